@@ -1,0 +1,122 @@
+//! The area or volume inside the surface by quadrature on the fitted polynomials.
+//!
+//! A grid of cells of the particle spacing covers the samples. Cells away from the surface count whole or not at
+//! all; cells that it cuts are halved along every axis, and the smallest ones count the share that a linear
+//! function with their corner values leaves inside.
+
+use super::redistancing::Redistancing;
+use crate::geometry::Vector;
+use rayon::prelude::{IntoParallelIterator, ParallelIterator};
+
+/// Halvings of a cut cell: 2⁴ in 2D leaves the linear share with an error of (h/16)² per cut length; 3D stops earlier,
+/// since the number of cut cells grows with the square.
+const fn halvings(dimension: usize) -> u32 {
+    if dimension == 2 { 4 } else { 1 }
+}
+
+/// The measure of all points with a negative level, for a bounded surface in an unbounded space.
+///
+/// Zero without samples. The sum runs over cells in a fixed order.
+#[must_use]
+pub fn enclosed_measure<const D: usize>(surface: &Redistancing<D>, spacing: f64) -> f64 {
+    if surface.is_lost() {
+        return 0.0;
+    }
+    let mut low = Vector::<D>::repeat(f64::INFINITY);
+    let mut high = Vector::<D>::repeat(f64::NEG_INFINITY);
+    for x in surface.sample_points() {
+        low = low.inf(&x);
+        high = high.sup(&x);
+    }
+    let low = low.add_scalar(-2.0 * spacing);
+    let counts: [usize; D] = std::array::from_fn(|d| ((high[d] + 2.0 * spacing - low[d]) / spacing).ceil() as usize);
+    let rows: usize = counts[1..].iter().product();
+    let sums: Vec<f64> = (0..rows)
+        .into_par_iter()
+        .map(|row| {
+            let mut corner = low;
+            let mut rest = row;
+            for d in 1..D {
+                corner[d] += (rest % counts[d]) as f64 * spacing;
+                rest /= counts[d];
+            }
+            (0..counts[0])
+                .map(|k| {
+                    corner[0] = low[0] + k as f64 * spacing;
+                    inside_of_cell(surface, &corner, spacing, halvings(D))
+                })
+                .sum()
+        })
+        .collect();
+    sums.iter().sum()
+}
+
+/// The inside part of one cubic cell.
+fn inside_of_cell<const D: usize>(surface: &Redistancing<D>, corner: &Vector<D>, edge: f64, halvings: u32) -> f64 {
+    let whole = edge.powi(D as i32);
+    let centre = corner.add_scalar(0.5 * edge);
+    let half_diagonal = 0.5 * edge * (D as f64).sqrt();
+    let Some(foot) = surface.query(&centre, f64::INFINITY) else { return 0.0 };
+    if foot.distance >= half_diagonal {
+        return if foot.is_outside { 0.0 } else { whole };
+    }
+    if halvings == 0 {
+        let signed = if foot.is_outside { foot.distance } else { -foot.distance };
+        return whole * share_below_plane(&foot.normal, signed / edge);
+    }
+    let half = 0.5 * edge;
+    (0..1_usize << D)
+        .map(|octant| {
+            let child = Vector::<D>::from_fn(|d, _| corner[d] + half * (octant >> d & 1) as f64);
+            inside_of_cell(surface, &child, half, halvings - 1)
+        })
+        .sum()
+}
+
+/// The share of the unit cube about the origin with n·x + s < 0 for a unit normal n.
+///
+/// By inclusion and exclusion over the corners: Σ ± max(0, −s − n·c)^D / (D! Π n_d), for the normal's components
+/// made positive; components near zero are lifted to keep the formula stable, at an error of their size.
+fn share_below_plane<const D: usize>(normal: &Vector<D>, signed: f64) -> f64 {
+    let n = normal.map(|c| c.abs().max(1e-4));
+    let total: f64 = n.sum();
+    let depth = 0.5 * total - signed;
+    if depth <= 0.0 {
+        return 0.0;
+    }
+    if depth >= total {
+        return 1.0;
+    }
+    let mut sum = 0.0;
+    for corner in 0..1_usize << D {
+        let offset: f64 = (0..D).filter(|d| corner >> d & 1 == 1).map(|d| n[d]).sum();
+        let term = (depth - offset).max(0.0).powi(D as i32);
+        sum += if corner.count_ones().is_multiple_of(2) { term } else { -term };
+    }
+    let factorial = if D == 2 { 2.0 } else { 6.0 };
+    (sum / (factorial * n.product())).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Vector, share_below_plane};
+
+    #[test]
+    fn planes_cut_the_unit_cube_as_counted() {
+        for (normal, signed) in [
+            (Vector::<3>::new(1.0, 2.0, -2.0) / 3.0, 0.1),
+            (Vector::<3>::new(0.0, 0.6, 0.8), -0.3),
+            (Vector::<3>::new(1.0, 0.0, 0.0), 0.2),
+        ] {
+            let n = 60;
+            let mut count = 0;
+            for k in 0..n * n * n {
+                let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n) - 0.5;
+                let x = Vector::<3>::new(at(k % n), at(k / n % n), at(k / n / n));
+                count += i32::from(x.dot(&normal) + signed < 0.0);
+            }
+            let share = share_below_plane(&normal, signed);
+            assert!((share - f64::from(count) / f64::from(n * n * n)).abs() < 0.01, "{share}");
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! The parameters of a closest-point level set, as understood.
+
+use crate::geometry::Vector;
+use crate::polynomials::{BasisKind, Neighborhood, PolynomialBasis, Regression};
+
+/// How particles are redistanced. Lengths are in multiples of the spacing h.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PcpMethod {
+    /// Total degree of the local polynomials.
+    pub degree: usize,
+    /// Basis of the regression.
+    pub basis: BasisKind,
+    /// Which particles take part in a fit.
+    pub neighborhood: NeighborhoodChoice,
+    /// k of the weight exp(−k r²/r_c²).
+    pub weight: f64,
+    /// Least number of neighbours per coefficient.
+    pub minimum_ratio: f64,
+    /// ξ/h: particles with the other sign within ξ become sample particles.
+    pub sample_threshold_h: f64,
+    /// ε: iterations end when the error of the foot falls below it.
+    pub tolerance: f64,
+    /// k_max of the iterations.
+    pub max_iterations: u32,
+}
+
+/// A neighbourhood in multiples of the spacing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NeighborhoodChoice {
+    /// All within `cutoff_h` spacings.
+    Radius {
+        /// r_c/h.
+        cutoff_h: f64,
+    },
+    /// The nearest `count` particles.
+    Nearest {
+        /// n_n.
+        count: usize,
+    },
+}
+
+impl PcpMethod {
+    /// The regression for particles of spacing h.
+    #[must_use]
+    pub fn regression<const D: usize>(&self, spacing: f64) -> Regression<D> {
+        Regression {
+            basis: PolynomialBasis::new(self.basis, self.degree),
+            neighborhood: match self.neighborhood {
+                NeighborhoodChoice::Radius { cutoff_h } => Neighborhood::Radius { cutoff: cutoff_h * spacing },
+                NeighborhoodChoice::Nearest { count } => Neighborhood::Nearest { count },
+            },
+            weight: self.weight,
+            minimum_ratio: self.minimum_ratio,
+            spacing,
+        }
+    }
+
+    /// How far from the surface particles take part in fits, in multiples of h, growth of the radius included.
+    #[must_use]
+    pub fn reach_h<const D: usize>(&self) -> f64 {
+        let terms = PolynomialBasis::<D>::terms(self.degree) as f64;
+        let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
+        let by_count = |count: f64| (count / ball).powf(1.0 / D as f64);
+        let cutoff = match self.neighborhood {
+            NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,
+            NeighborhoodChoice::Nearest { count } => by_count(count as f64),
+        };
+        // Half again over what an even distribution needs leaves room for the growth of a starved neighbourhood.
+        self.sample_threshold_h + 1.5 * cutoff.max(by_count(self.minimum_ratio * terms)) + 1.0
+    }
+
+    /// Whether two positions count as the same place for the iterations.
+    #[must_use]
+    pub fn is_converged<const D: usize>(&self, step: &Vector<D>) -> bool {
+        step.norm_squared() <= self.tolerance * self.tolerance
+    }
+}

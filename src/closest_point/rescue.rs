@@ -1,0 +1,80 @@
+//! Counts of everything that did not go the plain way. A rescue is data: counted and reported, never silent.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+macro_rules! counters {
+    ($($(#[$doc:meta])* $name:ident => $label:literal,)*) => {
+        /// How often what happened, over the life of a simulation.
+        #[derive(Debug, Default)]
+        pub struct RescueCounts {
+            $($(#[$doc])* pub $name: AtomicU64,)*
+        }
+
+        impl RescueCounts {
+            /// Labels and counts in a fixed order.
+            #[must_use]
+            pub fn entries(&self) -> Vec<(&'static str, u64)> {
+                vec![$(($label, self.$name.load(Ordering::Relaxed)),)*]
+            }
+
+            /// Takes the counts of an earlier [`Self::entries`] in the same order.
+            pub fn restore(&self, counts: &[u64]) {
+                let slots = [$(&self.$name,)*];
+                for (slot, count) in slots.into_iter().zip(counts) {
+                    slot.store(*count, Ordering::Relaxed);
+                }
+            }
+        }
+    };
+}
+
+counters! {
+    /// Regressions solved.
+    fits => "fits",
+    /// Fits whose radius had to grow.
+    enlarged => "fits.larger_radius",
+    /// Fits of a lower degree than asked.
+    lowered => "fits.lower_degree",
+    /// Near-surface particles without any fit.
+    unfitted => "fits.none",
+    /// Fits whose zero could not be reached: no sample particle.
+    unprojected => "samples.not_projected",
+    /// Queries solved, the rescued ones included.
+    queries => "queries",
+    /// Newton iterations of all queries.
+    iterations => "queries.iterations",
+    /// Queries that went on with another sample's polynomial.
+    hopped => "queries.other_sample",
+    /// Queries answered by the nearest sample itself.
+    sample_distance => "queries.sample_distance",
+    /// Band particles left as they were because the surface has no samples at all.
+    no_surface => "queries.no_surface",
+}
+
+/// Adds to a counter.
+pub(crate) fn add(counter: &AtomicU64, amount: u64) {
+    if amount > 0 {
+        counter.fetch_add(amount, Ordering::Relaxed);
+    }
+}
+
+/// Reads a counter.
+pub(crate) fn get(counter: &AtomicU64) -> u64 {
+    counter.load(Ordering::Relaxed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{RescueCounts, add};
+
+    #[test]
+    fn counts_survive_a_round_trip() {
+        let counts = RescueCounts::default();
+        add(&counts.hopped, 3);
+        add(&counts.queries, 70);
+        let saved: Vec<u64> = counts.entries().into_iter().map(|e| e.1).collect();
+        let other = RescueCounts::default();
+        other.restore(&saved);
+        assert_eq!(other.entries(), counts.entries());
+    }
+}

@@ -1,0 +1,55 @@
+//! What particles know of the surface: the signed distance, closest point, normal and curvature, and who is in the
+//! narrow band (PCP paper, sections 3.3 and 3.4).
+
+use super::redistancing::ClosestPoint;
+use crate::geometry::Vector;
+use crate::particles::{FlagKey, Particles, ScalarKey, VectorKey};
+
+/// The keys of the columns that redistancing writes.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfaceColumns {
+    /// Signed distance; meaningful in the band alone.
+    pub phi: ScalarKey,
+    /// Closest point of the surface.
+    pub closest_point: VectorKey,
+    /// Outward normal at the closest point.
+    pub normal: VectorKey,
+    /// Curvature at the closest point.
+    pub curvature: ScalarKey,
+    /// 1 within the narrow band.
+    pub in_band: FlagKey,
+}
+
+impl SurfaceColumns {
+    /// Adds the columns; nobody is in the band yet.
+    pub fn add<const D: usize>(particles: &mut Particles<D>) -> Self {
+        Self {
+            phi: particles.add_scalar("phi", 0.0),
+            closest_point: particles.add_vector("closest_point", Vector::<D>::zeros()),
+            normal: particles.add_vector("normal", Vector::<D>::zeros()),
+            curvature: particles.add_scalar("curvature", 0.0),
+            in_band: particles.add_flag("in_band", 0),
+        }
+    }
+
+    /// Writes answers (one a particle, None outside the band); the sign is that of the level before (PCP eq. 15).
+    pub fn store<const D: usize>(
+        &self,
+        particles: &mut Particles<D>,
+        level: ScalarKey,
+        answers: &[Option<ClosestPoint<D>>],
+        half_band: f64,
+    ) {
+        for (i, answer) in answers.iter().enumerate() {
+            let answer = answer.filter(|a| a.distance <= half_band);
+            particles.flag_mut(self.in_band)[i] = u8::from(answer.is_some());
+            if let Some(answer) = answer {
+                let inside = particles.scalar(level)[i] < 0.0;
+                particles.scalar_mut(self.phi)[i] = if inside { -answer.distance } else { answer.distance };
+                particles.vector_mut(self.closest_point)[i] = answer.point;
+                particles.vector_mut(self.normal)[i] = answer.normal;
+                particles.scalar_mut(self.curvature)[i] = answer.curvature;
+            }
+        }
+    }
+}

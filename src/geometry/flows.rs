@@ -1,0 +1,26 @@
+//! Prescribed velocity fields u(x, t). One file a flow.
+
+pub mod rotation;
+pub mod single_vortex;
+pub mod translation;
+
+pub use rotation::Rotation;
+pub use single_vortex::SingleVortex;
+pub use translation::Translation;
+
+use super::Vector;
+
+/// A velocity field known everywhere at every time.
+pub trait Flow<const D: usize>: Send + Sync {
+    /// u(x, t).
+    fn velocity(&self, x: &Vector<D>, time: f64) -> Vector<D>;
+
+    /// The largest speed anywhere in the ball `|x − center| ≤ radius` at any time, for step estimates.
+    fn largest_speed(&self, center: &Vector<D>, radius: f64) -> f64;
+
+    /// Whether the motion keeps all distances.
+    fn is_rigid(&self) -> bool;
+
+    /// The time at which the flow has brought every point back to its start, if it does.
+    fn return_time(&self) -> Option<f64>;
+}

@@ -1,0 +1,28 @@
+//! Uniform motion.
+
+use super::{Flow, Vector};
+
+/// u = v everywhere at all times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Translation<const D: usize> {
+    /// v.
+    pub velocity: Vector<D>,
+}
+
+impl<const D: usize> Flow<D> for Translation<D> {
+    fn velocity(&self, _x: &Vector<D>, _time: f64) -> Vector<D> {
+        self.velocity
+    }
+
+    fn largest_speed(&self, _center: &Vector<D>, _radius: f64) -> f64 {
+        self.velocity.norm()
+    }
+
+    fn is_rigid(&self) -> bool {
+        true
+    }
+
+    fn return_time(&self) -> Option<f64> {
+        None
+    }
+}

@@ -1,0 +1,82 @@
+//! Box (rectangle in 2D) with faces across the coordinates.
+
+use super::{Surface, SurfacePoint, Vector, join, line_points};
+
+/// |x_i − c_i| ≤ size_i / 2.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cuboid<const D: usize> {
+    /// Centre c.
+    pub center: Vector<D>,
+    /// Full edge lengths, positive.
+    pub size: Vector<D>,
+}
+
+impl<const D: usize> Cuboid<D> {
+    /// The axis of the face nearest to an inner point (centred frame) and its signed distance ≤ 0.
+    pub(super) fn nearest_face(half: &Vector<D>, local: &Vector<D>) -> (usize, f64) {
+        let mut axis = 0;
+        for d in 1..D {
+            if local[d].abs() - half[d] > local[axis].abs() - half[axis] {
+                axis = d;
+            }
+        }
+        (axis, local[axis].abs() - half[axis])
+    }
+}
+
+impl<const D: usize> Surface<D> for Cuboid<D> {
+    fn nearest(&self, x: &Vector<D>) -> SurfacePoint<D> {
+        let half = self.size * 0.5;
+        let local = x - self.center;
+        let clamped = Vector::<D>::from_fn(|d, _| local[d].clamp(-half[d], half[d]));
+        let outside = (0..D).filter(|&d| local[d].abs() > half[d]).count();
+        let (axis, depth) = Self::nearest_face(&half, &local);
+        let mut foot = clamped;
+        let distance = if outside == 0 {
+            foot[axis] = half[axis].copysign(local[axis]);
+            depth
+        } else {
+            (local - clamped).norm()
+        };
+        let mut face = Vector::<D>::zeros();
+        face[axis] = 1.0_f64.copysign(local[axis]);
+        let on_edge = (0..D).filter(|&d| foot[d].abs() >= half[d]).count() > 1;
+        SurfacePoint {
+            distance,
+            point: self.center + foot,
+            normal: (!on_edge).then_some(face),
+            curvature: (!on_edge).then_some(0.0),
+        }
+    }
+
+    fn bounding_box(&self) -> (Vector<D>, Vector<D>) {
+        (self.center - self.size * 0.5, self.center + self.size * 0.5)
+    }
+
+    fn measure(&self) -> f64 {
+        self.size.product()
+    }
+
+    fn near_medial_axis(&self, x: &Vector<D>, tolerance: f64) -> bool {
+        let half = self.size * 0.5;
+        let local = x - self.center;
+        let (axis, depth) = Self::nearest_face(&half, &local);
+        let inside = depth < 0.0;
+        inside && (0..D).any(|d| d != axis && depth - (local[d].abs() - half[d]) <= tolerance)
+            || inside && local[axis].abs() <= tolerance
+    }
+
+    fn outline(&self, spacing: f64) -> Vec<Vec<Vector<D>>> {
+        if D != 2 {
+            return Vec::new();
+        }
+        let corner = |sx: f64, sy: f64| {
+            let mut c = self.center;
+            c[0] += 0.5 * sx * self.size[0];
+            c[1] += 0.5 * sy * self.size[1];
+            c
+        };
+        let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        vec![join((0..4).map(|k| line_points(&corners[k], &corners[(k + 1) % 4], spacing)).collect())]
+    }
+}

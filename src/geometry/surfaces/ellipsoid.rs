@@ -1,0 +1,115 @@
+//! Ellipse and ellipsoid with axes along the coordinates.
+//!
+//! The closest point solves x_i = e_i² y_i / (t + e_i²) with Σ (e_i y_i / (t + e_i²))² = 1 for the largest root t
+//! (Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid"). The function of t is convex
+//! and falls beyond −e_min², so Newton's method from the left end of the bracket rises to the root monotonically.
+
+use super::{Surface, SurfacePoint, Vector, arc_points};
+use std::f64::consts::PI;
+
+/// Σ ((x_i − c_i) / e_i)² = 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ellipsoid<const D: usize> {
+    /// Centre c.
+    pub center: Vector<D>,
+    /// Semi-axes e, positive.
+    pub semi_axes: Vector<D>,
+}
+
+impl<const D: usize> Ellipsoid<D> {
+    /// √(Σ ((x_i − c_i)/e_i)²) − 1: a level-set function with this zero that is no distance (PCP eq. 21, sign turned).
+    #[must_use]
+    pub fn quadric(&self, x: &Vector<D>) -> f64 {
+        (x - self.center).component_div(&self.semi_axes).norm() - 1.0
+    }
+
+    /// The closest point for a query in the first orthant of the centred frame.
+    fn closest_in_first_orthant(&self, y: &Vector<D>) -> Vector<D> {
+        let e = &self.semi_axes;
+        let shortest = e.min();
+        // With s = t + e_min² the denominators t + e_i² = s + (e_i² − e_min²) lose no digits near the pole.
+        let gap = Vector::<D>::from_fn(|i, _| (e[i] - shortest) * (e[i] + shortest));
+        let pulled = |i: &usize| y[*i] > 0.0;
+        // Reach of the query along the shortest axes: it bounds the root away from the pole.
+        let reach = (0..D).filter(|&i| gap[i] == 0.0).map(|i| y[i] * y[i]).sum::<f64>().sqrt();
+        if reach == 0.0 {
+            // No pull along the shortest axes: near the centre the closest point leaves the coordinate plane.
+            let mut x = Vector::<D>::from_fn(|i, _| if gap[i] > 0.0 { e[i] * e[i] * y[i] / gap[i] } else { 0.0 });
+            let rest = 1.0 - x.component_div(e).norm_squared();
+            if rest > 0.0 {
+                if let Some(i) = (0..D).find(|&i| gap[i] == 0.0) {
+                    x[i] = shortest * rest.sqrt();
+                }
+                return x;
+            }
+        }
+        let mut s = shortest * reach;
+        for _ in 0..200 {
+            let value = (0..D).filter(pulled).map(|i| (e[i] * y[i] / (s + gap[i])).powi(2)).sum::<f64>() - 1.0;
+            let slope: f64 = (0..D).filter(pulled).map(|i| -2.0 * (e[i] * y[i] / (s + gap[i])).powi(2) / (s + gap[i])).sum();
+            let next = s - value / slope;
+            if !(next > s) {
+                break;
+            }
+            s = next;
+        }
+        Vector::<D>::from_fn(|i, _| if y[i] > 0.0 { e[i] * e[i] * y[i] / (s + gap[i]) } else { 0.0 })
+    }
+}
+
+impl<const D: usize> Surface<D> for Ellipsoid<D> {
+    fn nearest(&self, x: &Vector<D>) -> SurfacePoint<D> {
+        let e = &self.semi_axes;
+        let local = x - self.center;
+        let foot = self.closest_in_first_orthant(&local.abs());
+        // Round-off of the root is removed by one normalisation onto the surface.
+        let foot = foot / foot.component_div(e).norm();
+        let foot = Vector::<D>::from_fn(|i, _| foot[i].copysign(local[i]));
+        let gradient = Vector::<D>::from_fn(|i, _| 2.0 * foot[i] / (e[i] * e[i]));
+        let length = gradient.norm();
+        let normal = gradient / length;
+        let trace: f64 = (0..D).map(|i| 2.0 / (e[i] * e[i])).sum();
+        let bent: f64 = (0..D).map(|i| 2.0 / (e[i] * e[i]) * normal[i] * normal[i]).sum();
+        let inside = local.component_div(e).norm_squared() < 1.0;
+        let distance = (local - foot).norm();
+        SurfacePoint {
+            distance: if inside { -distance } else { distance },
+            point: self.center + foot,
+            normal: Some(normal),
+            curvature: Some((trace - bent) / length),
+        }
+    }
+
+    fn bounding_box(&self) -> (Vector<D>, Vector<D>) {
+        (self.center - self.semi_axes, self.center + self.semi_axes)
+    }
+
+    fn measure(&self) -> f64 {
+        let product = self.semi_axes.product();
+        if D == 2 { PI * product } else { 4.0 / 3.0 * PI * product }
+    }
+
+    fn near_medial_axis(&self, x: &Vector<D>, tolerance: f64) -> bool {
+        // The medial axis lies in the plane through the centre across a shortest axis, within the focal reach.
+        let local = x - self.center;
+        let shortest = self.semi_axes.min();
+        let flat = (0..D).any(|i| self.semi_axes[i] <= shortest && local[i].abs() <= tolerance);
+        let reach = (0..D)
+            .filter(|&i| self.semi_axes[i] > shortest)
+            .map(|i| {
+                let focal = (self.semi_axes[i].powi(2) - shortest * shortest) / self.semi_axes[i];
+                (local[i].abs() - tolerance).max(0.0) / focal
+            })
+            .map(|r| r * r)
+            .sum::<f64>();
+        let beside = (0..D).all(|i| self.semi_axes[i] > shortest || local[i].abs() <= tolerance);
+        flat && beside && reach <= 1.0
+    }
+
+    fn outline(&self, spacing: f64) -> Vec<Vec<Vector<D>>> {
+        if D != 2 {
+            return Vec::new();
+        }
+        vec![arc_points(&self.center, [self.semi_axes[0], self.semi_axes[1]], 0.0, 2.0 * PI, spacing)]
+    }
+}

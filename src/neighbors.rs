@@ -1,0 +1,18 @@
+//! Which points are near a point: a cell list, and brute force as its oracle.
+
+pub mod brute_force;
+pub mod cell_list;
+
+pub use brute_force::BruteForce;
+pub use cell_list::CellList;
+
+use crate::geometry::Vector;
+
+/// Search over a fixed set of points; the order of visits depends on the points alone.
+pub trait NeighborSearch<const D: usize> {
+    /// Calls `visit(j, dx, r²)` for every point j with `r ≤ radius`, `dx = x_j − x` by the shortest way.
+    fn for_each_within(&self, x: &Vector<D>, radius: f64, visit: impl FnMut(usize, &Vector<D>, f64));
+
+    /// The nearest point not farther than `reach`, as (index, distance); among equals the least index.
+    fn nearest(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)>;
+}

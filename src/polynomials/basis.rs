@@ -1,0 +1,161 @@
+//! Polynomial bases as products of one-dimensional Newton factors u_k(x) = ∏_{j<k} (x − p_j).
+//!
+//! Monomials are the case p_j = 0. The minter basis (PCP paper, section 3.1) is the Lagrange basis of the unisolvent
+//! nodes, which is a triangular combination of Newton factors: regressions use the Lagrange values, evaluation the
+//! Newton form. So one evaluator serves all bases, and because indices are graded, dropping the trailing terms gives
+//! the basis of lower degree.
+
+use super::multi_index::{MultiIndexSet, term_count};
+use super::unisolvent_nodes::{lagrange_in_newton_form, leja_ordered_chebyshev_lobatto};
+use super::{MAX_DEGREE, MAX_TERMS};
+use crate::geometry::Vector;
+
+/// Which basis a regression solves in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BasisKind {
+    /// Lagrange polynomials on Chebyshev–Lobatto unisolvent nodes of total degree, in Newton form.
+    Minter,
+    /// Monomials of the centred coordinates scaled by the radius of the neighbourhood.
+    Monomial,
+    /// Monomials of the raw coordinates, neither centred nor scaled: for the comparison of PCP fig. 6.
+    MonomialUnscaled,
+}
+
+/// A basis of all polynomials of `D` variables up to a total degree.
+#[derive(Debug, Clone)]
+pub struct PolynomialBasis<const D: usize> {
+    kind: BasisKind,
+    degree: usize,
+    set: MultiIndexSet<D>,
+    /// Generating nodes p_0 … p_{n−1}.
+    nodes: [f64; MAX_DEGREE],
+    /// Row α: the coefficients of the Lagrange polynomial L_α in Newton form. Empty for monomials.
+    lagrange: Vec<f64>,
+}
+
+/// One-dimensional factors u_0 … u_n at one coordinate, with derivatives.
+pub(super) type Factors = [f64; MAX_DEGREE + 1];
+
+impl<const D: usize> PolynomialBasis<D> {
+    /// A basis of the given kind, `1 ≤ degree ≤ 8`.
+    #[must_use]
+    pub fn new(kind: BasisKind, degree: usize) -> Self {
+        let set = MultiIndexSet::total_degree(degree);
+        let mut nodes = [0.0; MAX_DEGREE];
+        let mut lagrange = Vec::new();
+        if kind == BasisKind::Minter {
+            let generating = leja_ordered_chebyshev_lobatto(degree);
+            nodes[..degree].copy_from_slice(&generating[..degree]);
+            lagrange = lagrange_in_newton_form(&set, &generating);
+        }
+        Self { kind, degree, set, nodes, lagrange }
+    }
+
+    /// Which basis it is.
+    #[must_use]
+    pub fn kind(&self) -> BasisKind {
+        self.kind
+    }
+
+    /// Total degree.
+    #[must_use]
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// Number of terms of total degree `degree`, a beginning of the basis.
+    #[must_use]
+    pub fn terms(degree: usize) -> usize {
+        term_count::<D>(degree)
+    }
+
+    pub(super) fn indices(&self) -> &[[u8; D]] {
+        self.set.indices()
+    }
+
+    pub(super) fn factors(&self, x: f64, degree: usize) -> Factors {
+        let mut u = [0.0; MAX_DEGREE + 1];
+        u[0] = 1.0;
+        for k in 0..degree {
+            u[k + 1] = u[k] * (x - self.nodes[k]);
+        }
+        u
+    }
+
+    /// Factors with first and second derivatives.
+    pub(super) fn factor_jets(&self, x: f64, degree: usize) -> (Factors, Factors, Factors) {
+        let mut u = [0.0; MAX_DEGREE + 1];
+        let mut first = u;
+        let mut second = u;
+        u[0] = 1.0;
+        for k in 0..degree {
+            let s = x - self.nodes[k];
+            u[k + 1] = u[k] * s;
+            first[k + 1] = first[k] * s + u[k];
+            second[k + 1] = second[k] * s + 2.0 * first[k];
+        }
+        (u, first, second)
+    }
+
+    /// Values of the first `terms(degree)` basis functions at `x` (local coordinates), as a regression row needs them.
+    pub fn row(&self, x: &Vector<D>, degree: usize, row: &mut [f64]) {
+        let terms = row.len();
+        let mut newton = [0.0; MAX_TERMS];
+        let factors: [Factors; D] = std::array::from_fn(|d| self.factors(x[d], degree));
+        for (value, index) in newton[..terms].iter_mut().zip(self.indices()) {
+            *value = (0..D).map(|d| factors[d][index[d] as usize]).product();
+        }
+        if self.lagrange.is_empty() {
+            row.copy_from_slice(&newton[..terms]);
+            return;
+        }
+        let stride = self.indices().len();
+        for (alpha, value) in row.iter_mut().enumerate() {
+            // L_α combines the Newton terms from α on; cut off at `terms` it is the Lagrange basis of lower degree.
+            let coefficients = &self.lagrange[alpha * stride + alpha..alpha * stride + terms];
+            *value = coefficients.iter().zip(&newton[alpha..terms]).map(|(c, v)| c * v).sum();
+        }
+    }
+
+    /// Turns the coefficients of a regression into those of the Newton factors, in place.
+    pub fn to_newton_form(&self, coefficients: &mut [f64]) {
+        if self.lagrange.is_empty() {
+            return;
+        }
+        let terms = coefficients.len();
+        let stride = self.indices().len();
+        for beta in (0..terms).rev() {
+            coefficients[beta] = (0..=beta).map(|alpha| coefficients[alpha] * self.lagrange[alpha * stride + beta]).sum();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BasisKind, PolynomialBasis, Vector};
+
+    #[test]
+    fn lower_degrees_of_the_minter_basis_are_lagrange_bases_of_their_own() {
+        let basis = PolynomialBasis::<2>::new(BasisKind::Minter, 5);
+        for degree in 1..=5 {
+            let terms = PolynomialBasis::<2>::terms(degree);
+            for (a, alpha) in basis.indices()[..terms].iter().enumerate() {
+                let generating = super::leja_ordered_chebyshev_lobatto(5);
+                let x = Vector::<2>::new(generating[alpha[0] as usize], generating[alpha[1] as usize]);
+                let mut row = vec![0.0; terms];
+                basis.row(&x, degree, &mut row);
+                for (b, value) in row.iter().enumerate() {
+                    assert!((value - f64::from(u8::from(a == b))).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lagrange_polynomials_sum_to_one() {
+        let basis = PolynomialBasis::<3>::new(BasisKind::Minter, 4);
+        let mut row = vec![0.0; 35];
+        basis.row(&Vector::<3>::new(0.3, -0.7, 0.11), 4, &mut row);
+        assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,129 @@
+//! Scenes: from parameters as written to a valid scene that builds a simulation.
+//!
+//! A scene kind declares its parameters as data ([`schema::Parameter`]); checking, defaults, presets, JSON Schema and
+//! the list of restart-safe fields all come from that declaration.
+
+pub mod check;
+pub mod json_schema;
+pub mod schema;
+
+pub use check::{Violation, check};
+pub use schema::{Default as DefaultValue, Kind, Parameter, Variant};
+
+use crate::parallel::Interrupt;
+use crate::simulation::{CpuClock, OutputPlan, Simulation};
+use serde_json::{Map, Value};
+
+/// A kind of scene: everything that clients learn of it, and how its JSON becomes a scene.
+pub struct SceneKind {
+    /// The `kind` in JSON.
+    pub kind: &'static str,
+    /// One line.
+    pub title: &'static str,
+    /// Its parameters, `kind` and `preset` excepted.
+    pub parameters: &'static [Parameter],
+    /// Names of presets.
+    pub presets: &'static [&'static str],
+    /// Parameters of a preset, given what else stands in the scene.
+    pub preset: fn(name: &str, given: &Map<String, Value>) -> Map<String, Value>,
+    /// A small job body that runs in seconds.
+    pub example: &'static str,
+    /// From checked parameters (all defaults present) to a scene.
+    pub understand: fn(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Violation>>,
+}
+
+/// A valid scene.
+pub trait Scene: Send + Sync {
+    /// The parameters with every default and every automatic choice that is known before a run.
+    fn resolved(&self) -> Value;
+
+    /// Fields that frames can show.
+    fn field_names(&self) -> Vec<&'static str>;
+
+    /// Size of the run.
+    fn estimate(&self) -> Estimate;
+
+    /// The simulation at its start. Memory for particles is allocated here.
+    ///
+    /// # Errors
+    /// What turns out not to fit together only when it is made; a checked scene has nothing of that left.
+    fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>>;
+}
+
+/// What a scene is told when it is built.
+#[derive(Debug, Clone)]
+pub struct BuildContext {
+    /// When output is wanted.
+    pub plan: OutputPlan,
+    /// Asks a running step to be dropped.
+    pub interrupt: Interrupt,
+    /// Counter of CPU seconds.
+    pub cpu_clock: CpuClock,
+}
+
+/// The size of a run, before it is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Particles, within a few per cent.
+    pub particles: u64,
+    /// Steps.
+    pub steps: u64,
+    /// Δt.
+    pub time_step: f64,
+    /// Scene time at the end.
+    pub end_time: f64,
+    /// Resident memory of the simulation itself.
+    pub memory_bytes: u64,
+}
+
+/// From the JSON of a scene (`{"kind": …, …}`) to a scene. Pointers of violations start at the scene.
+///
+/// 1. The kind is looked up. 2. The preset is laid under what is given. 3. Parameters are checked one by one,
+///    defaults filled in. 4. The kind checks what parameters mean together.
+///
+/// # Errors
+/// All violations at once.
+pub fn understand(value: &Value, kinds: &[&'static SceneKind]) -> Result<Box<dyn Scene>, Vec<Violation>> {
+    let Value::Object(given) = value else {
+        return Err(vec![Violation::new("", "type", "a scene is an object", value, "an object with a kind".into())]);
+    };
+    let names: Vec<&str> = kinds.iter().map(|kind| kind.kind).collect();
+    let Some(kind) = given.get("kind") else {
+        let detail = "every scene names its kind";
+        return Err(vec![Violation::new("/kind", "required", detail, &Value::Null, names.into())]);
+    };
+    let Some(scene_kind) = kind.as_str().and_then(|name| kinds.iter().find(|k| k.kind == name)) else {
+        let mut violation = Violation::new("/kind", "unknown", "there is no such kind of scene", kind, names.clone().into());
+        violation.did_you_mean = kind.as_str().and_then(|name| check::closest(name, &names));
+        return Err(vec![violation]);
+    };
+    let mut violations = Vec::new();
+    let mut given = given.clone();
+    given.shift_remove("kind");
+    if let Some(preset) = given.shift_remove("preset") {
+        match preset.as_str().filter(|name| scene_kind.presets.contains(name)) {
+            Some(name) => given = check::laid_under((scene_kind.preset)(name, &given), given),
+            None => {
+                let allowed = scene_kind.presets.to_vec();
+                let mut violation = Violation::new("/preset", "unknown", "there is no such preset", &preset, allowed.into());
+                violation.did_you_mean = preset.as_str().and_then(|name| check::closest(name, scene_kind.presets));
+                violations.push(violation);
+            }
+        }
+    }
+    let mut resolved = check(scene_kind.parameters, &given, "", &mut violations);
+    // A name near `preset` is a likely slip, but `check` knows parameters only.
+    for violation in &mut violations {
+        if violation.code == "unknown_field" && violation.did_you_mean.is_none() {
+            let name = violation.pointer.trim_start_matches('/').to_owned();
+            violation.did_you_mean = check::closest(&name, &["preset", "kind"]);
+        }
+    }
+    if !violations.is_empty() {
+        return Err(violations);
+    }
+    let mut whole = Map::new();
+    whole.insert("kind".into(), scene_kind.kind.into());
+    whole.append(&mut resolved);
+    (scene_kind.understand)(&Value::Object(whole))
+}

@@ -1,0 +1,19 @@
+//! The kinds of scenes, one folder each. Schemas, validation, documentation and the tests that every scene must pass
+//! come from [`SCENES`].
+
+pub mod particle_estimate;
+pub mod pcp_parameters;
+pub mod redistance;
+pub mod shapes;
+pub mod vortex;
+
+use crate::scene::SceneKind;
+
+/// Every kind of scene.
+pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND];
+
+/// A kind by its name.
+#[must_use]
+pub fn find(kind: &str) -> Option<&'static SceneKind> {
+    SCENES.iter().copied().find(|k| k.kind == kind)
+}

@@ -1,0 +1,135 @@
+//! The parameters of the closest-point method (`"type": "pcp"`), shared by the scenes that use it.
+
+use crate::closest_point::PcpMethod;
+use crate::closest_point::method::NeighborhoodChoice;
+use crate::polynomials::basis::BasisKind;
+use crate::polynomials::multi_index::term_count;
+use crate::scene::schema::{NOT_NEGATIVE, POSITIVE};
+use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// Parameters of `pcp`.
+pub static PARAMETERS: &[Parameter] = &[
+    Parameter::new("degree", "total degree of the local polynomials", Kind::Integer { least: 1, most: 8 }, DefaultValue::Json("4")),
+    Parameter::new(
+        "basis",
+        "basis of the regressions; monomial_unscaled is neither centred nor scaled, for comparison",
+        Kind::Word(&["minter", "monomial", "monomial_unscaled"]),
+        DefaultValue::Json("\"minter\""),
+    ),
+    Parameter::new("neighborhood", "which particles take part in a fit; radius 2.5 h when not given", Kind::Choice(neighborhoods), DefaultValue::Absent),
+    Parameter::new("cutoff_h", "short for neighborhood radius {cutoff_h}", POSITIVE, DefaultValue::Absent),
+    Parameter::new("weight", "k in the weight exp(−k r²/r_c²)", NOT_NEGATIVE, DefaultValue::Json("2")),
+    Parameter::new(
+        "minimum_ratio",
+        "neighbours per coefficient up to which the radius grows; 2 when the field is overwritten every step, else 1.5",
+        Kind::Number { above: None, least: Some(1.0), below: None, most: Some(20.0) },
+        DefaultValue::Absent,
+    ),
+    Parameter::new(
+        "sample_threshold_h",
+        "particles with another of the opposite sign within so many h become sample particles",
+        Kind::Number { above: Some(0.5), least: None, below: None, most: Some(10.0) },
+        DefaultValue::Json("1.5"),
+    ),
+    Parameter::new("tolerance", "error of a closest point at which iterations end", POSITIVE, DefaultValue::Json("1e-14")),
+    Parameter::new("max_iterations", "most iterations of a solve", Kind::Integer { least: 1, most: 100_000 }, DefaultValue::Json("1000")),
+];
+
+static NEIGHBORHOODS: &[Variant] = &[
+    Variant {
+        name: "radius",
+        doc: "all particles within a radius, which grows until there are enough",
+        parameters: &[Parameter::new("cutoff_h", "r_c/h", POSITIVE, DefaultValue::Json("2.5"))],
+    },
+    Variant {
+        name: "nearest",
+        doc: "the nearest particles",
+        parameters: &[Parameter::new("count", "how many", Kind::Integer { least: 4, most: 10_000 }, DefaultValue::Json("30"))],
+    },
+];
+
+fn neighborhoods() -> &'static [Variant] {
+    NEIGHBORHOODS
+}
+
+#[derive(Debug, Deserialize)]
+struct Written {
+    degree: usize,
+    basis: String,
+    neighborhood: Option<Neighborhood>,
+    cutoff_h: Option<f64>,
+    weight: f64,
+    minimum_ratio: Option<f64>,
+    sample_threshold_h: f64,
+    tolerance: f64,
+    max_iterations: u32,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+enum Neighborhood {
+    Radius { cutoff_h: f64 },
+    Nearest { count: usize },
+}
+
+/// The method of checked parameters, and the parameters with what was left open.
+///
+/// # Errors
+/// Everything that does not fit together.
+pub fn understand(
+    written: &Value,
+    pointer: &str,
+    dimension: usize,
+    default_ratio: f64,
+) -> Result<(PcpMethod, Value), Vec<Violation>> {
+    let parsed: Written = serde_json::from_value(written.clone())
+        .map_err(|error| vec![Violation::new(pointer, "type", error.to_string(), written, Value::Null)])?;
+    if parsed.neighborhood.is_some() && parsed.cutoff_h.is_some() {
+        let detail = "cutoff_h is short for a neighborhood; give one of them";
+        let got = json!(parsed.cutoff_h);
+        return Err(vec![Violation::new(format!("{pointer}/cutoff_h"), "conflict", detail, &got, Value::Null)]);
+    }
+    let terms = if dimension == 2 { term_count::<2>(parsed.degree) } else { term_count::<3>(parsed.degree) };
+    let neighborhood = match (parsed.neighborhood, parsed.cutoff_h) {
+        (Some(Neighborhood::Radius { cutoff_h }), _) | (None, Some(cutoff_h)) => NeighborhoodChoice::Radius { cutoff_h },
+        (Some(Neighborhood::Nearest { count }), _) => {
+            if count < terms {
+                let detail = format!("degree {} has {terms} coefficients", parsed.degree);
+                let at = format!("{pointer}/neighborhood/count");
+                return Err(vec![Violation::new(at, "range", detail, &json!(count), json!(format!("a whole number ≥ {terms}")))]);
+            }
+            NeighborhoodChoice::Nearest { count }
+        }
+        (None, None) => NeighborhoodChoice::Radius { cutoff_h: 2.5 },
+    };
+    let method = PcpMethod {
+        degree: parsed.degree,
+        basis: match parsed.basis.as_str() {
+            "monomial" => BasisKind::Monomial,
+            "monomial_unscaled" => BasisKind::MonomialUnscaled,
+            _ => BasisKind::Minter,
+        },
+        neighborhood,
+        weight: parsed.weight,
+        minimum_ratio: match neighborhood {
+            // A count that is given is meant.
+            NeighborhoodChoice::Nearest { .. } => parsed.minimum_ratio.unwrap_or(1.0),
+            NeighborhoodChoice::Radius { .. } => parsed.minimum_ratio.unwrap_or(default_ratio),
+        },
+        sample_threshold_h: parsed.sample_threshold_h,
+        tolerance: parsed.tolerance,
+        max_iterations: parsed.max_iterations,
+    };
+    let mut resolved = written.clone();
+    resolved["neighborhood"] = match neighborhood {
+        NeighborhoodChoice::Radius { cutoff_h } => json!({"type": "radius", "cutoff_h": cutoff_h}),
+        NeighborhoodChoice::Nearest { count } => json!({"type": "nearest", "count": count}),
+    };
+    resolved["minimum_ratio"] = json!(method.minimum_ratio);
+    if let Some(map) = resolved.as_object_mut() {
+        map.shift_remove("cutoff_h");
+    }
+    Ok((method, resolved))
+}

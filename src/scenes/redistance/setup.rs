@@ -1,0 +1,139 @@
+//! From parameters to resting particles.
+
+use super::parameters::Written;
+use crate::closest_point::PcpMethod;
+use crate::geometry::Vector;
+use crate::geometry::lattice::Lattice;
+use crate::scene::{BuildContext, Estimate, Scene, Violation};
+use crate::scenes::particle_estimate::{band_particles, memory_bytes};
+use crate::scenes::{pcp_parameters, shapes};
+use crate::schemes::static_redistancing::{InitialLevel, StaticRedistancing, StaticSystem};
+use crate::simulation::Simulation;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+struct RedistanceScene<const D: usize> {
+    resolved: Value,
+    shape: Value,
+    lattice: Lattice,
+    method: PcpMethod,
+    initial: InitialLevel<D>,
+    half_band: f64,
+    repeats: u64,
+}
+
+pub(super) fn understand(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Violation>> {
+    let written: Written = serde_json::from_value(parameters.clone())
+        .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
+    let implied = written.shape.as_ref().and_then(shapes::implied_dimension);
+    match written.dimension.or(implied).unwrap_or(2) {
+        3 => scene::<3>(&written, parameters.clone()),
+        _ => scene::<2>(&written, parameters.clone()),
+    }
+}
+
+fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Result<Box<dyn Scene>, Vec<Violation>> {
+    let mut violations = Vec::new();
+    let default_shape =
+        if D == 2 { json!({"type": "ellipse", "semi_axes": [0.75, 0.5]}) } else { json!({"type": "ellipsoid", "semi_axes": [0.75, 0.5, 0.5]}) };
+    let shape = written.shape.clone().unwrap_or(default_shape);
+    if let Err(found) = shapes::surface::<D>(&shape, "/shape") {
+        violations.extend(found);
+    }
+    // Overwritten every step: distances become the input of the next redistancing.
+    let default_ratio = if written.repeat > 1 { 2.0 } else { 1.5 };
+    let method = match pcp_parameters::understand(&written.method, "/method", D, default_ratio) {
+        Ok((method, full)) => {
+            resolved["method"] = full;
+            Some(method)
+        }
+        Err(found) => {
+            violations.extend(found);
+            None
+        }
+    };
+    let is_ellipse = matches!(shape["type"].as_str(), Some("ellipse" | "ellipsoid" | "circle" | "sphere"));
+    let default_initial = if is_ellipse { "quadric" } else { "distance" };
+    let initial_name = written.initial.as_ref().and_then(|v| v["type"].as_str()).unwrap_or(default_initial).to_owned();
+    let initial = match initial_name.as_str() {
+        "distance" => InitialLevel::Distance,
+        "scaled" => InitialLevel::Scaled,
+        _ => {
+            if !is_ellipse {
+                let detail = "the quadric belongs to circles, spheres, ellipses and ellipsoids";
+                violations.push(Violation::new("/initial", "conflict", detail, &json!(initial_name), json!(["distance", "scaled"])));
+            }
+            quadric::<D>(&shape)
+        }
+    };
+    if written.band.is_some() && written.band_h.is_some() {
+        let detail = "band_h is the band in multiples of h; give one of them";
+        violations.push(Violation::new("/band", "conflict", detail, &json!(written.band), Value::Null));
+    }
+    let band = written.band.unwrap_or(written.band_h.unwrap_or(12.0) * written.spacing);
+    let Some(method) = method.filter(|_| violations.is_empty()) else { return Err(violations) };
+    resolved["dimension"] = json!(D);
+    resolved["shape"] = shape.clone();
+    resolved["initial"] = json!({"type": initial_name});
+    resolved["band"] = json!(band);
+    if let Some(map) = resolved.as_object_mut() {
+        map.shift_remove("band_h");
+    }
+    let lattice = Lattice { spacing: written.spacing, offset: 0.0, jitter: written.jitter, seed: written.seed };
+    Ok(Box::new(RedistanceScene::<D> {
+        resolved,
+        shape,
+        lattice,
+        method,
+        initial,
+        half_band: 0.5 * band,
+        repeats: written.repeat,
+    }))
+}
+
+/// The quadric of a shape that has one.
+fn quadric<const D: usize>(shape: &Value) -> InitialLevel<D> {
+    let number = |name: &str, d: usize| shape[name].get(d).and_then(Value::as_f64);
+    let center = Vector::<D>::from_fn(|d, _| number("center", d).unwrap_or(0.0));
+    let radius = shape["radius"].as_f64().unwrap_or(1.0);
+    let semi_axes = Vector::<D>::from_fn(|d, _| number("semi_axes", d).unwrap_or(radius));
+    InitialLevel::Quadric { center, semi_axes }
+}
+
+impl<const D: usize> Scene for RedistanceScene<D> {
+    fn resolved(&self) -> Value {
+        self.resolved.clone()
+    }
+
+    fn field_names(&self) -> Vec<&'static str> {
+        vec!["phi", "closest_point", "normal", "curvature", "particle_id"]
+    }
+
+    fn estimate(&self) -> Estimate {
+        let reach = self.half_band.max(self.method.reach_h::<D>() * self.lattice.spacing);
+        let particles = shapes::surface::<D>(&self.shape, "/shape")
+            .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing));
+        Estimate {
+            particles,
+            steps: self.repeats,
+            time_step: 1.0,
+            end_time: self.repeats as f64,
+            memory_bytes: memory_bytes::<D>(particles, self.method.degree),
+        }
+    }
+
+    fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
+        let surface = shapes::surface::<D>(&self.shape, "/shape")?;
+        let method = BTreeMap::from([("method", "pcp, as given".to_owned())]);
+        let system = StaticSystem::new(
+            surface,
+            &self.lattice,
+            self.method.clone(),
+            self.initial,
+            self.half_band,
+            self.repeats,
+            context.interrupt,
+        );
+        Ok(Box::new(StaticRedistancing::new(system, context.cpu_clock, method)))
+    }
+}

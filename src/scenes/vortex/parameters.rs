@@ -1,0 +1,183 @@
+//! The JSON of a `vortex` scene.
+
+use crate::scene::schema::{ANY, POSITIVE};
+use crate::scene::{DefaultValue, Kind, Parameter, Variant};
+use crate::scenes::{pcp_parameters, shapes};
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+
+const STEPS: Kind = Kind::Integer { least: 1, most: 1_000_000_000 };
+
+pub(super) static PARAMETERS: &[Parameter] = &[
+    Parameter::new(
+        "dimension",
+        "2 or 3; when not given, that of the shape, else 2",
+        Kind::Integer { least: 2, most: 3 },
+        DefaultValue::Absent,
+    ),
+    Parameter::new("flow", "the velocity field", Kind::Choice(flow_variants), DefaultValue::Json("\"single_vortex\"")),
+    Parameter::new(
+        "shape",
+        "the surface at the start",
+        Kind::Choice(shapes::variants),
+        DefaultValue::Json(r#"{"type": "circle", "center": [0.5, 0.75], "radius": 0.15}"#),
+    ),
+    Parameter::new("spacing", "h", POSITIVE, DefaultValue::Json("0.015625")),
+    Parameter::new(
+        "jitter",
+        "α: particles are centres of cells moved by up to α h along every axis",
+        Kind::Number { above: None, least: Some(0.0), below: Some(0.5), most: None },
+        DefaultValue::Json("0"),
+    ),
+    Parameter::new("seed", "seed of the jitter", Kind::Integer { least: 0, most: 9_007_199_254_740_991 }, DefaultValue::Json("1")),
+    Parameter::restart_safe("end_time", "scene time at the end", POSITIVE, DefaultValue::Json("8")),
+    Parameter::new("time_step", "Δt; end_time/240 when neither it nor steps is given", POSITIVE, DefaultValue::Absent),
+    Parameter::new("steps", "number of equal steps, instead of time_step", STEPS, DefaultValue::Absent),
+    Parameter::new("integrator", "path integrator", Kind::Choice(integrator_variants), DefaultValue::Json("\"rk4\"")),
+    Parameter::new("band_h", "width w of the narrow band in h", POSITIVE, DefaultValue::Json("40")),
+    Parameter::new("redistance", "when to redistance", Kind::Choice(redistance_variants), DefaultValue::Json("\"auto\"")),
+    Parameter::new(
+        "field",
+        "dual: a transported value that is never touched, distances apart; overwrite: the distance replaces it (the paper)",
+        Kind::Word(&["dual", "overwrite"]),
+        DefaultValue::Json("\"dual\""),
+    ),
+    Parameter::new("method", "the method", Kind::Choice(method_variants), DefaultValue::Json("\"auto\"")),
+];
+
+static FLOWS: &[Variant] = &[
+    Variant {
+        name: "single_vortex",
+        doc: "the spiraling vortex in the unit square (2D)",
+        parameters: &[Parameter::new("period", "T of the reversal; null never turns; 8 when not given", POSITIVE, DefaultValue::JsonOrNull("8"))],
+    },
+    Variant {
+        name: "rotation",
+        doc: "rigid rotation about a point in the x–y plane",
+        parameters: &[
+            Parameter::new("center", "fixed point", Kind::Vector { positive: false }, DefaultValue::Required),
+            Parameter::new("angular_velocity", "counter-clockwise", ANY, DefaultValue::Required),
+        ],
+    },
+    Variant {
+        name: "translation",
+        doc: "uniform motion",
+        parameters: &[Parameter::new("velocity", "velocity", Kind::Vector { positive: false }, DefaultValue::Required)],
+    },
+];
+
+fn flow_variants() -> &'static [Variant] {
+    FLOWS
+}
+
+static INTEGRATORS: &[Variant] = &[
+    Variant { name: "rk4", doc: "classical Runge–Kutta of order 4", parameters: &[] },
+    Variant { name: "tvd_rk2", doc: "TVD Runge–Kutta of order 2", parameters: &[] },
+    Variant {
+        name: "dopri5",
+        doc: "Dormand–Prince 5(4) with error control inside each step",
+        parameters: &[Parameter::new("tolerance", "error of an inner step", POSITIVE, DefaultValue::Json("1e-9"))],
+    },
+];
+
+fn integrator_variants() -> &'static [Variant] {
+    INTEGRATORS
+}
+
+static REDISTANCE: &[Variant] = &[
+    Variant { name: "auto", doc: "for_output with a dual field, every step with an overwritten one", parameters: &[] },
+    Variant {
+        name: "every",
+        doc: "after every so many steps",
+        parameters: &[Parameter::new("steps", "how many", STEPS, DefaultValue::Json("1"))],
+    },
+    Variant { name: "for_output", doc: "when a frame, an error or the end needs it", parameters: &[] },
+];
+
+fn redistance_variants() -> &'static [Variant] {
+    REDISTANCE
+}
+
+static METHODS: [Variant; 2] = [
+    Variant { name: "auto", doc: "the best method measured for the choice of field", parameters: &[] },
+    Variant { name: "pcp", doc: "particle closest point", parameters: pcp_parameters::PARAMETERS },
+];
+
+fn method_variants() -> &'static [Variant] {
+    &METHODS
+}
+
+/// What section 4.2 states.
+pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Value> {
+    let mut method = json!({
+        "type": "pcp", "degree": 4, "basis": "minter", "weight": 0, "minimum_ratio": 1,
+        "sample_threshold_h": 1.5, "tolerance": 1e-10, "max_iterations": 100
+    });
+    let own_neighborhood = given.get("method").is_some_and(|m| m.get("neighborhood").is_some() || m.get("cutoff_h").is_some());
+    if !own_neighborhood {
+        method["neighborhood"] = json!({"type": "radius", "cutoff_h": 15});
+    }
+    let mut preset = json!({
+        "flow": {"type": "single_vortex", "period": 8},
+        "shape": {"type": "circle", "center": [0.5, 0.75], "radius": 0.15},
+        "end_time": 8, "integrator": "rk4", "band_h": 40, "jitter": 0,
+        "redistance": {"type": "every", "steps": 1}, "field": "overwrite", "method": method
+    });
+    if !given.contains_key("steps") && !given.contains_key("time_step") {
+        preset["time_step"] = json!(1.0 / 30.0);
+    }
+    match preset {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+/// The scene as checked.
+#[derive(Debug, Deserialize)]
+pub(super) struct Written {
+    pub dimension: Option<usize>,
+    pub flow: Flow,
+    pub shape: Value,
+    pub spacing: f64,
+    pub jitter: f64,
+    pub seed: u64,
+    pub end_time: f64,
+    pub time_step: Option<f64>,
+    pub steps: Option<u64>,
+    pub integrator: Integrator,
+    pub band_h: f64,
+    pub redistance: Redistance,
+    pub field: Field,
+    pub method: Value,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub(super) enum Flow {
+    SingleVortex { period: Option<f64> },
+    Rotation { center: Vec<f64>, angular_velocity: f64 },
+    Translation { velocity: Vec<f64> },
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub(super) enum Integrator {
+    Rk4,
+    TvdRk2,
+    Dopri5 { tolerance: f64 },
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub(super) enum Redistance {
+    Auto,
+    Every { steps: u64 },
+    ForOutput,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Field {
+    Dual,
+    Overwrite,
+}

@@ -1,0 +1,6 @@
+//! Methods: one folder each, with the same inner names. `system` holds the data, `simulation` the one
+//! `impl Simulation`; no scheme uses another's inside.
+
+pub mod advected_level_set;
+pub mod measured_errors;
+pub mod static_redistancing;

@@ -1,0 +1,9 @@
+//! A level set carried by particles through a prescribed flow (PCP paper, section 4.2).
+
+mod reference;
+mod simulation;
+mod system;
+
+pub use reference::ExactMotion;
+pub use simulation::AdvectedLevelSet;
+pub use system::{AdvectedSystem, FieldChoice, RedistanceWhen};

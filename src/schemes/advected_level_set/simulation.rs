@@ -1,0 +1,266 @@
+//! Transport and redistancing step by step.
+
+use super::system::{AdvectedSystem, FieldChoice, RedistanceWhen};
+use crate::closest_point::enclosed_measure::enclosed_measure;
+use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, entry, rescued};
+use crate::simulation::state::check_length;
+use crate::simulation::{
+    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, OutputPlan, Phases, Report, RestoreError, Simulation, State,
+    StepError,
+};
+use crate::time::{Clock, FixedStep};
+use rayon::prelude::{IntoParallelIterator, ParallelIterator};
+use std::collections::BTreeMap;
+
+/// An advected level set as a simulation.
+pub struct AdvectedLevelSet<const D: usize> {
+    system: AdvectedSystem<D>,
+    fixed: FixedStep,
+    plan: OutputPlan,
+    step: u64,
+    /// Step of the last redistancing; the start counts as one, since its distances are exact.
+    redistanced: u64,
+    /// Enclosed measure at the last redistancing that was asked for it.
+    measure: f64,
+    max_cfl: f64,
+    errors: Vec<MeasuredErrors>,
+    phases: Phases,
+    method: BTreeMap<&'static str, String>,
+}
+
+/// Errors of one moment, as they stand in a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct MeasuredErrors {
+    time: f64,
+    phi_rms: f64,
+    phi_max: f64,
+    measure_relative: f64,
+    samples_mean: f64,
+    samples_max: f64,
+}
+
+impl MeasuredErrors {
+    const NUMBERS: usize = 6;
+
+    fn to_numbers(self) -> [f64; Self::NUMBERS] {
+        [self.time, self.phi_rms, self.phi_max, self.measure_relative, self.samples_mean, self.samples_max]
+    }
+
+    fn from_numbers(n: &[f64]) -> Self {
+        Self { time: n[0], phi_rms: n[1], phi_max: n[2], measure_relative: n[3], samples_mean: n[4], samples_max: n[5] }
+    }
+
+    fn entries(&self, dimension: usize) -> Vec<ErrorEntry> {
+        let reference = "exact motion";
+        let measure = if dimension == 2 { "area" } else { "volume" };
+        vec![
+            entry("phi", "rms", self.phi_rms, self.time, reference),
+            entry("phi", "max", self.phi_max, self.time, reference),
+            entry(measure, "relative", self.measure_relative, self.time, "conservation"),
+            entry("samples", "mean", self.samples_mean, self.time, reference),
+            entry("samples", "max", self.samples_max, self.time, reference),
+        ]
+    }
+}
+
+impl<const D: usize> AdvectedLevelSet<D> {
+    /// At time 0.
+    #[must_use]
+    pub fn new(
+        system: AdvectedSystem<D>,
+        fixed: FixedStep,
+        plan: OutputPlan,
+        cpu_clock: CpuClock,
+        method: BTreeMap<&'static str, String>,
+    ) -> Self {
+        let measure = system.motion.surface().measure();
+        let phases = Phases::new(cpu_clock);
+        Self { system, fixed, plan, step: 0, redistanced: 0, measure, max_cfl: 0.0, errors: Vec::new(), phases, method }
+    }
+
+    /// Whether the step that ends at `step` redistances.
+    fn is_redistancing_due(&self, step: u64) -> bool {
+        let needed = step >= self.fixed.steps || self.is_error_due(step) || self.plan.is_frame_due(&self.fixed, step);
+        match (self.system.when, self.system.field) {
+            (RedistanceWhen::ForOutput, _) => needed,
+            // Overwriting for a frame would make the output part of the physics: such frames use a copy.
+            (RedistanceWhen::Every(every), FieldChoice::Overwrite) => step.is_multiple_of(every) || step >= self.fixed.steps,
+            (RedistanceWhen::Every(every), FieldChoice::Dual) => step.is_multiple_of(every) || needed,
+        }
+    }
+
+    /// Errors are taken half way through a flow that returns, and at the end.
+    fn is_error_due(&self, step: u64) -> bool {
+        let halfway = self.system.motion.flow().return_time().is_some_and(|t| self.fixed.reaches(step, 0.5 * t));
+        step >= self.fixed.steps || halfway
+    }
+
+    fn check_finite(&self, clock: Clock) -> Result<(), StepError> {
+        let Clock { step, time } = clock;
+        let broken = self.system.particles.positions().iter().position(|x| x.iter().any(|c| !c.is_finite()));
+        if let Some(particle) = broken {
+            return Err(StepError::NonFinite { field: "position", particle, step, time });
+        }
+        Ok(())
+    }
+
+    fn measure_errors(&mut self, time: f64) {
+        let system = &self.system;
+        let Some(front) = system.motion.front(time, system.spacing) else { return };
+        let particles = &system.particles;
+        let band = particles.flag(system.columns.in_band);
+        let phi = particles.scalar(system.columns.phi);
+        let differences: Vec<f64> = (0..particles.len())
+            .into_par_iter()
+            .filter(|&i| band[i] == 1)
+            .map(|i| phi[i] - front.signed_distance(&particles.positions()[i]))
+            .collect();
+        let mut norms = ErrorNorms::default();
+        for difference in differences {
+            norms.add(difference);
+        }
+        let (samples_mean, samples_max) = system.redistancing.over_samples(|x| front.signed_distance(x).abs());
+        let exact = system.motion.surface().measure();
+        self.errors.push(MeasuredErrors {
+            time,
+            phi_rms: norms.rms(),
+            phi_max: norms.max(),
+            measure_relative: (self.measure - exact).abs() / exact,
+            samples_mean,
+            samples_max,
+        });
+    }
+}
+
+impl<const D: usize> Simulation for AdvectedLevelSet<D> {
+    fn clock(&self) -> Clock {
+        self.fixed.clock(self.step)
+    }
+
+    fn end(&self) -> Clock {
+        self.fixed.clock(self.fixed.steps)
+    }
+
+    /// 1. Transport: positions move, ψ stays with them.
+    /// 2. Redistancing, where the scene or the output asks for it.
+    /// 3. The enclosed measure for a due series row; errors half way and at the end.
+    fn step(&mut self) -> Result<(), StepError> {
+        let before = self.clock();
+        let next = self.fixed.clock(self.step + 1);
+        let (system, fixed) = (&mut self.system, &self.fixed);
+        let way = self.phases.measure("advection", || system.advect(before.time, fixed.time_step))?;
+        self.check_finite(next)?;
+        self.max_cfl = self.max_cfl.max(way);
+        if self.is_redistancing_due(next.step) {
+            self.system.redistance(&mut self.phases)?;
+            if self.system.redistancing.is_lost() {
+                return Err(StepError::InterfaceLost { step: next.step, time: next.time });
+            }
+            self.redistanced = next.step;
+            let error_due = self.is_error_due(next.step);
+            if error_due || self.plan.is_series_due(&self.fixed, next.step) {
+                let system = &self.system;
+                self.measure =
+                    self.phases.measure("measure", || enclosed_measure(&system.redistancing, system.spacing));
+            }
+            if error_due {
+                let start = (self.phases.clock())();
+                self.measure_errors(next.time);
+                self.phases.book("errors", (self.phases.clock())() - start);
+            }
+        }
+        self.step = next.step;
+        Ok(())
+    }
+
+    fn observables(&self) -> Observables {
+        let exact = self.system.motion.surface().measure();
+        let band = self.system.particles.flag(self.system.columns.in_band);
+        vec![
+            ("time", self.clock().time),
+            ("time_step", self.fixed.time_step),
+            (if D == 2 { "area" } else { "volume" }, self.measure),
+            ("volume_drift", (self.measure - exact) / exact),
+            ("band_particles", band.iter().map(|b| f64::from(*b)).sum()),
+            ("cfl", self.max_cfl),
+            ("rescued_fits", rescued(self.system.redistancing.counts()) as f64),
+        ]
+    }
+
+    fn fields(&self) -> Fields {
+        let fresh;
+        let particles = if self.redistanced == self.step {
+            &self.system.particles
+        } else {
+            fresh = self.system.redistanced_copy();
+            &fresh
+        };
+        let mut fields = Fields::at(particles.positions());
+        fields.surface(particles, &self.system.columns);
+        if self.system.field == FieldChoice::Dual {
+            fields.scalar("psi", particles.scalar(self.system.psi).to_vec());
+        }
+        let (flow, time) = (self.system.motion.flow(), self.clock().time);
+        fields.vector("velocity", particles.positions().iter().map(|x| flow.velocity(x, time)));
+        fields.id("particle_id", (0..particles.len() as u64).collect());
+        fields
+    }
+
+    fn state(&self) -> State {
+        let Clock { step, time } = self.clock();
+        let mut state = State { step, time, ..State::default() };
+        state.push_particles(&self.system.particles);
+        let surface = &self.system.redistancing;
+        state.push_counts("rescues", surface.counts().entries().iter().map(|e| e.1).collect());
+        state.push_counts("redistanced", vec![self.redistanced]);
+        state.push_reals("monitors", &[self.measure, self.max_cfl, surface.worst_condition()]);
+        let errors: Vec<f64> = self.errors.iter().flat_map(|e| e.to_numbers()).collect();
+        state.push_reals("errors", &errors);
+        state
+    }
+
+    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
+        if state.step > self.fixed.steps {
+            return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
+        }
+        let surface = &mut self.system.redistancing;
+        let (rescues, redistanced) = (state.counts("rescues")?, state.counts("redistanced")?);
+        let (monitors, errors) = (state.reals("monitors")?, state.reals("errors")?);
+        check_length("rescues", rescues.len(), surface.counts().entries().len())?;
+        check_length("redistanced", redistanced.len(), 1)?;
+        check_length("monitors", monitors.len(), 3)?;
+        check_length("errors", errors.len(), errors.len() / MeasuredErrors::NUMBERS * MeasuredErrors::NUMBERS)?;
+        state.pull_particles(&mut self.system.particles)?;
+        surface.counts().restore(rescues);
+        surface.restore_worst_condition(monitors[2]);
+        self.measure = monitors[0];
+        self.max_cfl = monitors[1];
+        self.redistanced = redistanced[0];
+        self.errors = errors.chunks_exact(MeasuredErrors::NUMBERS).map(MeasuredErrors::from_numbers).collect();
+        self.step = state.step;
+        Ok(())
+    }
+
+    fn report(&self) -> Report {
+        let errors = self.errors.iter().flat_map(|e| e.entries(D)).collect();
+        closest_point_report(&self.system.redistancing, errors, &self.phases, self.health(), self.method.clone())
+    }
+
+    fn health(&self) -> Health {
+        let exact = self.system.motion.surface().measure();
+        Health {
+            finite: self.system.particles.positions().iter().all(|x| x.iter().all(|c| c.is_finite())),
+            max_cfl: self.max_cfl,
+            volume_drift: Some((self.measure - exact) / exact),
+            rescued_fits: rescued(self.system.redistancing.counts()),
+        }
+    }
+
+    fn particle_count(&self) -> usize {
+        self.system.particles.len()
+    }
+
+    fn take_findings(&mut self) -> Vec<Finding> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,169 @@
+//! The particles of an advected level set, their transport and their redistancing.
+
+use super::reference::ExactMotion;
+use crate::closest_point::{ClosestPoint, PcpMethod, Redistancing, SurfaceColumns};
+use crate::geometry::lattice::Lattice;
+use crate::geometry::{Domain, Vector};
+use crate::parallel::{BLOCK, Interrupt, Interrupted};
+use crate::particles::{Particles, ScalarKey};
+use crate::simulation::Phases;
+use crate::time::PathIntegrator;
+use rayon::prelude::{ParallelIterator, ParallelSliceMut};
+
+/// What is transported, and what distances are written to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FieldChoice {
+    /// ψ with Dψ/Dt = 0 is never touched; distances are an array of their own.
+    Dual,
+    /// The distance replaces the transported value (the paper).
+    Overwrite,
+}
+
+/// When to redistance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RedistanceWhen {
+    /// After every so many steps, and at the end.
+    Every(u64),
+    /// Only when a frame or an error needs it.
+    ForOutput,
+}
+
+/// Particles in a flow.
+pub struct AdvectedSystem<const D: usize> {
+    /// Surface and flow: the exact answer.
+    pub motion: ExactMotion<D>,
+    /// h.
+    pub spacing: f64,
+    /// w/2.
+    pub half_band: f64,
+    /// Path integrator.
+    pub integrator: PathIntegrator,
+    /// What is transported.
+    pub field: FieldChoice,
+    /// When to redistance.
+    pub when: RedistanceWhen,
+    pub(super) method: PcpMethod,
+    pub(super) particles: Particles<D>,
+    /// ψ, constant along paths (dual) or the distance of the last redistancing.
+    pub(super) psi: ScalarKey,
+    pub(super) columns: SurfaceColumns,
+    pub(super) redistancing: Redistancing<D>,
+    pub(super) answers: Vec<Option<ClosestPoint<D>>>,
+    pub(super) interrupt: Interrupt,
+}
+
+impl<const D: usize> AdvectedSystem<D> {
+    /// Particles on the lattice inside the band, with the exact distance as level set.
+    #[must_use]
+    #[expect(clippy::too_many_arguments, reason = "the parts of a scene, named one by one")]
+    pub fn new(
+        motion: ExactMotion<D>,
+        lattice: &Lattice,
+        method: PcpMethod,
+        half_band: f64,
+        integrator: PathIntegrator,
+        field: FieldChoice,
+        when: RedistanceWhen,
+        interrupt: Interrupt,
+    ) -> Self {
+        let spacing = lattice.spacing;
+        let surface = motion.surface();
+        let (low, high) = surface.bounding_box();
+        let margin = half_band + spacing;
+        let positions = lattice.points_in(&low.add_scalar(-margin), &high.add_scalar(margin), |x| {
+            surface.signed_distance(x).abs() <= half_band
+        });
+        let mut particles = Particles::new(positions);
+        let psi = particles.add_scalar("psi", 0.0);
+        let columns = SurfaceColumns::add(&mut particles);
+        for i in 0..particles.len() {
+            let exact = surface.nearest(&particles.positions()[i]);
+            particles.scalar_mut(psi)[i] = exact.distance;
+            particles.scalar_mut(columns.phi)[i] = exact.distance;
+            particles.vector_mut(columns.closest_point)[i] = exact.point;
+            particles.vector_mut(columns.normal)[i] = exact.normal.unwrap_or_else(Vector::<D>::zeros);
+            particles.scalar_mut(columns.curvature)[i] = exact.curvature.unwrap_or(0.0);
+            particles.flag_mut(columns.in_band)[i] = 1;
+        }
+        let answers = vec![None; particles.len()];
+        let redistancing = Redistancing::new(method.clone(), Domain::unbounded(), spacing);
+        Self {
+            motion,
+            spacing,
+            half_band,
+            integrator,
+            field,
+            when,
+            method,
+            particles,
+            psi,
+            columns,
+            redistancing,
+            answers,
+            interrupt,
+        }
+    }
+
+    /// Moves every particle along its path; returns the longest way in spacings.
+    pub(super) fn advect(&mut self, time: f64, step: f64) -> Result<f64, Interrupted> {
+        let (flow, integrator, interrupt) = (self.motion.flow(), self.integrator, &self.interrupt);
+        let longest = self
+            .particles
+            .positions_mut()
+            .par_chunks_mut(BLOCK)
+            .map(|block| {
+                if interrupt.is_raised() {
+                    return 0.0;
+                }
+                let mut longest = 0.0_f64;
+                for x in block {
+                    let next = integrator.advance(flow, x, time, step);
+                    longest = longest.max((next - *x).norm_squared());
+                    *x = next;
+                }
+                longest
+            })
+            // A maximum does not depend on the order of its terms.
+            .reduce(|| 0.0, f64::max);
+        interrupt.check()?;
+        Ok(longest.sqrt() / self.spacing)
+    }
+
+    /// Rebuilds the surface from ψ and writes distance, closest point, normal and curvature of the band.
+    pub(super) fn redistance(&mut self, phases: &mut Phases) -> Result<(), Interrupted> {
+        let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
+        let (surface, interrupt) = (&mut self.redistancing, &self.interrupt);
+        phases.measure("redistancing/detection", || surface.detect(positions, psi, interrupt))?;
+        phases.measure("redistancing/regression", || surface.fit_samples(positions, psi, interrupt))?;
+        let answers = &mut self.answers;
+        // Whoever is nearer than w/2 to a sample is asked for the exact distance (PCP 3.4).
+        phases.measure("redistancing/query", || surface.closest_points(positions, self.half_band, answers, interrupt))?;
+        self.columns.store(&mut self.particles, self.psi, &self.answers, self.half_band);
+        if self.field == FieldChoice::Overwrite {
+            for i in 0..self.particles.len() {
+                if self.particles.flag(self.columns.in_band)[i] == 1 {
+                    let phi = self.particles.scalar(self.columns.phi)[i];
+                    self.particles.scalar_mut(self.psi)[i] = phi;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A copy of the particles with the surface columns of the present moment, for a frame between redistancings.
+    pub(super) fn redistanced_copy(&self) -> Particles<D> {
+        let mut particles = self.particles.clone();
+        let mut surface = Redistancing::new(self.method.clone(), Domain::unbounded(), self.spacing);
+        let never = Interrupt::default();
+        let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
+        let mut answers = vec![None; positions.len()];
+        let found = surface
+            .detect(positions, psi, &never)
+            .and_then(|()| surface.fit_samples(positions, psi, &never))
+            .and_then(|()| surface.closest_points(positions, self.half_band, &mut answers, &never));
+        if found.is_ok() {
+            self.columns.store(&mut particles, self.psi, &answers, self.half_band);
+        }
+        particles
+    }
+}

@@ -1,0 +1,93 @@
+//! Root-mean-square and maximum of errors, and the report entries that closest-point schemes share.
+
+use crate::closest_point::rescue::get;
+use crate::closest_point::{Redistancing, RescueCounts};
+use crate::simulation::report::Newton;
+use crate::simulation::{ErrorEntry, Health, Phases, Report};
+use std::collections::BTreeMap;
+
+/// Sums of errors in the order of adding.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ErrorNorms {
+    squares: f64,
+    largest: f64,
+    count: u64,
+}
+
+impl ErrorNorms {
+    /// Takes one error into account.
+    pub fn add(&mut self, error: f64) {
+        self.squares += error * error;
+        // A NaN must not be lost in a maximum.
+        self.largest = if error.is_nan() { f64::NAN } else { self.largest.max(error.abs()) };
+        self.count += 1;
+    }
+
+    /// √(Σ e²/n).
+    #[must_use]
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.count.max(1) as f64).sqrt()
+    }
+
+    /// max |e|.
+    #[must_use]
+    pub fn max(&self) -> f64 {
+        self.largest
+    }
+
+    /// Whether nothing was added.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The two norms as report entries.
+    #[must_use]
+    pub fn entries(&self, quantity: &str, time: f64, reference: &str) -> Vec<ErrorEntry> {
+        [("rms", self.rms()), ("max", self.max())]
+            .map(|(norm, value)| entry(quantity, norm, value, time, reference))
+            .to_vec()
+    }
+}
+
+/// One report entry.
+#[must_use]
+pub fn entry(quantity: &str, norm: &str, value: f64, time: f64, reference: &str) -> ErrorEntry {
+    ErrorEntry { quantity: quantity.to_owned(), norm: norm.to_owned(), value, time, reference: reference.to_owned() }
+}
+
+/// The fits and queries that needed a rescue.
+#[must_use]
+pub fn rescued(counts: &RescueCounts) -> u64 {
+    get(&counts.lowered) + get(&counts.unfitted) + get(&counts.unprojected) + get(&counts.sample_distance)
+}
+
+/// The report of a closest-point scheme from its parts.
+#[must_use]
+pub fn closest_point_report<const D: usize>(
+    surface: &Redistancing<D>,
+    errors: Vec<ErrorEntry>,
+    phases: &Phases,
+    health: Health,
+    method: BTreeMap<&'static str, String>,
+) -> Report {
+    let counts = surface.counts();
+    let entries = counts.entries();
+    let some = |labels: &[&str]| {
+        entries.iter().filter(|(name, count)| labels.contains(name) && *count > 0).copied().collect::<BTreeMap<_, _>>()
+    };
+    let solves = get(&counts.queries);
+    Report {
+        errors,
+        phases: phases.seconds().clone(),
+        health,
+        worst_condition: surface.worst_condition(),
+        rescued_fits: some(&["fits.larger_radius", "fits.lower_degree", "fits.none", "samples.not_projected"]),
+        newton: Newton {
+            solves,
+            iterations_mean: get(&counts.iterations) as f64 / solves.max(1) as f64,
+            rescued: some(&["queries.other_sample", "queries.sample_distance", "queries.no_surface"]),
+        },
+        method,
+    }
+}

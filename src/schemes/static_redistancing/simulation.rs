@@ -1,0 +1,178 @@
+//! One step a redistancing: the distances of one are the input of the next.
+
+use super::system::StaticSystem;
+use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, rescued};
+use crate::simulation::{
+    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State, StepError,
+};
+use crate::time::{Clock, FixedStep};
+use std::collections::BTreeMap;
+
+/// A static redistancing as a simulation; scene time counts redistancings.
+pub struct StaticRedistancing<const D: usize> {
+    system: StaticSystem<D>,
+    fixed: FixedStep,
+    step: u64,
+    phases: Phases,
+    method: BTreeMap<&'static str, String>,
+}
+
+impl<const D: usize> StaticRedistancing<D> {
+    /// At the start.
+    #[must_use]
+    pub fn new(system: StaticSystem<D>, cpu_clock: CpuClock, method: BTreeMap<&'static str, String>) -> Self {
+        let fixed = FixedStep { time_step: 1.0, steps: system.repeats };
+        Self { system, fixed, step: 0, phases: Phases::new(cpu_clock), method }
+    }
+
+    /// The numbers of a step must be numbers.
+    fn check_finite(&self) -> Result<(), StepError> {
+        let Clock { step, time } = self.fixed.clock(self.step + 1);
+        let phi = self.system.particles.scalar(self.system.columns.phi);
+        match phi.iter().position(|v| !v.is_finite()) {
+            Some(particle) => Err(StepError::NonFinite { field: "phi", particle, step, time }),
+            None => Ok(()),
+        }
+    }
+
+    /// Errors against the exact surface over the band.
+    fn errors(&self) -> Vec<ErrorEntry> {
+        let system = &self.system;
+        let particles = &system.particles;
+        let mut norms = [ErrorNorms::default(); 4];
+        for i in 0..particles.len() {
+            if particles.flag(system.columns.in_band)[i] == 0 {
+                continue;
+            }
+            let x = particles.positions()[i];
+            let exact = system.surface.nearest(&x);
+            norms[0].add(particles.scalar(system.columns.phi)[i] - exact.distance);
+            // Where two points of the surface are nearly as close, another choice is no error.
+            if self.step == 0 || system.surface.near_medial_axis(&x, system.spacing) {
+                continue;
+            }
+            norms[1].add((particles.vector(system.columns.closest_point)[i] - exact.point).norm());
+            if let Some(normal) = exact.normal {
+                norms[2].add((particles.vector(system.columns.normal)[i] - normal).norm());
+            }
+            if let Some(curvature) = exact.curvature {
+                norms[3].add(particles.scalar(system.columns.curvature)[i] - curvature);
+            }
+        }
+        let names = ["phi", "closest_point", "normal", "curvature"];
+        let time = self.clock().time;
+        names
+            .iter()
+            .zip(&norms)
+            .filter(|(_, norms)| !norms.is_empty())
+            .flat_map(|(name, norms)| norms.entries(name, time, "exact surface"))
+            .collect()
+    }
+}
+
+impl<const D: usize> Simulation for StaticRedistancing<D> {
+    fn clock(&self) -> Clock {
+        self.fixed.clock(self.step)
+    }
+
+    fn end(&self) -> Clock {
+        self.fixed.clock(self.fixed.steps)
+    }
+
+    /// 1. Detection, regression and projection from the present level.
+    /// 2. Queries at every particle.
+    /// 3. The distances become the level.
+    fn step(&mut self) -> Result<(), StepError> {
+        let system = &mut self.system;
+        let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
+        let surface = &mut system.redistancing;
+        self.phases.measure("redistancing/detection", || surface.detect(positions, level, &system.interrupt))?;
+        self.phases.measure("redistancing/regression", || surface.fit_samples(positions, level, &system.interrupt))?;
+        if surface.is_lost() {
+            let Clock { step, time } = self.fixed.clock(self.step + 1);
+            return Err(StepError::InterfaceLost { step, time });
+        }
+        let (answers, interrupt) = (&mut system.answers, &system.interrupt);
+        self.phases
+            .measure("redistancing/query", || surface.closest_points(positions, f64::INFINITY, answers, interrupt))?;
+        // Particles beyond the band serve the fits and are redistanced like the others; the band's flags stay.
+        for (i, answer) in system.answers.iter().enumerate() {
+            if let Some(answer) = answer {
+                let inside = system.particles.scalar(system.level)[i] < 0.0;
+                let phi = if inside { -answer.distance } else { answer.distance };
+                system.particles.scalar_mut(system.columns.phi)[i] = phi;
+                system.particles.scalar_mut(system.level)[i] = phi;
+                system.particles.vector_mut(system.columns.closest_point)[i] = answer.point;
+                system.particles.vector_mut(system.columns.normal)[i] = answer.normal;
+                system.particles.scalar_mut(system.columns.curvature)[i] = answer.curvature;
+            }
+        }
+        self.check_finite()?;
+        self.step += 1;
+        Ok(())
+    }
+
+    fn observables(&self) -> Observables {
+        let counts = self.system.redistancing.counts();
+        let errors = self.errors();
+        let of_phi = |norm: &str| errors.iter().find(|e| e.quantity == "phi" && e.norm == norm).map_or(0.0, |e| e.value);
+        vec![
+            ("time", self.clock().time),
+            ("phi_error_rms", of_phi("rms")),
+            ("phi_error_max", of_phi("max")),
+            ("rescued_fits", rescued(counts) as f64),
+        ]
+    }
+
+    fn fields(&self) -> Fields {
+        let particles = &self.system.particles;
+        let mut fields = Fields::at(particles.positions());
+        fields.surface(particles, &self.system.columns);
+        fields.id("particle_id", (0..particles.len() as u64).collect());
+        fields
+    }
+
+    fn state(&self) -> State {
+        let Clock { step, time } = self.clock();
+        let mut state = State { step, time, ..State::default() };
+        state.push_particles(&self.system.particles);
+        let surface = &self.system.redistancing;
+        state.push_counts("rescues", surface.counts().entries().iter().map(|e| e.1).collect());
+        state.push_reals("worst_condition", &[surface.worst_condition()]);
+        state
+    }
+
+    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
+        if state.step > self.fixed.steps {
+            return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
+        }
+        let surface = &mut self.system.redistancing;
+        let (rescues, condition) = (state.counts("rescues")?, state.reals("worst_condition")?);
+        crate::simulation::state::check_length("rescues", rescues.len(), surface.counts().entries().len())?;
+        crate::simulation::state::check_length("worst_condition", condition.len(), 1)?;
+        state.pull_particles(&mut self.system.particles)?;
+        surface.counts().restore(rescues);
+        surface.restore_worst_condition(condition[0]);
+        self.step = state.step;
+        Ok(())
+    }
+
+    fn report(&self) -> Report {
+        let errors = self.errors();
+        closest_point_report(&self.system.redistancing, errors, &self.phases, self.health(), self.method.clone())
+    }
+
+    fn health(&self) -> Health {
+        let finite = self.system.particles.scalar(self.system.columns.phi).iter().all(|v| v.is_finite());
+        let rescued_fits = rescued(self.system.redistancing.counts());
+        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits }
+    }
+
+    fn particle_count(&self) -> usize {
+        self.system.particles.len()
+    }
+
+    fn take_findings(&mut self) -> Vec<Finding> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,94 @@
+//! What a frame shows: points in space with named values.
+
+use crate::closest_point::SurfaceColumns;
+use crate::geometry::Vector;
+use crate::particles::{Particles, ScalarKey, VectorKey};
+
+/// Points and their values at one moment. 2D points have z = 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Fields {
+    /// Positions.
+    pub points: Vec<[f64; 3]>,
+    /// Point data.
+    pub columns: Vec<Field>,
+}
+
+/// One named field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Name as in the scene's list of fields.
+    pub name: &'static str,
+    /// One value a point.
+    pub values: FieldValues,
+}
+
+/// The values of a field.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FieldValues {
+    /// Numbers.
+    Scalar(Vec<f64>),
+    /// Vectors, z = 0 in 2D.
+    Vector(Vec<[f64; 3]>),
+    /// Small whole numbers.
+    Flag(Vec<u8>),
+    /// Large whole numbers.
+    Id(Vec<u64>),
+}
+
+/// A vector with its missing components set to zero.
+#[must_use]
+pub fn in_space<const D: usize>(x: &Vector<D>) -> [f64; 3] {
+    std::array::from_fn(|d| if d < D { x[d] } else { 0.0 })
+}
+
+impl Fields {
+    /// Points without fields.
+    #[must_use]
+    pub fn at<const D: usize>(points: &[Vector<D>]) -> Self {
+        Self { points: points.iter().map(in_space).collect(), columns: Vec::new() }
+    }
+
+    /// Adds numbers.
+    pub fn scalar(&mut self, name: &'static str, values: Vec<f64>) {
+        self.columns.push(Field { name, values: FieldValues::Scalar(values) });
+    }
+
+    /// Adds vectors.
+    pub fn vector<const D: usize>(&mut self, name: &'static str, values: impl Iterator<Item = Vector<D>>) {
+        self.columns.push(Field { name, values: FieldValues::Vector(values.map(|v| in_space(&v)).collect()) });
+    }
+
+    /// Adds small whole numbers.
+    pub fn flag(&mut self, name: &'static str, values: Vec<u8>) {
+        self.columns.push(Field { name, values: FieldValues::Flag(values) });
+    }
+
+    /// Adds particle numbers.
+    pub fn id(&mut self, name: &'static str, values: Vec<u64>) {
+        self.columns.push(Field { name, values: FieldValues::Id(values) });
+    }
+
+    /// Adds what particles know of the surface, NaN outside the narrow band.
+    pub fn surface<const D: usize>(&mut self, particles: &Particles<D>, columns: &SurfaceColumns) {
+        let band = particles.flag(columns.in_band);
+        let number = |key: ScalarKey| {
+            particles.scalar(key).iter().zip(band).map(|(v, b)| if *b == 1 { *v } else { f64::NAN }).collect()
+        };
+        let arrow = |key: VectorKey| {
+            particles.vector(key).iter().zip(band).map(|(v, b)| if *b == 1 { *v } else { v.map(|_| f64::NAN) })
+        };
+        self.scalar("phi", number(columns.phi));
+        self.vector("closest_point", arrow(columns.closest_point));
+        self.vector("normal", arrow(columns.normal));
+        self.scalar("curvature", number(columns.curvature));
+    }
+
+    /// The scalar field of a name.
+    #[must_use]
+    pub fn scalar_named(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|c| c.name == name).and_then(|c| match &c.values {
+            FieldValues::Scalar(values) => Some(values.as_slice()),
+            _ => None,
+        })
+    }
+}

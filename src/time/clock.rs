@@ -1,0 +1,81 @@
+//! Step number and scene time. With a fixed step t = n·dt by multiplication, so that no rounding accumulates.
+
+/// Where a simulation stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clock {
+    /// Steps done.
+    pub step: u64,
+    /// Scene time reached.
+    pub time: f64,
+}
+
+/// A run of equal steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedStep {
+    /// Δt.
+    pub time_step: f64,
+    /// Number of steps to the end.
+    pub steps: u64,
+}
+
+/// Share of a step by which rounding may miss a time and still count as having reached it.
+pub const TIME_SLACK: f64 = 1e-9;
+
+impl FixedStep {
+    /// Steps given by a person: the run ends at the first n with n·dt ≥ end − dt·1e-9, and may overshoot.
+    #[must_use]
+    pub fn from_time_step(end_time: f64, time_step: f64) -> Self {
+        let steps = (end_time / time_step - TIME_SLACK).ceil().max(0.0) as u64;
+        Self { time_step, steps }
+    }
+
+    /// A number of equal steps that land on the end.
+    #[must_use]
+    pub fn from_steps(end_time: f64, steps: u64) -> Self {
+        Self { time_step: end_time / steps.max(1) as f64, steps }
+    }
+
+    /// The longest step not above `limit` that lands on the end.
+    #[must_use]
+    pub fn from_limit(end_time: f64, limit: f64) -> Self {
+        let steps = (end_time / limit - TIME_SLACK).ceil().max(1.0) as u64;
+        Self::from_steps(end_time, steps)
+    }
+
+    /// The clock after n steps.
+    #[must_use]
+    pub fn clock(&self, step: u64) -> Clock {
+        Clock { step, time: step as f64 * self.time_step }
+    }
+
+    /// Whether `step` is the first with t ≥ `time` up to the slack.
+    #[must_use]
+    pub fn reaches(&self, step: u64, time: f64) -> bool {
+        let has_reached = |n: u64| n as f64 * self.time_step >= time - self.time_step * TIME_SLACK;
+        has_reached(step) && (step == 0 || !has_reached(step - 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::FixedStep;
+
+    #[test]
+    fn rounding_adds_no_step_and_loses_none() {
+        assert_eq!(FixedStep::from_time_step(8.0, 1.0 / 30.0).steps, 240);
+        assert_eq!(FixedStep::from_time_step(1.0, 0.3).steps, 4);
+        assert_eq!(FixedStep::from_time_step(0.3, 0.1).steps, 3);
+        assert_eq!(FixedStep::from_limit(1.0, 0.3).steps, 4);
+        assert!((FixedStep::from_limit(1.0, 0.3).time_step - 0.25).abs() < 1e-16);
+        assert_eq!(FixedStep::from_time_step(0.0, 0.1).steps, 0);
+    }
+
+    #[test]
+    fn a_time_is_reached_once() {
+        let fixed = FixedStep::from_steps(8.0, 240);
+        let reached: Vec<u64> = (0..=240).filter(|&n| fixed.reaches(n, 4.0)).collect();
+        assert_eq!(reached, [120]);
+        let late: Vec<u64> = (0..=240).filter(|&n| fixed.reaches(n, 4.01)).collect();
+        assert_eq!(late, [121]);
+    }
+}
