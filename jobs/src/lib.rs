@@ -1,0 +1,31 @@
+//! Durable jobs for the Meniscus engine.
+//!
+//! Two processes share this crate and meet in files only:
+//!
+//! - the service: [`body`] → [`store`] (the one SQLite file) → [`supervisor`] (queue, limits, recovery) → [`executor`];
+//! - a worker: [`order`] → [`worker`] → [`observers`] → frames, checkpoints, series and [`records`] in its attempt's
+//!   directory.
+//!
+//! The service reads the records, checks their epoch and publishes. It knows no HTTP and no numerics: a simulation is
+//! a `dyn Simulation` to it.
+
+pub mod artifacts;
+pub mod backup;
+pub mod body;
+pub mod build;
+pub mod checkpoint;
+pub mod clock;
+pub mod digest;
+pub mod executor;
+pub mod formats;
+pub mod job;
+pub mod lock;
+pub mod observers;
+pub mod order;
+pub mod process;
+pub mod records;
+pub mod report;
+pub mod store;
+pub mod strict_json;
+pub mod supervisor;
+pub mod worker;

@@ -1,0 +1,512 @@
+//! The body of a job: as written by a client, and as understood with every default.
+
+use meniscus::scene::schema::{NOT_NEGATIVE, POSITIVE};
+use meniscus::scene::{DefaultValue, Estimate, Kind, Parameter, Scene, Violation, check, understand};
+use meniscus::scenes::SCENES;
+use meniscus::simulation::OutputPlan;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+/// What the machine and the operator allow.
+#[derive(Debug, Clone, Copy)]
+pub struct Allowance {
+    /// Threads a job may ask for; also the default.
+    pub threads: u64,
+    /// Memory a job may ask for; also the default.
+    pub memory_bytes: u64,
+}
+
+/// A job body with every default, and its scene.
+pub struct JobBody {
+    /// The body as sent.
+    pub spec: Value,
+    /// The body with every default.
+    pub resolved: Value,
+    /// Name, for people.
+    pub name: Option<String>,
+    /// Labels, for filters.
+    pub labels: BTreeMap<String, String>,
+    /// Kind of the scene.
+    pub kind: String,
+    /// Higher goes first.
+    pub priority: i64,
+    /// The scene.
+    pub scene: Box<dyn Scene>,
+    /// Size of the run.
+    pub estimate: Estimate,
+    /// The job whose checkpoint this one starts from.
+    pub restarted_from: Option<String>,
+}
+
+/// The checkpoint that a restart begins with, as the store knows it.
+#[derive(Debug, Clone)]
+pub struct RestartSource {
+    /// Its id.
+    pub checkpoint: String,
+    /// The resolved body of the job that wrote it.
+    pub resolved: Value,
+    /// Its job.
+    pub job: String,
+    /// Instruction set it was written on.
+    pub isa: String,
+    /// Its step.
+    pub step: u64,
+}
+
+/// Memory of a worker before it holds any particle.
+pub const WORKER_BASE_BYTES: u64 = 48 << 20;
+
+static OUTPUT: &[Parameter] = &[
+    Parameter::restart_safe("every_time", "a frame at every multiple of this time; first and last only when not given", POSITIVE, DefaultValue::Absent),
+    Parameter::restart_safe("series_every_steps", "a series row every so many steps", Kind::Integer { least: 1, most: u64::MAX }, DefaultValue::Json("10")),
+];
+
+static CHECKPOINT: &[Parameter] = &[
+    Parameter::restart_safe("every_wall_s", "a checkpoint every so many seconds; 60 when neither it nor every_steps is given", POSITIVE, DefaultValue::Absent),
+    Parameter::restart_safe("every_steps", "a checkpoint every so many steps", Kind::Integer { least: 1, most: u64::MAX }, DefaultValue::Absent),
+    Parameter::restart_safe("keep", "verified checkpoints to keep", Kind::Integer { least: 2, most: 1000 }, DefaultValue::Json("2")),
+];
+
+static LIMITS: &[Parameter] = &[
+    Parameter::restart_safe("wall_s", "running time until the job is paused; it counts anew after a resume", POSITIVE, DefaultValue::Absent),
+    Parameter::restart_safe("memory_bytes", "resident memory of the worker", Kind::Integer { least: 1 << 20, most: u64::MAX }, DefaultValue::Absent),
+    Parameter::restart_safe("disk_bytes", "size of all files of the job, checkpoints included", NOT_NEGATIVE, DefaultValue::Absent),
+    Parameter::restart_safe("threads", "threads of the worker", Kind::Integer { least: 1, most: 1024 }, DefaultValue::Absent),
+];
+
+const FIELDS: [&str; 8] = ["name", "labels", "scene", "restart", "output", "checkpoint", "limits", "priority"];
+const OUTPUT_FIELDS: [&str; 3] = ["every_time", "fields", "series_every_steps"];
+
+/// From a client's JSON to a job.
+///
+/// `find_checkpoint` looks up what a restart names.
+///
+/// # Errors
+/// All violations at once, with pointers from the body's root.
+pub fn parse(
+    spec: &Value,
+    allowance: Allowance,
+    find_checkpoint: impl Fn(&str) -> Option<RestartSource>,
+) -> Result<JobBody, Vec<Violation>> {
+    let Value::Object(given) = spec else {
+        return Err(vec![Violation::new("", "type", "a job is an object", spec, json!("an object with a scene"))]);
+    };
+    let mut errors = Vec::new();
+    for (name, value) in given {
+        if !FIELDS.contains(&name.as_str()) {
+            let at = format!("/{}", check::escaped(name));
+            let mut violation = Violation::new(at, "unknown_field", "there is no such field", value, json!(FIELDS));
+            violation.did_you_mean = check::closest(name, &FIELDS);
+            errors.push(violation);
+        }
+    }
+    let name = text(given, "name", &mut errors);
+    let labels = labels(given, &mut errors);
+    let priority = priority(given, &mut errors);
+    let restart = match (given.get("scene"), given.get("restart")) {
+        (None, None) => {
+            let detail = "a job names a scene or a restart";
+            errors.push(Violation::new("/scene", "required", detail, &Value::Null, json!("an object with a kind")));
+            None
+        }
+        (Some(_), Some(restart)) => {
+            let detail = "a restart takes its scene from the checkpoint; give one of them";
+            errors.push(Violation::new("/restart", "conflict", detail, restart, Value::Null));
+            None
+        }
+        (Some(_), None) => None,
+        (None, Some(restart)) => parse_restart(restart, &find_checkpoint, &mut errors),
+    };
+    let scene_json = restart.as_ref().map(|(_, scene)| scene.clone()).or_else(|| given.get("scene").cloned());
+    let prefix = if restart.is_some() { "/restart/overrides" } else { "/scene" };
+    let scene = scene_json.and_then(|value| {
+        understand(&value, SCENES).map_err(|found| errors.extend(found.into_iter().map(|v| v.under(prefix)))).ok()
+    });
+    let mut output = section(given, "output", OUTPUT, Some(&OUTPUT_FIELDS), &mut errors);
+    let fields = output_fields(given, scene.as_deref(), &mut errors);
+    output.insert("fields".into(), fields);
+    let mut checkpoint = section(given, "checkpoint", CHECKPOINT, None, &mut errors);
+    if checkpoint.get("every_wall_s").is_none_or(Value::is_null) && checkpoint.get("every_steps").is_none_or(Value::is_null) {
+        checkpoint.insert("every_wall_s".into(), json!(60.0));
+    }
+    let mut limits = section(given, "limits", LIMITS, None, &mut errors);
+    default_limit(&mut limits, "threads", allowance.threads, &mut errors);
+    default_limit(&mut limits, "memory_bytes", allowance.memory_bytes, &mut errors);
+    let estimate = scene.as_ref().map(|scene| scene.estimate());
+    if let (Some(estimate), Some(memory)) = (estimate, limits.get("memory_bytes").and_then(Value::as_u64)) {
+        let needed = WORKER_BASE_BYTES + estimate.memory_bytes;
+        if needed > memory {
+            let detail = format!(
+                "about {} particles need {needed} bytes, the limit is {memory} (/limits/memory_bytes); a larger spacing or a narrower band needs less",
+                estimate.particles
+            );
+            let spacing = scene.as_ref().map_or(Value::Null, |s| s.resolved()["spacing"].clone());
+            errors.push(Violation::new(format!("{prefix}/spacing"), "memory", detail, &spacing, json!(format!("≤ {memory} bytes"))));
+        }
+    }
+    if let (Some((source, _)), Some(estimate)) = (&restart, estimate)
+        && estimate.steps < source.step
+    {
+        let detail = format!("the checkpoint is at step {}, this scene ends at step {}", source.step, estimate.steps);
+        errors.push(Violation::new("/restart/overrides", "range", detail, &json!(estimate.end_time), Value::Null));
+    }
+    let (Some(scene), Some(estimate)) = (scene, estimate) else { return Err(errors) };
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let mut resolved = Map::new();
+    resolved.insert("name".into(), json!(name));
+    resolved.insert("labels".into(), json!(labels));
+    resolved.insert("scene".into(), scene.resolved());
+    if let Some(restart) = given.get("restart") {
+        resolved.insert("restart".into(), restart.clone());
+    }
+    resolved.insert("output".into(), Value::Object(output));
+    resolved.insert("checkpoint".into(), Value::Object(checkpoint));
+    resolved.insert("limits".into(), Value::Object(limits));
+    resolved.insert("priority".into(), json!(priority));
+    Ok(JobBody {
+        spec: spec.clone(),
+        kind: scene.resolved()["kind"].as_str().unwrap_or_default().to_owned(),
+        resolved: Value::Object(resolved),
+        name,
+        labels,
+        priority,
+        scene,
+        estimate,
+        restarted_from: restart.map(|(source, _)| source.checkpoint),
+    })
+}
+
+/// What a resolved body asks of the run: everything but the scene.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Wishes {
+    /// Output section.
+    pub output: Output,
+    /// Checkpoint section.
+    pub checkpoint: CheckpointWishes,
+    /// Limits section.
+    pub limits: Limits,
+}
+
+/// What to write.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Output {
+    /// A frame at every multiple of this time.
+    pub every_time: Option<f64>,
+    /// Fields of frames.
+    pub fields: Vec<String>,
+    /// A series row every so many steps.
+    pub series_every_steps: u64,
+}
+
+/// When to write checkpoints.
+#[derive(Debug, Clone, Deserialize)]
+pub struct CheckpointWishes {
+    /// By the wall clock.
+    pub every_wall_s: Option<f64>,
+    /// By steps.
+    pub every_steps: Option<u64>,
+    /// How many to keep.
+    pub keep: u64,
+}
+
+/// Limits of a job.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Limits {
+    /// Running time until the job is paused.
+    pub wall_s: Option<f64>,
+    /// Resident memory.
+    pub memory_bytes: u64,
+    /// Size of all files.
+    pub disk_bytes: Option<f64>,
+    /// Threads.
+    pub threads: u64,
+}
+
+impl Wishes {
+    /// From a resolved body.
+    ///
+    /// # Errors
+    /// When it is not one.
+    pub fn of(resolved: &Value) -> Result<Self, serde_json::Error> {
+        Self::deserialize(resolved)
+    }
+
+    /// The plan that the engine sees.
+    #[must_use]
+    pub fn plan(&self) -> OutputPlan {
+        OutputPlan { every_time: self.output.every_time, series_every_steps: self.output.series_every_steps }
+    }
+}
+
+fn text(given: &Map<String, Value>, name: &str, errors: &mut Vec<Violation>) -> Option<String> {
+    match given.get(name) {
+        None | Some(Value::Null) => None,
+        Some(Value::String(text)) if text.len() <= 200 => Some(text.clone()),
+        Some(value) => {
+            errors.push(Violation::new(format!("/{name}"), "type", "a text is needed", value, json!("a text of at most 200 bytes")));
+            None
+        }
+    }
+}
+
+fn labels(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> BTreeMap<String, String> {
+    let mut labels = BTreeMap::new();
+    match given.get("labels") {
+        None | Some(Value::Null) => {}
+        Some(Value::Object(map)) if map.len() <= 64 => {
+            for (key, value) in map {
+                match value.as_str() {
+                    Some(text) if text.len() <= 200 && key.len() <= 100 => {
+                        labels.insert(key.clone(), text.to_owned());
+                    }
+                    _ => {
+                        let at = format!("/labels/{}", check::escaped(key));
+                        errors.push(Violation::new(at, "type", "a label is a text", value, json!("a text of at most 200 bytes")));
+                    }
+                }
+            }
+        }
+        Some(value) => {
+            errors.push(Violation::new("/labels", "type", "labels are an object of texts", value, json!("at most 64 texts by key")));
+        }
+    }
+    labels
+}
+
+fn priority(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> i64 {
+    match given.get("priority") {
+        None | Some(Value::Null) => 0,
+        Some(value) => match value.as_i64() {
+            Some(number) if (-100..=100).contains(&number) => number,
+            _ => {
+                errors.push(Violation::new("/priority", "range", "a priority is a whole number", value, json!("−100 to 100")));
+                0
+            }
+        },
+    }
+}
+
+fn section(
+    given: &Map<String, Value>,
+    name: &str,
+    parameters: &[Parameter],
+    known: Option<&[&str]>,
+    errors: &mut Vec<Violation>,
+) -> Map<String, Value> {
+    let empty = Map::new();
+    let section = match given.get(name) {
+        None | Some(Value::Null) => &empty,
+        Some(Value::Object(map)) => map,
+        Some(value) => {
+            errors.push(Violation::new(format!("/{name}"), "type", "an object is needed", value, Value::Null));
+            &empty
+        }
+    };
+    // `fields` depends on the scene and is checked apart.
+    let mut rest = section.clone();
+    if known.is_some() {
+        rest.shift_remove("fields");
+    }
+    if let Some(value) = section.get("type") {
+        errors.push(Violation::new(format!("/{name}/type"), "unknown_field", "there is no such field", value, Value::Null));
+    }
+    let before = errors.len();
+    let checked = check(parameters, &rest, &format!("/{name}"), errors);
+    if let Some(known) = known {
+        for violation in &mut errors[before..] {
+            if violation.code == "unknown_field" {
+                let field = violation.pointer.rsplit('/').next().unwrap_or_default().to_owned();
+                violation.did_you_mean = check::closest(&field, known);
+                violation.allowed = json!(known);
+            }
+        }
+    }
+    checked
+}
+
+fn output_fields(given: &Map<String, Value>, scene: Option<&dyn Scene>, errors: &mut Vec<Violation>) -> Value {
+    let known = scene.map(Scene::field_names).unwrap_or_default();
+    match given.get("output").and_then(|output| output.get("fields")) {
+        None | Some(Value::Null) => json!(known),
+        Some(Value::Array(list)) => {
+            for (k, value) in list.iter().enumerate() {
+                let is_known = value.as_str().is_some_and(|name| known.contains(&name));
+                if !is_known && scene.is_some() {
+                    let detail = "the scene has no such field";
+                    let mut violation = Violation::new(format!("/output/fields/{k}"), "unknown", detail, value, json!(known));
+                    violation.did_you_mean = value.as_str().and_then(|name| check::closest(name, &known));
+                    errors.push(violation);
+                }
+            }
+            Value::Array(list.clone())
+        }
+        Some(value) => {
+            errors.push(Violation::new("/output/fields", "type", "a list of names is needed", value, json!(known)));
+            Value::Null
+        }
+    }
+}
+
+fn default_limit(limits: &mut Map<String, Value>, name: &str, most: u64, errors: &mut Vec<Violation>) {
+    match limits.get(name).and_then(Value::as_u64) {
+        None => {
+            limits.insert(name.to_owned(), json!(most));
+        }
+        Some(asked) if asked > most => {
+            let detail = "more than this service gives to a job";
+            errors.push(Violation::new(format!("/limits/{name}"), "range", detail, &json!(asked), json!(format!("at most {most}"))));
+        }
+        Some(_) => {}
+    }
+}
+
+/// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields.
+fn parse_restart(
+    restart: &Value,
+    find_checkpoint: &impl Fn(&str) -> Option<RestartSource>,
+    errors: &mut Vec<Violation>,
+) -> Option<(RestartSource, Value)> {
+    const KNOWN: [&str; 3] = ["checkpoint", "overrides", "allow_other_isa"];
+    let Value::Object(map) = restart else {
+        errors.push(Violation::new("/restart", "type", "a restart is an object", restart, json!(KNOWN)));
+        return None;
+    };
+    for (name, value) in map {
+        if !KNOWN.contains(&name.as_str()) {
+            let at = format!("/restart/{}", check::escaped(name));
+            let mut violation = Violation::new(at, "unknown_field", "there is no such field", value, json!(KNOWN));
+            violation.did_you_mean = check::closest(name, &KNOWN);
+            errors.push(violation);
+        }
+    }
+    let id = map.get("checkpoint").unwrap_or(&Value::Null);
+    let Some(source) = id.as_str().and_then(find_checkpoint) else {
+        let code = if id.is_null() { "required" } else { "not_found" };
+        let detail = "there is no such checkpoint";
+        errors.push(Violation::new("/restart/checkpoint", code, detail, id, json!("the id of a checkpoint, ckpt_…")));
+        return None;
+    };
+    let allow = map.get("allow_other_isa").unwrap_or(&Value::Null);
+    if !(allow.is_null() || allow.is_boolean()) {
+        errors.push(Violation::new("/restart/allow_other_isa", "type", "true or false", allow, json!([true, false])));
+    }
+    if source.isa != crate::build::isa() && allow != &Value::Bool(true) {
+        let detail = format!(
+            "the checkpoint was written on {}, this service computes on {}; results would not be bit-identical",
+            source.isa,
+            crate::build::isa()
+        );
+        errors.push(Violation::new("/restart/allow_other_isa", "required", detail, allow, json!([true])));
+    }
+    let mut scene = source.resolved["scene"].clone();
+    let kind = scene["kind"].as_str().and_then(meniscus::scenes::find)?;
+    let safe = meniscus::scene::json_schema::restart_safe(kind);
+    match map.get("overrides") {
+        None | Some(Value::Null) => {}
+        Some(Value::Object(overrides)) => {
+            for (pointer, value) in overrides {
+                let at = format!("/restart/overrides/{}", check::escaped(pointer));
+                if !safe.contains(pointer) {
+                    let detail = "a restart may not change this field";
+                    let mut violation = Violation::new(at, "not_restart_safe", detail, value, json!(safe));
+                    let names: Vec<&str> = safe.iter().map(String::as_str).collect();
+                    violation.did_you_mean = check::closest(pointer, &names);
+                    errors.push(violation);
+                } else if let Some(slot) = scene.pointer_mut(pointer) {
+                    *slot = value.clone();
+                }
+            }
+        }
+        Some(value) => {
+            let detail = "overrides are an object from JSON pointers to values";
+            errors.push(Violation::new("/restart/overrides", "type", detail, value, json!(safe)));
+        }
+    }
+    Some((source, scene))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Allowance, RestartSource, Wishes, parse};
+    use serde_json::{Value, json};
+
+    const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30 };
+
+    fn errors(body: &Value) -> Vec<(String, String)> {
+        match parse(body, ALLOWANCE, |_| None) {
+            Ok(_) => Vec::new(),
+            Err(found) => found.into_iter().map(|v| (v.pointer, v.code.to_owned())).collect(),
+        }
+    }
+
+    #[test]
+    fn every_default_stands_in_the_resolved_body() {
+        let body = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, |_| None).ok().unwrap();
+        let scene = &body.resolved["scene"];
+        assert_eq!(scene["field"], "dual");
+        assert_eq!(scene["redistance"]["type"], "for_output");
+        assert_eq!(scene["method"]["neighborhood"]["type"], "nearest");
+        assert_eq!(body.resolved["limits"]["threads"], 2);
+        assert_eq!(body.resolved["output"]["series_every_steps"], 10);
+        assert_eq!(body.resolved["checkpoint"]["every_wall_s"], 60.0);
+        assert!(Wishes::of(&body.resolved).is_ok());
+        // What is resolved is a body of its own with the same meaning.
+        let again = parse(&json!({"scene": scene}), ALLOWANCE, |_| None).ok().unwrap();
+        assert_eq!(&again.resolved["scene"], scene);
+    }
+
+    #[test]
+    fn all_errors_come_at_once_with_their_places() {
+        let body = json!({
+            "scene": {"kind": "vortex", "spacing": -1, "bandh": 3, "shape": {"type": "circle", "radius": "big"}, "flow": "single_vortx"},
+            "output": {"every_time": 0, "fields": ["fi"]}, "limits": {"threads": 99}, "nme": "x"
+        });
+        let found = errors(&body);
+        for expected in [
+            ("/nme", "unknown_field"),
+            ("/scene/spacing", "range"),
+            ("/scene/bandh", "unknown_field"),
+            ("/scene/shape/radius", "type"),
+            ("/scene/flow", "unknown"),
+            ("/output/every_time", "range"),
+            ("/limits/threads", "range"),
+        ] {
+            assert!(found.iter().any(|(p, c)| p == expected.0 && c == expected.1), "{expected:?} not in {found:?}");
+        }
+        let suggestions: Vec<String> =
+            parse(&body, ALLOWANCE, |_| None).err().unwrap().into_iter().filter_map(|v| v.did_you_mean).collect();
+        for name in ["name", "band_h", "single_vortex"] {
+            assert!(suggestions.iter().any(|s| s == name), "{name} not in {suggestions:?}");
+        }
+    }
+
+    #[test]
+    fn more_particles_than_memory_names_both_fields() {
+        let body = json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.002}, "limits": {"memory_bytes": 100_000_000}});
+        assert_eq!(errors(&body), [("/scene/spacing".to_owned(), "memory".to_owned())]);
+    }
+
+    #[test]
+    fn restarts_change_only_what_is_safe() {
+        let source = |_: &str| {
+            let first = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, |_| None).ok()?;
+            Some(RestartSource {
+                checkpoint: "ckpt_1".into(),
+                resolved: first.resolved,
+                job: "job_1".into(),
+                isa: crate::build::isa(),
+                step: 240,
+            })
+        };
+        let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/end_time": 12.0}}});
+        let job = parse(&body, ALLOWANCE, source).ok().unwrap();
+        assert_eq!(job.estimate.steps, 360);
+        let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/spacing": 0.1}}});
+        assert_eq!(parse(&body, ALLOWANCE, source).err().unwrap()[0].code, "not_restart_safe");
+        let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/end_time": 4.0}}});
+        assert_eq!(parse(&body, ALLOWANCE, source).err().unwrap()[0].code, "range");
+    }
+}

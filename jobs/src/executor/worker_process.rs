@@ -1,0 +1,77 @@
+//! The inside of a worker's process: the ear on standard input, the pulse on standard output, and the attempt.
+
+use crate::observers::Control;
+use crate::order::{self, Order};
+use crate::process;
+use crate::records::{Record, RecordFile, RecordSink, Verdict};
+use crate::worker::run_attempt;
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+use std::time::Duration;
+
+/// Time between two signs of life.
+const PULSE: Duration = Duration::from_secs(1);
+
+/// Runs the order in an attempt's directory; the verdict stands in the records.
+///
+/// # Errors
+/// When the order cannot be read or the records cannot be opened.
+pub fn run(directory: &Path) -> io::Result<Verdict> {
+    process::be_nice();
+    let order: Order = serde_json::from_slice(&std::fs::read(directory.join(order::FILE_NAME))?)?;
+    let control = Control::default();
+    listen(control.clone())?;
+    pulse()?;
+    let mut sink = Announced(RecordFile::open(directory, order.epoch)?);
+    Ok(run_attempt(&order, directory, &control, &mut sink))
+}
+
+/// Hears requests; the end of the input is the end of the service and of this process.
+fn listen(control: Control) -> io::Result<()> {
+    std::thread::Builder::new().name("ear".to_owned()).spawn(move || {
+        for line in io::stdin().lock().lines() {
+            match line {
+                Ok(word) => control.hear(&word),
+                Err(_) => break,
+            }
+        }
+        end_at_once();
+    })?;
+    Ok(())
+}
+
+fn pulse() -> io::Result<()> {
+    std::thread::Builder::new().name("pulse".to_owned()).spawn(|| {
+        loop {
+            std::thread::sleep(PULSE);
+            if hint().is_err() {
+                end_at_once();
+            }
+        }
+    })?;
+    Ok(())
+}
+
+fn hint() -> io::Result<()> {
+    let mut output = io::stdout().lock();
+    output.write_all(b"\n")?;
+    output.flush()
+}
+
+/// Ends without exit handlers, which could wait for a library that another thread is inside of. Whatever was being
+/// written has an unfinished name.
+fn end_at_once() {
+    let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::KILL);
+}
+
+/// Records that are hinted at on standard output.
+struct Announced(RecordFile);
+
+impl RecordSink for Announced {
+    fn put(&mut self, record: &Record, durable: bool) -> io::Result<()> {
+        self.0.put(record, durable)?;
+        // The pulse notices a closed pipe.
+        let _ = hint();
+        Ok(())
+    }
+}

@@ -1,0 +1,6 @@
+//! Files that others read: VTKHDF frames, CSV series, SVG pictures.
+
+pub mod csv;
+pub mod hdf5_file;
+pub mod picture;
+pub mod vtkhdf;

@@ -1,0 +1,87 @@
+//! Frames as VTKHDF `PolyData` (version 2.0): every particle is a vertex. ParaView, VTK, PyVista and h5py open them.
+//!
+//! VTK's reader needs all four topology groups, and numbers only under `FieldData`.
+
+use super::hdf5_file::write;
+use hdf5::types::FixedAscii;
+use hdf5::{File, Group};
+use meniscus::simulation::{FieldValues, Fields};
+use std::path::Path;
+
+/// Writes the chosen fields of one moment; the file is closed when this returns.
+///
+/// # Errors
+/// Whatever libhdf5 reports.
+pub fn write_frame(path: &Path, fields: &Fields, chosen: &[String], time: f64, step: u64) -> hdf5::Result<()> {
+    let file = File::create(path)?;
+    let root = file.create_group("VTKHDF")?;
+    root.new_attr::<i64>().shape(2).create("Version")?.write_raw(&[2_i64, 0])?;
+    let kind = FixedAscii::<8>::from_ascii(b"PolyData").map_err(|e| hdf5::Error::from(e.to_string()))?;
+    root.new_attr::<FixedAscii<8>>().create("Type")?.write_scalar(&kind)?;
+    let count = fields.points.len();
+    write(&root, "NumberOfPoints", 1, &[count as i64])?;
+    write(&root, "Points", 3, fields.points.as_flattened())?;
+    let places: Vec<i64> = (0..=count as i64).collect();
+    topology(&root, "Vertices", &places, &places[..count])?;
+    for name in ["Lines", "Polygons", "Strips"] {
+        topology(&root, name, &[0], &[])?;
+    }
+    let data = root.create_group("PointData")?;
+    for field in fields.columns.iter().filter(|field| chosen.iter().any(|name| name == field.name)) {
+        match &field.values {
+            FieldValues::Scalar(values) => write(&data, field.name, 1, values)?,
+            FieldValues::Vector(values) => write(&data, field.name, 3, values.as_flattened())?,
+            FieldValues::Flag(values) => write(&data, field.name, 1, values)?,
+            FieldValues::Id(values) => write(&data, field.name, 1, values)?,
+        };
+    }
+    let moment = root.create_group("FieldData")?;
+    write(&moment, "Time", 1, &[time])?;
+    write(&moment, "Step", 1, &[step as i64])?;
+    file.close()
+}
+
+fn topology(root: &Group, name: &str, offsets: &[i64], connectivity: &[i64]) -> hdf5::Result<()> {
+    let group = root.create_group(name)?;
+    write(&group, "NumberOfCells", 1, &[offsets.len() as i64 - 1])?;
+    write(&group, "NumberOfConnectivityIds", 1, &[connectivity.len() as i64])?;
+    write(&group, "Offsets", 1, offsets)?;
+    write(&group, "Connectivity", 1, connectivity)?;
+    Ok(())
+}
+
+/// What a picture needs of a frame.
+#[derive(Debug, Clone, Default)]
+pub struct FrameView {
+    /// Scene time.
+    pub time: f64,
+    /// Positions.
+    pub points: Vec<[f64; 3]>,
+    /// Signed distances, NaN outside the band.
+    pub phi: Vec<f64>,
+    /// Closest points and normals, where the frame has both.
+    pub surface: Vec<([f64; 3], [f64; 3])>,
+}
+
+/// Reads a frame back; None where it has no `phi`.
+///
+/// # Errors
+/// Whatever libhdf5 reports.
+pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
+    let file = File::open(path)?;
+    let root = file.group("VTKHDF")?;
+    let data = root.group("PointData")?;
+    let Ok(phi) = data.dataset("phi") else { return Ok(None) };
+    let triples = |values: Vec<f64>| values.as_chunks::<3>().0.to_vec();
+    let surface = match (data.dataset("closest_point"), data.dataset("normal")) {
+        (Ok(points), Ok(normals)) => triples(points.read_raw()?).into_iter().zip(triples(normals.read_raw()?)).collect(),
+        _ => Vec::new(),
+    };
+    let time = root.dataset("FieldData/Time")?.read_raw::<f64>()?;
+    Ok(Some(FrameView {
+        time: time.first().copied().unwrap_or(0.0),
+        points: triples(root.dataset("Points")?.read_raw()?),
+        phi: phi.read_raw()?,
+        surface,
+    }))
+}

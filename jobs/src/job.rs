@@ -1,0 +1,232 @@
+//! The states of a job and the one table of transitions between them.
+
+use serde::{Deserialize, Serialize};
+
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident => $word:literal,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum $name {
+            $($(#[$variant_doc])* #[serde(rename = $word)] $variant,)*
+        }
+
+        impl $name {
+            /// All of them.
+            pub const ALL: &[$name] = &[$($name::$variant,)*];
+
+            /// The word that stands for it in JSON and in the store.
+            #[must_use]
+            pub fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)*
+                }
+            }
+
+            /// From its word.
+            #[must_use]
+            pub fn from_word(word: &str) -> Option<Self> {
+                match word {
+                    $($word => Some(Self::$variant),)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+words! {
+    /// Where a job stands.
+    State {
+        /// Waiting for a slot.
+        Queued => "queued",
+        /// A worker runs.
+        Running => "running",
+        /// A worker was asked to checkpoint and end.
+        Pausing => "pausing",
+        /// At rest with its checkpoints.
+        Paused => "paused",
+        /// A worker was asked to drop everything.
+        Canceling => "canceling",
+        /// The worker is gone without a verdict.
+        Interrupted => "interrupted",
+        /// Done, everything published.
+        Succeeded => "succeeded",
+        /// Ended by an error.
+        Failed => "failed",
+        /// Ended on request.
+        Canceled => "canceled",
+    }
+}
+
+words! {
+    /// What can happen to a job.
+    Trigger {
+        /// A slot and memory are free.
+        Claim => "claim",
+        /// Somebody cancels.
+        Cancel => "cancel",
+        /// Somebody pauses, or a limit does.
+        Pause => "pause",
+        /// Somebody resumes, or space is back.
+        Resume => "resume",
+        /// The worker ended with everything published.
+        Finish => "finish",
+        /// The worker ended after a checkpoint.
+        Rest => "rest",
+        /// The worker ended after a checkpoint because the service shuts down.
+        Drain => "drain",
+        /// The worker dropped its step.
+        Drop => "drop",
+        /// The run cannot go on.
+        Fail => "fail",
+        /// The worker is gone without a verdict.
+        Lose => "lose",
+        /// A lost job goes back to the queue.
+        Requeue => "requeue",
+    }
+}
+
+words! {
+    /// Why a job is in a state that is not plain.
+    Reason {
+        /// On request.
+        UserCancel => "user.cancel",
+        /// On request.
+        UserPause => "user.pause",
+        /// Running time used up.
+        LimitWalltime => "limit.walltime",
+        /// Resident memory above the limit.
+        LimitMemory => "limit.memory",
+        /// Ended by the kernel for memory.
+        WorkerOom => "worker.oom",
+        /// Files above the limit.
+        LimitDisk => "limit.disk",
+        /// No space on the device.
+        StorageEnospc => "storage.enospc",
+        /// Reading or writing failed.
+        StorageIo => "storage.io",
+        /// A value stopped being a number.
+        DivergedNonfinite => "diverged.nonfinite",
+        /// The interface vanished.
+        DivergedInterface => "diverged.interface",
+        /// The worker died.
+        WorkerCrash => "worker.crash",
+        /// The worker gave no sign of life.
+        WorkerStalled => "worker.stalled",
+        /// The service restarted.
+        ServerRestart => "server.restart",
+        /// No checkpoint to go on from could be read.
+        CheckpointNoneValid => "checkpoint.none_valid",
+        /// The checkpoint belongs to another scene.
+        CheckpointIncompatible => "checkpoint.incompatible",
+        /// An input file is damaged.
+        InputDamaged => "input.damaged",
+        /// A defect of the program.
+        Internal => "internal",
+    }
+}
+
+/// The only transition table: (from, trigger, to).
+pub const TRANSITIONS: &[(State, Trigger, State)] = &[
+    (State::Queued, Trigger::Claim, State::Running),
+    (State::Queued, Trigger::Cancel, State::Canceled),
+    (State::Queued, Trigger::Pause, State::Paused),
+    (State::Paused, Trigger::Cancel, State::Canceled),
+    (State::Paused, Trigger::Resume, State::Queued),
+    (State::Running, Trigger::Finish, State::Succeeded),
+    (State::Running, Trigger::Pause, State::Pausing),
+    (State::Running, Trigger::Cancel, State::Canceling),
+    (State::Running, Trigger::Fail, State::Failed),
+    (State::Running, Trigger::Lose, State::Interrupted),
+    (State::Pausing, Trigger::Rest, State::Paused),
+    (State::Pausing, Trigger::Drain, State::Queued),
+    (State::Pausing, Trigger::Cancel, State::Canceling),
+    // The end may be reached while the request is on its way.
+    (State::Pausing, Trigger::Finish, State::Succeeded),
+    (State::Pausing, Trigger::Fail, State::Failed),
+    (State::Pausing, Trigger::Lose, State::Interrupted),
+    (State::Canceling, Trigger::Drop, State::Canceled),
+    (State::Canceling, Trigger::Lose, State::Canceled),
+    (State::Interrupted, Trigger::Requeue, State::Queued),
+    (State::Interrupted, Trigger::Fail, State::Failed),
+];
+
+impl State {
+    /// Where a trigger leads from here; None where the table has no such row.
+    #[must_use]
+    pub fn after(self, trigger: Trigger) -> Option<State> {
+        TRANSITIONS.iter().find(|(from, on, _)| *from == self && *on == trigger).map(|(_, _, to)| *to)
+    }
+
+    /// Whether the state is never left.
+    #[must_use]
+    pub fn is_terminal(self) -> bool {
+        matches!(self, Self::Succeeded | Self::Failed | Self::Canceled)
+    }
+
+    /// Whether a worker should exist.
+    #[must_use]
+    pub fn has_worker(self) -> bool {
+        matches!(self, Self::Running | Self::Pausing | Self::Canceling)
+    }
+}
+
+impl Reason {
+    /// What a person can do about it.
+    #[must_use]
+    pub fn hint(self) -> &'static str {
+        match self {
+            Self::UserCancel => "canceled on request; submit the body again to run it anew",
+            Self::UserPause => "paused on request; POST …/resume goes on from the last checkpoint",
+            Self::LimitWalltime => "limits.wall_s is used up; POST …/resume grants it once more",
+            Self::LimitMemory => "the worker outgrew limits.memory_bytes; raise it, or use a larger spacing or a narrower band",
+            Self::WorkerOom => "the kernel ended the worker for lack of memory; run fewer jobs at once or lower limits.memory_bytes",
+            Self::LimitDisk => "limits.disk_bytes is used up; restart from the last checkpoint with a higher limit or fewer frames",
+            Self::StorageEnospc => "the disk is full; the job resumes by itself when space is back",
+            Self::StorageIo => "a file could not be read or written; the service's log names it",
+            Self::DivergedNonfinite => "a value stopped being finite; try a smaller time step, from the last checkpoint",
+            Self::DivergedInterface => "the interface vanished between the particles; try a smaller spacing",
+            Self::WorkerCrash => "the worker died; its log may say why",
+            Self::WorkerStalled => "the worker gave no sign of life and was ended",
+            Self::ServerRestart => "the service stopped while the job ran; it goes on from the last checkpoint",
+            Self::CheckpointNoneValid => "no checkpoint to start from passed its checks",
+            Self::CheckpointIncompatible => "the checkpoint is of another scene or another instruction set",
+            Self::InputDamaged => "an input file did not pass its checks",
+            Self::Internal => "a defect of the program; please report it with the job's log",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{State, TRANSITIONS, Trigger};
+
+    #[test]
+    fn terminal_states_are_never_left_and_every_state_is_reached() {
+        for (from, _, _) in TRANSITIONS {
+            assert!(!from.is_terminal(), "{from:?} is left");
+        }
+        for state in State::ALL {
+            assert!(*state == State::Queued || TRANSITIONS.iter().any(|t| t.2 == *state), "{state:?}");
+        }
+    }
+
+    #[test]
+    fn every_state_that_lasts_can_be_canceled_and_every_worker_can_be_lost() {
+        for state in State::ALL {
+            if state.has_worker() {
+                assert!(state.after(Trigger::Lose).is_some(), "{state:?}");
+            }
+            if matches!(state, State::Queued | State::Running | State::Pausing | State::Paused) {
+                assert!(state.after(Trigger::Cancel).is_some(), "{state:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_row_a_state_and_trigger() {
+        for (k, row) in TRANSITIONS.iter().enumerate() {
+            assert!(TRANSITIONS[..k].iter().all(|other| (other.0, other.1) != (row.0, row.1)), "{row:?}");
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! What the system says of processes: CPU time, memory, free space.
+
+use rustix::process::{getpriority_process, setpriority_process};
+use rustix::time::{ClockId, clock_gettime};
+use std::path::Path;
+
+/// CPU seconds of this process, all threads.
+#[must_use]
+pub fn cpu_seconds() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+/// Makes this process stand back for others.
+pub fn be_nice() {
+    if getpriority_process(None).is_ok_and(|priority| priority < 10) {
+        // Failing to stand back is no reason not to work.
+        let _ = setpriority_process(None, 10);
+    }
+}
+
+/// A line `Name:  1234 kB` of `/proc/PID/status` in bytes.
+fn status_bytes(pid: u32, name: &str) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'))?;
+    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
+}
+
+/// Resident memory of a process now.
+#[must_use]
+pub fn resident_bytes(pid: u32) -> Option<u64> {
+    status_bytes(pid, "VmRSS")
+}
+
+/// Most resident memory of a process so far.
+#[must_use]
+pub fn peak_resident_bytes(pid: u32) -> Option<u64> {
+    status_bytes(pid, "VmHWM")
+}
+
+/// Memory that new processes can have.
+#[must_use]
+pub fn available_memory() -> Option<u64> {
+    meminfo("MemAvailable")
+}
+
+/// Memory of the machine.
+#[must_use]
+pub fn total_memory() -> Option<u64> {
+    meminfo("MemTotal")
+}
+
+fn meminfo(name: &str) -> Option<u64> {
+    let info = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = info.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'))?;
+    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
+}
+
+/// Bytes that an ordinary user can still write where `path` lives.
+#[must_use]
+pub fn free_space(path: &Path) -> Option<u64> {
+    let stat = rustix::fs::statvfs(path).ok()?;
+    Some(stat.f_bavail * stat.f_frsize)
+}
+
+/// Bytes of all files below a directory.
+#[must_use]
+pub fn directory_bytes(directory: &Path) -> u64 {
+    let Ok(entries) = std::fs::read_dir(directory) else { return 0 };
+    entries
+        .flatten()
+        .map(|entry| match entry.metadata() {
+            Ok(meta) if meta.is_dir() => directory_bytes(&entry.path()),
+            Ok(meta) => meta.len(),
+            Err(_) => 0,
+        })
+        .sum()
+}
+
+/// Whether an error says that the device is full.
+#[must_use]
+pub fn is_out_of_space(error: &(dyn std::error::Error + 'static)) -> bool {
+    let mut current = Some(error);
+    while let Some(error) = current {
+        let full = error.downcast_ref::<std::io::Error>().is_some_and(|e| {
+            matches!(e.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded)
+        });
+        // libhdf5 wraps the system's error in text.
+        if full || error.to_string().contains("No space left on device") {
+            return true;
+        }
+        current = error.source();
+    }
+    false
+}

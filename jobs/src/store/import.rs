@@ -1,0 +1,226 @@
+//! Publishing a worker's records: each is taken exactly once, together with the offset behind it, and only while the
+//! job is at the record's attempt.
+
+use super::{Store, StoreError, events, rows};
+use crate::records::{self, CheckpointRecord, Line, Progress, Record, Usage, Verdict};
+use rusqlite::{Transaction, params};
+use serde_json::json;
+use std::time::{Duration, Instant};
+
+/// Least time between two progress events of a job.
+const PROGRESS_EVENT_INTERVAL: Duration = Duration::from_secs(1);
+
+/// When the last progress event of a running job was written.
+#[derive(Debug, Default)]
+pub struct ProgressPace {
+    last: Option<Instant>,
+}
+
+/// What an import brought.
+#[derive(Debug, Default)]
+pub struct Imported {
+    /// The worker's last word.
+    pub verdict: Option<Verdict>,
+    /// Whether a checkpoint came.
+    pub has_checkpoint: bool,
+    /// Whether anything came.
+    pub any: bool,
+}
+
+impl Store {
+    /// Takes the new records of an attempt.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn import(&self, job: &str, epoch: u64, pace: &mut ProgressPace) -> Result<Imported, StoreError> {
+        let Some(row) = self.job(job)?.filter(|row| row.attempt == epoch) else { return Ok(Imported::default()) };
+        let directory = crate::order::attempt_directory(&self.job_directory(job), epoch);
+        let lines = records::read_from(&directory, row.records_offset)?;
+        let Some((_, end)) = lines.last() else { return Ok(Imported::default()) };
+        let end = *end;
+        let mut imported = Imported { any: true, ..Imported::default() };
+        self.write(|transaction| -> Result<(), StoreError> {
+            // The epoch and the offset are checked again inside the transaction: this is the fence.
+            let changed = transaction
+                .prepare_cached("UPDATE jobs SET records_offset = ?4 WHERE id = ?1 AND attempt = ?2 AND records_offset = ?3")?
+                .execute(params![job, epoch as i64, row.records_offset as i64, end as i64])?;
+            if changed != 1 {
+                return Ok(());
+            }
+            let mut latest: Option<Progress> = None;
+            for (line, _) in lines {
+                let Some(Line { epoch: stamped, record, .. }) = line else { continue };
+                if stamped != epoch {
+                    continue;
+                }
+                match record {
+                    Record::Progress(progress) => latest = Some(progress),
+                    Record::Verdict(verdict) => imported.verdict = Some(verdict),
+                    Record::Checkpoint(checkpoint) => {
+                        imported.has_checkpoint = true;
+                        take_checkpoint(transaction, job, epoch, &checkpoint)?;
+                    }
+                    other => take(transaction, job, epoch, &other)?,
+                }
+            }
+            if let Some(progress) = latest {
+                let due = pace.last.is_none_or(|last| last.elapsed() >= PROGRESS_EVENT_INTERVAL);
+                take_progress(transaction, job, epoch, &progress, due || imported.verdict.is_some())?;
+                if due {
+                    pace.last = Some(Instant::now());
+                }
+            }
+            Ok(())
+        })?;
+        Ok(imported)
+    }
+
+    /// Books what the service knows of an attempt's cost.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn book_usage(&self, job: &str, epoch: u64, usage: &Usage) -> Result<(), StoreError> {
+        let text = serde_json::to_string(usage)?;
+        self.write(|transaction| {
+            transaction
+                .prepare_cached("UPDATE jobs SET usage = ?3 WHERE id = ?1 AND attempt = ?2")?
+                .execute(params![job, epoch as i64, text])?;
+            Ok(())
+        })
+    }
+
+    /// Counts a worker's death; a checkpoint since the last one starts the count anew. Returns the count.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn count_death(&self, job: &str, epoch: u64) -> Result<u32, StoreError> {
+        self.write(|transaction| {
+            transaction.execute(
+                "UPDATE jobs SET deaths = CASE WHEN checkpoint_since THEN 1 ELSE deaths + 1 END
+                 WHERE id = ?1 AND attempt = ?2",
+                params![job, epoch as i64],
+            )?;
+            Ok(transaction.query_row("SELECT deaths FROM jobs WHERE id = ?1", [job], |row| row.get(0))?)
+        })
+    }
+
+    /// Takes checkpoints beyond the newest `keep` out of the store; the caller removes their files.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn prune_checkpoints(&self, job: &str, keep: usize) -> Result<Vec<super::CheckpointRow>, StoreError> {
+        let old: Vec<_> = self.checkpoints(job)?.into_iter().skip(keep.max(2)).collect();
+        if old.is_empty() {
+            return Ok(old);
+        }
+        self.write(|transaction| -> Result<(), StoreError> {
+            for checkpoint in &old {
+                transaction.execute("DELETE FROM checkpoints WHERE id = ?1", [&checkpoint.id])?;
+            }
+            Ok(())
+        })?;
+        Ok(old)
+    }
+}
+
+fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Result<(), StoreError> {
+    match record {
+        Record::Started { frames, pid, step, .. } => {
+            // Frames after the checkpoint are written again; until then they are not part of the job.
+            let paths: Vec<String> = {
+                let mut statement =
+                    transaction.prepare_cached("SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path")?;
+                let rows = statement.query_map([job], |row| row.get(0))?;
+                rows.collect::<Result<_, _>>()?
+            };
+            for path in paths.iter().skip(*frames as usize) {
+                transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
+            }
+            transaction.execute("UPDATE jobs SET worker_pid = ?2 WHERE id = ?1", params![job, pid])?;
+            // Checkpoints of steps that are to come again were refused by the worker.
+            transaction.execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, *step as i64])?;
+        }
+        Record::File(file) => {
+            transaction
+                .prepare_cached(
+                    "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                )?
+                .execute(params![
+                    job,
+                    file.path,
+                    epoch as i64,
+                    file.size_bytes as i64,
+                    file.sha256,
+                    file.media_type,
+                    file.time,
+                    file.step.map(|step| step as i64),
+                ])?;
+            if file.step.is_some() {
+                let data = json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
+                events::append(transaction, job, epoch, "frame", &data)?;
+            }
+        }
+        Record::Warning { code, message } => {
+            let warnings: String = transaction.query_row("SELECT warnings FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
+            let mut warnings: Vec<String> = serde_json::from_str(&warnings)?;
+            warnings.push(message.clone());
+            transaction.execute("UPDATE jobs SET warnings = ?2 WHERE id = ?1", params![job, serde_json::to_string(&warnings)?])?;
+            events::append(transaction, job, epoch, "warning", &json!({"code": code, "message": message}))?;
+        }
+        Record::Finding { name, message, time } => {
+            let data = json!({"name": name, "message": message, "time": time});
+            events::append(transaction, job, epoch, "finding", &data)?;
+        }
+        Record::Progress(_) | Record::Checkpoint(_) | Record::Verdict(_) => {}
+    }
+    Ok(())
+}
+
+fn take_checkpoint(transaction: &Transaction, job: &str, epoch: u64, checkpoint: &CheckpointRecord) -> Result<(), StoreError> {
+    transaction
+        .prepare_cached(
+            "INSERT OR REPLACE INTO checkpoints (id, job, attempt, path, step, time, size_bytes, sha256, created_at, isa, build)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+        )?
+        .execute(params![
+            checkpoint.id,
+            job,
+            epoch as i64,
+            checkpoint.path,
+            checkpoint.step as i64,
+            checkpoint.time,
+            checkpoint.size_bytes as i64,
+            checkpoint.sha256,
+            crate::clock::now(),
+            checkpoint.isa,
+            checkpoint.build,
+        ])?;
+    transaction.execute("UPDATE jobs SET checkpoint_since = 1 WHERE id = ?1", [job])?;
+    let data = json!({"id": checkpoint.id, "step": checkpoint.step, "time": checkpoint.time, "size_bytes": checkpoint.size_bytes});
+    Ok(events::append(transaction, job, epoch, "checkpoint", &data)?)
+}
+
+fn take_progress(
+    transaction: &Transaction,
+    job: &str,
+    epoch: u64,
+    progress: &Progress,
+    is_event: bool,
+) -> Result<(), StoreError> {
+    let before = rows::job(transaction, job)?.map(|row| row.progress.fraction).unwrap_or_default();
+    // The fraction never falls, also where an attempt repeats what a lost one had done.
+    let mut shown = progress.clone();
+    shown.fraction = shown.fraction.max(before);
+    transaction
+        .prepare_cached("UPDATE jobs SET progress = ?2, usage = ?3, progress_count = progress_count + 1 WHERE id = ?1")?
+        .execute(params![job, serde_json::to_string(&shown)?, serde_json::to_string(&progress.usage)?])?;
+    if is_event {
+        let data = json!({
+            "fraction": shown.fraction, "time": shown.time, "step": shown.step,
+            "steps_per_s": shown.steps_per_s, "eta_s": shown.eta_s,
+        });
+        events::append(transaction, job, epoch, "progress", &data)?;
+    }
+    Ok(())
+}

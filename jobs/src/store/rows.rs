@@ -1,0 +1,206 @@
+//! Rows as values.
+
+use super::StoreError;
+use crate::job::{Reason, State};
+use crate::records::{Progress, Usage};
+use rusqlite::{Connection, OptionalExtension, Row};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// A job.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobRow {
+    /// Id.
+    pub id: String,
+    /// Counts changes of state.
+    pub rev: i64,
+    /// State.
+    pub state: State,
+    /// Why, if the state is not plain.
+    pub reason: Option<Reason>,
+    /// What to do about it.
+    pub hint: Option<String>,
+    /// Numbers and places of a failure.
+    pub message: Option<String>,
+    /// Name.
+    pub name: Option<String>,
+    /// Labels.
+    pub labels: BTreeMap<String, String>,
+    /// Kind of the scene.
+    pub kind: String,
+    /// Body as sent.
+    pub spec: Value,
+    /// Body with every default.
+    pub resolved: Value,
+    /// Size of the run as estimated.
+    pub estimate: Value,
+    /// Priority.
+    pub priority: i64,
+    /// Made.
+    pub created_at: String,
+    /// First started.
+    pub started_at: Option<String>,
+    /// Came to a terminal state.
+    pub finished_at: Option<String>,
+    /// Number of the latest attempt: the epoch.
+    pub attempt: u64,
+    /// Workers that died in a row without a new checkpoint.
+    pub deaths: u32,
+    /// Bytes of the attempt's records that are imported.
+    pub records_offset: u64,
+    /// Whether this attempt has made a checkpoint.
+    pub has_new_checkpoint: bool,
+    /// Process of the latest attempt.
+    pub worker_pid: Option<u32>,
+    /// Progress.
+    pub progress: Progress,
+    /// Counts changes of progress.
+    pub progress_count: i64,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Cost of attempts that ended.
+    pub usage: Usage,
+    /// Running time at the last resume.
+    pub leg_wall_s: f64,
+    /// Checkpoint of another job that this one began with.
+    pub restarted_from: Option<String>,
+}
+
+/// A published file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileRow {
+    /// Path among the job's files.
+    pub path: String,
+    /// Attempt that wrote it.
+    pub attempt: u64,
+    /// Bytes.
+    pub size_bytes: u64,
+    /// Digest.
+    pub sha256: String,
+    /// Media type.
+    pub media_type: String,
+    /// Scene time.
+    pub time: Option<f64>,
+    /// Step.
+    pub step: Option<u64>,
+}
+
+/// A verified checkpoint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckpointRow {
+    /// Id.
+    pub id: String,
+    /// Job that wrote it.
+    pub job: String,
+    /// Attempt that wrote it.
+    pub attempt: u64,
+    /// Path below the attempt's directory.
+    pub path: String,
+    /// Step.
+    pub step: u64,
+    /// Scene time.
+    pub time: f64,
+    /// Bytes.
+    pub size_bytes: u64,
+    /// Digest.
+    pub sha256: String,
+    /// When.
+    pub created_at: String,
+    /// Instruction set.
+    pub isa: String,
+    /// Program.
+    pub build: String,
+}
+
+fn json<T: serde::de::DeserializeOwned + Default>(row: &Row, column: &str) -> rusqlite::Result<T> {
+    let text: Option<String> = row.get(column)?;
+    text.map_or_else(
+        || Ok(T::default()),
+        |text| {
+            serde_json::from_str(&text).map_err(|error| {
+                rusqlite::Error::FromSqlConversionFailure(0, rusqlite::types::Type::Text, Box::new(error))
+            })
+        },
+    )
+}
+
+pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
+    let state: String = row.get("state")?;
+    let reason: Option<String> = row.get("reason")?;
+    Ok(JobRow {
+        id: row.get("id")?,
+        rev: row.get("rev")?,
+        state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
+        reason: reason.as_deref().and_then(Reason::from_word),
+        hint: row.get("hint")?,
+        message: row.get("message")?,
+        name: row.get("name")?,
+        labels: json(row, "labels")?,
+        kind: row.get("kind")?,
+        spec: json(row, "spec")?,
+        resolved: json(row, "resolved")?,
+        estimate: json(row, "estimate")?,
+        priority: row.get("priority")?,
+        created_at: row.get("created_at")?,
+        started_at: row.get("started_at")?,
+        finished_at: row.get("finished_at")?,
+        attempt: row.get::<_, i64>("attempt")? as u64,
+        deaths: row.get("deaths")?,
+        records_offset: row.get::<_, i64>("records_offset")? as u64,
+        has_new_checkpoint: row.get::<_, i64>("checkpoint_since")? != 0,
+        worker_pid: row.get("worker_pid")?,
+        progress: json(row, "progress")?,
+        progress_count: row.get("progress_count")?,
+        warnings: json(row, "warnings")?,
+        usage: json(row, "usage")?,
+        leg_wall_s: row.get("leg_wall_s")?,
+        restarted_from: row.get("restarted_from")?,
+    })
+}
+
+pub(super) fn job(connection: &Connection, id: &str) -> Result<Option<JobRow>, StoreError> {
+    Ok(connection.prepare_cached("SELECT * FROM jobs WHERE id = ?1")?.query_row([id], job_of).optional()?)
+}
+
+fn checkpoint_of(row: &Row) -> rusqlite::Result<CheckpointRow> {
+    Ok(CheckpointRow {
+        id: row.get("id")?,
+        job: row.get("job")?,
+        attempt: row.get::<_, i64>("attempt")? as u64,
+        path: row.get("path")?,
+        step: row.get::<_, i64>("step")? as u64,
+        time: row.get("time")?,
+        size_bytes: row.get::<_, i64>("size_bytes")? as u64,
+        sha256: row.get("sha256")?,
+        created_at: row.get("created_at")?,
+        isa: row.get("isa")?,
+        build: row.get("build")?,
+    })
+}
+
+pub(super) fn checkpoint(connection: &Connection, id: &str) -> Result<Option<CheckpointRow>, StoreError> {
+    Ok(connection.prepare_cached("SELECT * FROM checkpoints WHERE id = ?1")?.query_row([id], checkpoint_of).optional()?)
+}
+
+pub(super) fn checkpoints(connection: &Connection, job: &str) -> Result<Vec<CheckpointRow>, StoreError> {
+    let mut statement =
+        connection.prepare_cached("SELECT * FROM checkpoints WHERE job = ?1 ORDER BY step DESC, attempt DESC, id DESC")?;
+    let rows = statement.query_map([job], checkpoint_of)?;
+    Ok(rows.collect::<Result<_, _>>()?)
+}
+
+pub(super) fn files(connection: &Connection, job: &str) -> Result<Vec<FileRow>, StoreError> {
+    let mut statement = connection.prepare_cached("SELECT * FROM files WHERE job = ?1 ORDER BY path")?;
+    let rows = statement.query_map([job], |row| {
+        Ok(FileRow {
+            path: row.get("path")?,
+            attempt: row.get::<_, i64>("attempt")? as u64,
+            size_bytes: row.get::<_, i64>("size_bytes")? as u64,
+            sha256: row.get("sha256")?,
+            media_type: row.get("media_type")?,
+            time: row.get("time")?,
+            step: row.get::<_, Option<i64>>("step")?.map(|step| step as u64),
+        })
+    })?;
+    Ok(rows.collect::<Result<_, _>>()?)
+}

@@ -1,0 +1,174 @@
+//! Changing the state of a job: the table of [`crate::job`] applied as a compare-and-set.
+
+use super::{JobRow, Store, StoreError, events, rows};
+use crate::job::{Reason, State, Trigger};
+use rusqlite::{Transaction, params};
+use serde_json::json;
+
+/// Why a change was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum ChangeError {
+    /// No such job.
+    #[error("there is no such job")]
+    NotFound,
+    /// The table has no such row.
+    #[error("a job that is {} cannot {}", .0.word(), .1.word())]
+    Illegal(State, Trigger),
+    /// The job's epoch or revision has moved on.
+    #[error("the job has moved on")]
+    Stale,
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+impl From<rusqlite::Error> for ChangeError {
+    fn from(error: rusqlite::Error) -> Self {
+        Self::Store(error.into())
+    }
+}
+
+/// A change to make.
+#[derive(Debug, Clone, Default)]
+pub struct Change {
+    /// Why.
+    pub reason: Option<Reason>,
+    /// Numbers and places of a failure.
+    pub message: Option<String>,
+    /// Only if the job is at this attempt.
+    pub epoch: Option<u64>,
+}
+
+impl Change {
+    /// A change with a reason.
+    #[must_use]
+    pub fn because(reason: Reason) -> Self {
+        Self { reason: Some(reason), ..Self::default() }
+    }
+}
+
+impl Store {
+    /// Applies a trigger to a job.
+    ///
+    /// # Errors
+    /// [`ChangeError`].
+    pub fn change(&self, id: &str, trigger: Trigger, change: &Change) -> Result<JobRow, ChangeError> {
+        self.write(|transaction| apply(transaction, id, trigger, change))
+    }
+
+    /// Takes the next job of the queue whose memory fits, as a new attempt. Durable before any worker starts.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn claim(&self, fits: impl Fn(u64) -> bool) -> Result<Option<JobRow>, StoreError> {
+        let next: Option<(String, i64)> = {
+            let connection = self.read();
+            let mut statement = connection.prepare_cached(
+                "SELECT id, json_extract(estimate, '$.memory_bytes') FROM jobs WHERE state = 'queued'
+                 ORDER BY priority DESC, id LIMIT 64",
+            )?;
+            let mut found = None;
+            for row in statement.query_map([], |row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?)))? {
+                let row = row?;
+                if fits(row.1 as u64) {
+                    found = Some(row);
+                    break;
+                }
+            }
+            found
+        };
+        let Some((id, _)) = next else { return Ok(None) };
+        match self.change(&id, Trigger::Claim, &Change::default()) {
+            Ok(job) => Ok(Some(job)),
+            // Canceled or paused in between.
+            Err(ChangeError::Illegal(..) | ChangeError::NotFound | ChangeError::Stale) => Ok(None),
+            Err(ChangeError::Store(error)) => Err(error),
+        }
+    }
+
+    /// Jobs that should have a worker, and those cut off between two states.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn unfinished_attempts(&self) -> Result<Vec<JobRow>, StoreError> {
+        let connection = self.read();
+        let mut statement = connection.prepare_cached(
+            "SELECT * FROM jobs WHERE state IN ('running', 'pausing', 'canceling', 'interrupted') ORDER BY id",
+        )?;
+        let rows = statement.query_map([], rows::job_of)?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Paused jobs with a reason.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn paused_for(&self, reason: Reason) -> Result<Vec<JobRow>, StoreError> {
+        let connection = self.read();
+        let mut statement =
+            connection.prepare_cached("SELECT * FROM jobs WHERE state = 'paused' AND reason = ?1 ORDER BY id")?;
+        let rows = statement.query_map([reason.word()], rows::job_of)?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Notes the process of an attempt and its lease.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn lease(&self, id: &str, epoch: u64, pid: u32, until: &str) -> Result<(), StoreError> {
+        self.write(|transaction| {
+            transaction
+                .prepare_cached("UPDATE jobs SET worker_pid = ?3, lease_until = ?4 WHERE id = ?1 AND attempt = ?2")?
+                .execute(params![id, epoch as i64, pid, until])?;
+            Ok(())
+        })
+    }
+}
+
+pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, change: &Change) -> Result<JobRow, ChangeError> {
+    let job = rows::job(transaction, id)?.ok_or(ChangeError::NotFound)?;
+    if change.epoch.is_some_and(|epoch| epoch != job.attempt) {
+        return Err(ChangeError::Stale);
+    }
+    let to = job.state.after(trigger).ok_or(ChangeError::Illegal(job.state, trigger))?;
+    let now = crate::clock::now();
+    let is_claim = trigger == Trigger::Claim;
+    // A plain state has no reason; a pause or cancellation keeps the one that it was asked with.
+    let plain = matches!(to, State::Running | State::Succeeded);
+    let reason = if plain { None } else { change.reason.or(job.reason) };
+    let reason = if trigger == Trigger::Resume { None } else { reason };
+    let message = if plain || trigger == Trigger::Resume { None } else { change.message.clone().or(job.message) };
+    let hint = reason.map(Reason::hint);
+    // Three deaths in a row count; a person's resume begins a new row.
+    let deaths = if trigger == Trigger::Resume { 0 } else { job.deaths };
+    let changed = transaction
+        .prepare_cached(
+            "UPDATE jobs SET rev = rev + 1, state = ?3, reason = ?4, hint = ?5, message = ?6,
+                 attempt = attempt + ?7, records_offset = CASE WHEN ?7 = 1 THEN 0 ELSE records_offset END,
+                 checkpoint_since = CASE WHEN ?7 = 1 THEN 0 ELSE checkpoint_since END,
+                 worker_pid = CASE WHEN ?7 = 1 THEN NULL ELSE worker_pid END,
+                 started_at = CASE WHEN ?7 = 1 THEN COALESCE(started_at, ?8) ELSE started_at END,
+                 finished_at = CASE WHEN ?9 THEN ?8 ELSE NULL END, deaths = ?10, leg_wall_s = ?11
+             WHERE id = ?1 AND rev = ?2",
+        )?
+        .execute(params![
+            id,
+            job.rev,
+            to.word(),
+            reason.map(Reason::word),
+            hint,
+            message,
+            i64::from(is_claim),
+            now,
+            to.is_terminal(),
+            deaths,
+            if trigger == Trigger::Resume { job.usage.wall_s } else { job.leg_wall_s },
+        ])?;
+    if changed != 1 {
+        return Err(ChangeError::Stale);
+    }
+    let attempt = job.attempt + u64::from(is_claim);
+    let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
+    events::append(transaction, id, attempt, "state", &data)?;
+    rows::job(transaction, id)?.ok_or(ChangeError::NotFound)
+}
