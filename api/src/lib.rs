@@ -1,0 +1,14 @@
+//! The HTTP job API and the command line of Meniscus.
+//!
+//! It computes nothing and stores nothing: it translates between HTTP and `meniscus_jobs`.
+
+pub mod application;
+pub mod cli;
+pub mod config;
+pub mod error;
+pub mod file_response;
+pub mod foreground;
+pub mod router;
+pub mod routes;
+pub mod telemetry;
+pub mod views;

@@ -104,6 +104,22 @@ impl Store {
         })
     }
 
+    /// Takes one checkpoint out of the store and removes its file.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn delete_checkpoint(&self, row: &super::CheckpointRow) -> Result<(), StoreError> {
+        self.write(|transaction| -> Result<(), StoreError> {
+            transaction.execute("DELETE FROM checkpoints WHERE id = ?1", [&row.id])?;
+            Ok(())
+        })?;
+        let directory = crate::order::attempt_directory(&self.job_directory(&row.job), row.attempt);
+        match std::fs::remove_file(directory.join(&row.path)) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
+            _ => Ok(()),
+        }
+    }
+
     /// Takes checkpoints beyond the newest `keep` out of the store; the caller removes their files.
     ///
     /// # Errors

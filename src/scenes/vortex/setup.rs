@@ -62,7 +62,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Result<Box<d
         let count = if D == 2 { count } else { 2 * count };
         method_json = json!({
             "type": "pcp", "degree": degree, "basis": "minter", "neighborhood": {"type": "nearest", "count": count},
-            "cutoff_h": null, "weight": 2, "minimum_ratio": null, "sample_threshold_h": 1.5, "tolerance": 1e-12,
+            "cutoff_h": null, "weight": 2.0, "minimum_ratio": null, "sample_threshold_h": 1.5, "tolerance": 1e-12,
             "max_iterations": 100
         });
         chosen.insert("method", format!("pcp, degree {degree}, nearest {count}: {why}"));

@@ -1,0 +1,115 @@
+//! The service as a whole: store, supervisor, listener, and their orderly start and end.
+
+use crate::config::Config;
+use crate::router;
+use meniscus_jobs::executor::local::LocalExecutor;
+use meniscus_jobs::lock::{DirectoryLock, LockError};
+use meniscus_jobs::store::{Store, StoreError};
+use meniscus_jobs::supervisor::{Settings, Supervisor, SupervisorHandle};
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::watch;
+
+/// What every handler can reach.
+#[derive(Clone)]
+pub struct Application {
+    /// Jobs.
+    pub store: Arc<Store>,
+    /// Who runs them.
+    pub supervisor: SupervisorHandle,
+    /// The operator's choice.
+    pub config: Arc<Config>,
+    /// Whether recovery is done and no shutdown has begun.
+    pub ready: Arc<AtomicBool>,
+    /// Turns true when the service stops; long answers end then.
+    pub stopping: watch::Receiver<bool>,
+}
+
+/// Why a service could not run.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The data directory is taken.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The system failed.
+    #[error("{0}")]
+    Io(#[from] std::io::Error),
+}
+
+/// Time that open answers have to end after the supervisor has.
+const LAST_ANSWERS: Duration = Duration::from_secs(1);
+
+/// Runs the service until SIGTERM or SIGINT: running jobs then checkpoint and go back to the queue.
+///
+/// # Errors
+/// [`ServeError`].
+pub async fn serve(config: Config) -> Result<(), ServeError> {
+    std::fs::create_dir_all(&config.data)?;
+    // Paths in orders to workers must hold wherever those run.
+    let config = Config { data: std::fs::canonicalize(&config.data)?, ..config };
+    let _lock = DirectoryLock::take(&config.data)?;
+    let store = Arc::new(Store::open(&config.data)?);
+    let executor = Box::new(LocalExecutor::new(std::env::current_exe()?));
+    let supervisor = Supervisor::new(Arc::clone(&store), executor, Settings::with_slots(config.slots));
+    let (stop, stopping) = watch::channel(false);
+    let application = Application {
+        store,
+        supervisor: supervisor.handle(),
+        config: Arc::new(config),
+        ready: Arc::new(AtomicBool::new(false)),
+        stopping,
+    };
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    let listener = TcpListener::bind(application.config.bind).await?;
+    announce(&listener.local_addr()?.to_string())?;
+    let ready = Arc::clone(&application.ready);
+    let supervision = std::thread::Builder::new().name("supervisor".to_owned()).spawn(move || {
+        if let Err(error) = supervisor.recover() {
+            tracing::error!(%error, "recovery failed; the service stays unready");
+            return;
+        }
+        ready.store(true, Ordering::Release);
+        tracing::info!("ready");
+        supervisor.run();
+    })?;
+    let handle = application.supervisor.clone();
+    let ready = Arc::clone(&application.ready);
+    let mut stopped = application.stopping.clone();
+    let answers = tokio::spawn(
+        axum::serve(listener, router::router(application))
+            .with_graceful_shutdown(async move {
+                let _ = stopped.wait_for(|stopped| *stopped).await;
+            })
+            .into_future(),
+    );
+    tokio::select! {
+        _ = terminate.recv() => {}
+        _ = interrupt.recv() => {}
+    }
+    tracing::info!("stopping: running jobs checkpoint and go back to the queue");
+    ready.store(false, Ordering::Release);
+    handle.shut_down();
+    let joined = tokio::task::spawn_blocking(move || supervision.join()).await;
+    if !matches!(joined, Ok(Ok(()))) {
+        tracing::error!("the supervisor did not end well");
+    }
+    let _ = stop.send(true);
+    // Whoever still reads slowly is cut off.
+    let _ = tokio::time::timeout(LAST_ANSWERS, answers).await;
+    Ok(())
+}
+
+/// The first line on standard output tells where the service listens.
+fn announce(address: &str) -> std::io::Result<()> {
+    let mut output = std::io::stdout().lock();
+    writeln!(output, "listening on http://{address}")?;
+    output.flush()
+}

@@ -1,0 +1,158 @@
+//! Errors as RFC 9457 problems: the only mapping from what went wrong to a status code.
+
+use axum::Json;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use meniscus::scene::Violation;
+use meniscus_jobs::store::{ChangeError, StoreError};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+/// An `application/problem+json` body.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Problem {
+    /// A word for programs, as a relative URI.
+    pub r#type: String,
+    /// A title for people.
+    pub title: String,
+    /// The status code.
+    pub status: u16,
+    /// What is wrong here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub detail: Option<String>,
+    /// Every single thing that is wrong with a body or a query.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub errors: Vec<ProblemItem>,
+}
+
+/// One thing wrong with a body.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct ProblemItem {
+    /// JSON pointer to the place, or the name of a query parameter.
+    pub pointer: String,
+    /// A word for programs.
+    pub code: String,
+    /// A sentence fragment for people.
+    pub detail: String,
+    /// What stands there.
+    #[schema(value_type = Object)]
+    pub got: Value,
+    /// What would be accepted.
+    #[schema(value_type = Object)]
+    pub allowed: Value,
+    /// A known name spelled alike.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub did_you_mean: Option<String>,
+}
+
+impl From<Violation> for ProblemItem {
+    fn from(v: Violation) -> Self {
+        let Violation { pointer, code, detail, got, allowed, did_you_mean } = v;
+        Self { pointer, code: code.to_owned(), detail, got, allowed, did_you_mean }
+    }
+}
+
+/// Whatever a handler can fail with.
+#[derive(Debug)]
+pub enum ApiError {
+    /// The body is not JSON as it must be.
+    Unparsable(String),
+    /// The body or query says things that cannot be.
+    Invalid(Vec<ProblemItem>),
+    /// Nothing is there.
+    NotFound(&'static str),
+    /// The path exists, the method does not.
+    MethodNotAllowed,
+    /// The state does not allow it.
+    Conflict(String),
+    /// The body is larger than this many bytes.
+    TooLarge(usize),
+    /// No byte of the range exists in a file of this size.
+    RangeNotSatisfiable(u64),
+    /// Not yet, or not any more.
+    NotReady,
+    /// A defect or a failing disk; the log says more than the client learns.
+    Internal(String),
+}
+
+impl ApiError {
+    fn problem(&self) -> (StatusCode, &'static str, &'static str, Option<String>) {
+        match self {
+            Self::Unparsable(detail) => (StatusCode::BAD_REQUEST, "unparsable", "the body is not valid JSON", Some(detail.clone())),
+            Self::Invalid(items) => {
+                let detail = format!("{} thing{} wrong", items.len(), if items.len() == 1 { " is" } else { "s are" });
+                (StatusCode::UNPROCESSABLE_ENTITY, "invalid", "the request is not valid", Some(detail))
+            }
+            Self::NotFound(what) => (StatusCode::NOT_FOUND, "not-found", "not found", Some(format!("there is no such {what}"))),
+            Self::MethodNotAllowed => (StatusCode::METHOD_NOT_ALLOWED, "method-not-allowed", "this resource does not do that", None),
+            Self::Conflict(detail) => (StatusCode::CONFLICT, "conflict", "the state does not allow that", Some(detail.clone())),
+            Self::TooLarge(limit) => {
+                (StatusCode::PAYLOAD_TOO_LARGE, "too-large", "the body is too large", Some(format!("at most {limit} bytes")))
+            }
+            Self::RangeNotSatisfiable(size) => {
+                let detail = Some(format!("the file has {size} bytes"));
+                (StatusCode::RANGE_NOT_SATISFIABLE, "range", "no byte of that range exists", detail)
+            }
+            Self::NotReady => (StatusCode::SERVICE_UNAVAILABLE, "not-ready", "the service is starting or stopping", None),
+            Self::Internal(_) => (StatusCode::INTERNAL_SERVER_ERROR, "internal", "the service failed", None),
+        }
+    }
+}
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let (status, kind, title, detail) = self.problem();
+        if let Self::Internal(cause) = &self {
+            // Logged once, here; the client gets no path, no SQL, no backtrace.
+            tracing::error!(cause, "request failed");
+        }
+        let range = if let Self::RangeNotSatisfiable(size) = &self { Some(*size) } else { None };
+        let errors = if let Self::Invalid(items) = self { items } else { Vec::new() };
+        let body = Problem { r#type: format!("/problems/{kind}"), title: title.to_owned(), status: status.as_u16(), detail, errors };
+        let mut response = (status, Json(body)).into_response();
+        let headers = response.headers_mut();
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if status == StatusCode::SERVICE_UNAVAILABLE {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+        }
+        if let Some(value) = range.and_then(|size| HeaderValue::from_str(&format!("bytes */{size}")).ok()) {
+            headers.insert(header::CONTENT_RANGE, value);
+        }
+        response
+    }
+}
+
+impl From<StoreError> for ApiError {
+    fn from(error: StoreError) -> Self {
+        Self::Internal(error.to_string())
+    }
+}
+
+impl From<std::io::Error> for ApiError {
+    fn from(error: std::io::Error) -> Self {
+        Self::Internal(error.to_string())
+    }
+}
+
+impl From<tokio::task::JoinError> for ApiError {
+    fn from(error: tokio::task::JoinError) -> Self {
+        Self::Internal(error.to_string())
+    }
+}
+
+impl From<ChangeError> for ApiError {
+    fn from(error: ChangeError) -> Self {
+        match error {
+            ChangeError::NotFound => Self::NotFound("job"),
+            ChangeError::Illegal(..) | ChangeError::Stale => Self::Conflict(error.to_string()),
+            ChangeError::Store(error) => error.into(),
+        }
+    }
+}
+
+impl From<Vec<Violation>> for ApiError {
+    fn from(violations: Vec<Violation>) -> Self {
+        Self::Invalid(violations.into_iter().map(ProblemItem::from).collect())
+    }
+}

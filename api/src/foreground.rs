@@ -1,0 +1,166 @@
+//! `meniscus run` and `meniscus resume`: one job in this process, with a progress bar and no service.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use meniscus_jobs::body::{self, Allowance};
+use meniscus_jobs::order::{Order, StartCheckpoint};
+use meniscus_jobs::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
+use meniscus_jobs::observers::Control;
+use meniscus_jobs::{checkpoint, process, strict_json, worker};
+use serde_json::{Value, json};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Why a run in the foreground did not begin.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The file cannot be used.
+    #[error("{path}: {cause}")]
+    File {
+        /// Which.
+        path: String,
+        /// Why.
+        cause: String,
+    },
+    /// The body is not valid.
+    #[error("{0}")]
+    Invalid(String),
+    /// The target directory has something in it.
+    #[error("{0} is not empty")]
+    NotEmpty(String),
+    /// The system failed.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+}
+
+/// Runs a job body, or a bare scene, from a file.
+///
+/// # Errors
+/// [`RunError`].
+pub fn run(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCode, RunError> {
+    let cannot = |cause: String| RunError::File { path: file.display().to_string(), cause };
+    let bytes = std::fs::read(file).map_err(|error| cannot(error.to_string()))?;
+    let value = strict_json::parse(&bytes).map_err(|error| cannot(error.to_string()))?;
+    // A scene names its kind, a job body its scene.
+    let spec = if value.get("kind").is_some() { json!({"scene": value}) } else { value };
+    start(&resolve(&spec, threads)?, Vec::new(), out)
+}
+
+/// Goes on from a checkpoint to the end of its scene.
+///
+/// # Errors
+/// [`RunError`].
+pub fn resume(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCode, RunError> {
+    let cannot = |cause: String| RunError::File { path: file.display().to_string(), cause };
+    let (meta, _) = checkpoint::read(file, None).map_err(|error| cannot(error.to_string()))?;
+    let mut spec = meta.body;
+    if let Some(map) = spec.as_object_mut() {
+        map.shift_remove("restart");
+        // Limits belong to the machine that wrote it.
+        map.shift_remove("limits");
+    }
+    let path = std::fs::canonicalize(file)?;
+    let candidate =
+        StartCheckpoint { id: file.display().to_string(), path, sha256: None, is_own: false, allow_other_isa: false };
+    start(&resolve(&spec, threads)?, vec![candidate], out)
+}
+
+fn resolve(spec: &Value, threads: Option<usize>) -> Result<Value, RunError> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let allowance = Allowance {
+        threads: threads.unwrap_or(cores) as u64,
+        memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4,
+    };
+    let body = body::parse(spec, allowance, |_| None).map_err(|violations| {
+        let lines: Vec<String> = violations
+            .iter()
+            .map(|v| {
+                let hint = v.did_you_mean.as_ref().map(|name| format!(" (did you mean {name}?)")).unwrap_or_default();
+                let allowed = if v.allowed.is_null() { String::new() } else { format!("; allowed: {}", v.allowed) };
+                format!("{}: {} (got {}){allowed}{hint}", v.pointer, v.detail, v.got)
+            })
+            .collect();
+        RunError::Invalid(lines.join("\n"))
+    })?;
+    Ok(body.resolved)
+}
+
+fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Result<ExitCode, RunError> {
+    std::fs::create_dir_all(out)?;
+    if std::fs::read_dir(out)?.next().is_some() {
+        return Err(RunError::NotEmpty(out.display().to_string()));
+    }
+    let out = std::fs::canonicalize(out)?;
+    let order = Order {
+        job: "foreground".to_owned(),
+        epoch: 1,
+        body: resolved.clone(),
+        attempts_directory: out.clone(),
+        may_start_afresh: checkpoints.is_empty(),
+        checkpoints,
+        usage: Usage::default(),
+    };
+    let keep = resolved["checkpoint"]["keep"].as_u64().unwrap_or(2) as usize;
+    let mut sink = Screen::new(out.clone(), keep);
+    let verdict = worker::run_attempt(&order, &out, &Control::default(), &mut sink);
+    sink.bar.finish_and_clear();
+    let mut output = io::stdout().lock();
+    match verdict {
+        Verdict::Succeeded => {
+            let report: Value = serde_json::from_slice(&std::fs::read(out.join("report.json"))?).unwrap_or_default();
+            for error in report["errors"].as_array().into_iter().flatten() {
+                let value = error["value"].as_f64().unwrap_or(f64::NAN);
+                let word = |name: &str| error[name].as_str().unwrap_or_default().to_owned();
+                writeln!(output, "{:<14} {:<9} {value:.3e}  at t = {}", word("quantity"), word("norm"), error["time"])?;
+            }
+            let cost = |name: &str| report["cost"][name].as_f64().unwrap_or(0.0);
+            writeln!(output, "wall {:.2} s, cpu {:.2} s, {} steps", cost("wall_s"), cost("cpu_s"), report["cost"]["steps"])?;
+            writeln!(output, "results in {}", out.display())?;
+            Ok(ExitCode::SUCCESS)
+        }
+        other => {
+            writeln!(io::stderr(), "{other:?}")?;
+            Ok(ExitCode::FAILURE)
+        }
+    }
+}
+
+/// Shows records on a terminal and keeps the newest checkpoints.
+struct Screen {
+    bar: ProgressBar,
+    out: PathBuf,
+    keep: usize,
+    checkpoints: Vec<CheckpointRecord>,
+}
+
+impl Screen {
+    fn new(out: PathBuf, keep: usize) -> Self {
+        let bar = ProgressBar::new(1000);
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, out, keep, checkpoints: Vec::new() }
+    }
+}
+
+impl RecordSink for Screen {
+    fn put(&mut self, record: &Record, _durable: bool) -> io::Result<()> {
+        match record {
+            Record::Progress(progress) => {
+                self.bar.set_position((1000.0 * progress.fraction) as u64);
+                let eta = progress.eta_s.map_or_else(|| "…".to_owned(), |s| format!("{s:.0} s"));
+                self.bar.set_message(format!("t = {:.4}/{}  ETA {eta}", progress.time, progress.end_time));
+            }
+            Record::Checkpoint(checkpoint) => {
+                self.checkpoints.push(checkpoint.clone());
+                while self.checkpoints.len() > self.keep {
+                    let old = self.checkpoints.remove(0);
+                    std::fs::remove_file(self.out.join(old.path))?;
+                }
+            }
+            Record::Warning { message, .. } | Record::Finding { message, .. } => self.bar.println(message),
+            Record::Started { .. } | Record::File(_) | Record::Verdict(_) => {}
+        }
+        Ok(())
+    }
+}

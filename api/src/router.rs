@@ -1,0 +1,107 @@
+//! Every route in one list, and what every answer goes through.
+
+use crate::application::Application;
+use crate::error::ApiError;
+use crate::routes::{checkpoints, events, files, jobs, results, scenes, service};
+use axum::extract::{Request, State};
+use axum::http::{HeaderName, HeaderValue, Method};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::{Json, Router};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+use tower_http::catch_panic::CatchPanicLayer;
+use ulid::Ulid;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+#[derive(OpenApi)]
+#[openapi(info(
+    title = "Meniscus",
+    description = "Jobs for moving interfaces and the physics on them. Errors are application/problem+json (RFC 9457)."
+))]
+struct Document;
+
+/// The routes and the document that describes them.
+fn documented() -> OpenApiRouter<Application> {
+    OpenApiRouter::with_openapi(Document::openapi())
+        .routes(routes!(service::index))
+        .routes(routes!(service::health))
+        .routes(routes!(service::ready))
+        .routes(routes!(scenes::list))
+        .routes(routes!(scenes::get))
+        .routes(routes!(jobs::submit, jobs::list))
+        .routes(routes!(jobs::get, jobs::delete))
+        .routes(routes!(jobs::cancel))
+        .routes(routes!(jobs::pause))
+        .routes(routes!(jobs::resume))
+        .routes(routes!(events::events))
+        .routes(routes!(results::log))
+        .routes(routes!(results::series))
+        .routes(routes!(results::report))
+        .routes(routes!(files::list))
+        .routes(routes!(files::tar))
+        .routes(routes!(files::get))
+        .routes(routes!(checkpoints::list, checkpoints::request))
+        .routes(routes!(checkpoints::latest))
+        .routes(routes!(checkpoints::get, checkpoints::delete))
+        .routes(routes!(checkpoints::content))
+}
+
+/// The whole service.
+pub fn router(application: Application) -> Router {
+    let (routes, document) = documented().split_for_parts();
+    let document = Json(serde_json::to_value(document).unwrap_or_default());
+    routes
+        .route("/openapi.json", axum::routing::get(move || async move { document }))
+        .fallback(|| async { ApiError::NotFound("resource") })
+        .method_not_allowed_fallback(|| async { ApiError::MethodNotAllowed })
+        .layer(middleware::from_fn_with_state(application.clone(), only_when_ready))
+        .layer(CatchPanicLayer::custom(|_| ApiError::Internal("a handler panicked".to_owned()).into_response()))
+        .layer(middleware::from_fn(with_request_id))
+        .with_state(application)
+}
+
+/// Nothing under `/v1` is answered from a store that is not recovered yet.
+async fn only_when_ready(State(application): State<Application>, request: Request, next: Next) -> Response {
+    let reads = request.method() == Method::GET || request.method() == Method::HEAD;
+    let is_ready = application.ready.load(Ordering::Acquire);
+    let is_stopping = *application.stopping.borrow();
+    if !is_ready && request.uri().path().starts_with("/v1") && (!reads || !is_stopping) {
+        return ApiError::NotReady.into_response();
+    }
+    next.run(request).await
+}
+
+/// Every answer carries a request id, which the log repeats.
+async fn with_request_id(request: Request, next: Next) -> Response {
+    let id = format!("req_{}", Ulid::generate());
+    let (method, path, began) = (request.method().clone(), request.uri().path().to_owned(), Instant::now());
+    let mut response = next.run(request).await;
+    if let Ok(value) = HeaderValue::from_str(&id) {
+        response.headers_mut().insert(HeaderName::from_static("x-request-id"), value);
+    }
+    let headers = response.headers_mut();
+    headers.insert(HeaderName::from_static("x-content-type-options"), HeaderValue::from_static("nosniff"));
+    tracing::debug!(id, %method, path, status = response.status().as_u16(), elapsed = ?began.elapsed(), "request");
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::documented;
+
+    #[test]
+    fn the_document_is_openapi_31_and_names_every_schema_it_uses() {
+        let (_, document) = documented().split_for_parts();
+        let json = serde_json::to_value(&document).unwrap();
+        assert!(json["openapi"].as_str().unwrap().starts_with("3.1"));
+        let text = json.to_string();
+        for reference in text.split("\"#/components/schemas/").skip(1) {
+            let name = reference.split('"').next().unwrap();
+            assert!(json["components"]["schemas"].get(name).is_some(), "{name}");
+        }
+        assert!(json["paths"]["/v1/jobs"]["post"]["responses"]["422"].is_object());
+    }
+}

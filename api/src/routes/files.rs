@@ -1,0 +1,93 @@
+//! The published files of a job.
+
+use crate::application::Application;
+use crate::error::{ApiError, Problem};
+use crate::file_response::{FileFacts, file_response};
+use crate::routes::{job, with_store};
+use crate::views::{FileList, FileView};
+use axum::Json;
+use axum::body::{Body, Bytes};
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, header};
+use axum::response::Response;
+use meniscus_jobs::order::attempt_directory;
+use meniscus_jobs::store::FileRow;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+
+/// All published files.
+#[utoipa::path(get, path = "/v1/jobs/{id}/files", tag = "files", params(("id" = String, Path)),
+    responses((status = 200, body = FileList), (status = 404, body = Problem)))]
+pub async fn list(State(application): State<Application>, Path(id): Path<String>) -> Result<Json<FileList>, ApiError> {
+    let row = job(&application, &id).await?;
+    let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
+    Ok(Json(FileList { items: files.into_iter().map(FileView::from).collect(), next: None }))
+}
+
+fn location(application: &Application, job: &str, file: &FileRow) -> PathBuf {
+    attempt_directory(&application.store.job_directory(job), file.attempt).join(&file.path)
+}
+
+/// A file, or a part of it. The tag is its SHA-256.
+#[utoipa::path(get, path = "/v1/jobs/{id}/files/{path}", tag = "files",
+    params(("id" = String, Path), ("path" = String, Path, description = "a path of the list"),
+        ("Range" = Option<String>, Header), ("If-Range" = Option<String>, Header), ("If-None-Match" = Option<String>, Header)),
+    responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304),
+        (status = 404, body = Problem), (status = 416, body = Problem)))]
+pub async fn get(
+    State(application): State<Application>,
+    Path((id, path)): Path<(String, String)>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let row = job(&application, &id).await?;
+    let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
+    // Only what is listed exists, so no path can lead elsewhere.
+    let file = files.into_iter().find(|file| file.path == path).ok_or(ApiError::NotFound("file"))?;
+    let name = file.path.rsplit('/').next().unwrap_or("file").to_owned();
+    let facts = FileFacts { sha256: Some(file.sha256.clone()), media_type: file.media_type.clone(), name };
+    file_response(&location(&application, &id, &file), &facts, &headers).await
+}
+
+/// All published files as one stream.
+#[utoipa::path(get, path = "/v1/jobs/{id}/files.tar", tag = "files", params(("id" = String, Path)),
+    responses((status = 200, content_type = "application/x-tar"), (status = 404, body = Problem)))]
+pub async fn tar(State(application): State<Application>, Path(id): Path<String>) -> Result<Response, ApiError> {
+    let row = job(&application, &id).await?;
+    let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
+    let places: Vec<(String, PathBuf)> = files.iter().map(|f| (f.path.clone(), location(&application, &id, f))).collect();
+    // A reader that is slow holds up this thread and nothing else.
+    let (sender, receiver) = mpsc::channel::<Result<Bytes, io::Error>>(8);
+    let top = id.clone();
+    tokio::task::spawn_blocking(move || {
+        let mut archive = ::tar::Builder::new(ChannelWriter(sender.clone()));
+        archive.mode(::tar::HeaderMode::Deterministic);
+        let written = places
+            .iter()
+            .try_for_each(|(path, place)| archive.append_path_with_name(place, format!("{top}/{path}")))
+            .and_then(|()| archive.finish());
+        if let Err(error) = written {
+            // An archive that ends early must not look whole.
+            let _ = sender.blocking_send(Err(error));
+        }
+    });
+    Response::builder()
+        .header(header::CONTENT_TYPE, "application/x-tar")
+        .header(header::CONTENT_DISPOSITION, format!("attachment; filename=\"{id}.tar\""))
+        .body(Body::from_stream(ReceiverStream::new(receiver)))
+        .map_err(|error| ApiError::Internal(error.to_string()))
+}
+
+struct ChannelWriter(mpsc::Sender<Result<Bytes, io::Error>>);
+
+impl Write for ChannelWriter {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let sent = self.0.blocking_send(Ok(Bytes::copy_from_slice(bytes)));
+        sent.map(|()| bytes.len()).map_err(|_| io::Error::from(io::ErrorKind::BrokenPipe))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,88 @@
+//! What a job has to say: log, series, report.
+
+use crate::application::Application;
+use crate::error::{ApiError, Problem, ProblemItem};
+use crate::file_response::{FileFacts, bytes_response, file_response};
+use crate::routes::{job, with_store};
+use axum::Json;
+use axum::extract::{Path, Query, State};
+use axum::http::{HeaderMap, header};
+use axum::response::{IntoResponse, Response};
+use meniscus::scene::Violation;
+use meniscus_jobs::formats::csv;
+use meniscus_jobs::observers::series;
+use meniscus_jobs::order::attempt_directory;
+use meniscus_jobs::store::JobRow;
+use meniscus_jobs::worker;
+use serde_json::json;
+use std::collections::BTreeMap;
+
+/// A file of every attempt, in order, as far as it is there.
+fn of_attempts(application: &Application, row: &JobRow, name: &str) -> Vec<Vec<u8>> {
+    let directory = application.store.job_directory(&row.id);
+    (1..=row.attempt).filter_map(|n| std::fs::read(attempt_directory(&directory, n).join(name)).ok()).collect()
+}
+
+/// The log of all attempts; `tail` keeps the last lines.
+#[utoipa::path(get, path = "/v1/jobs/{id}/log", tag = "results",
+    params(("id" = String, Path), ("tail" = Option<usize>, Query), ("Range" = Option<String>, Header)),
+    responses((status = 200, content_type = "text/plain"), (status = 206), (status = 404, body = Problem), (status = 422, body = Problem)))]
+pub async fn log(
+    State(application): State<Application>,
+    Path(id): Path<String>,
+    Query(query): Query<BTreeMap<String, String>>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let tail = match query.get("tail").map(|text| (text, text.parse::<usize>())) {
+        None => None,
+        Some((_, Ok(tail))) => Some(tail),
+        Some((text, Err(_))) => {
+            let violation = Violation::new("tail", "type", "a whole number is needed", &json!(text), json!("a whole number ≥ 0"));
+            return Err(ApiError::Invalid(vec![ProblemItem::from(violation)]));
+        }
+    };
+    let row = job(&application, &id).await?;
+    let reader = application.clone();
+    let text = with_store(&application, move |_| Ok(of_attempts(&reader, &row, worker::LOG_NAME).concat())).await?;
+    let text = match tail {
+        None => text,
+        Some(tail) => {
+            let lines: Vec<&[u8]> = text.split_inclusive(|b| *b == b'\n').collect();
+            lines[lines.len().saturating_sub(tail)..].concat()
+        }
+    };
+    let facts = FileFacts { sha256: None, media_type: "text/plain; charset=utf-8".to_owned(), name: format!("{id}.log") };
+    bytes_response(&text, &facts, &headers)
+}
+
+/// The observables over time, as CSV or as JSON by `Accept`.
+#[utoipa::path(get, path = "/v1/jobs/{id}/series", tag = "results",
+    params(("id" = String, Path), ("Accept" = Option<String>, Header)),
+    responses((status = 200, content_type = "text/csv"), (status = 404, body = Problem)))]
+pub async fn series(State(application): State<Application>, Path(id): Path<String>, headers: HeaderMap) -> Result<Response, ApiError> {
+    let row = job(&application, &id).await?;
+    let reader = application.clone();
+    // The newest attempt that has come so far continues all earlier ones.
+    let text = with_store(&application, move |_| Ok(of_attempts(&reader, &row, series::FILE_NAME).pop().unwrap_or_default())).await?;
+    let wants_json = headers
+        .get(header::ACCEPT)
+        .and_then(|v| v.to_str().ok())
+        .is_some_and(|accept| accept.contains("json") && !accept.contains("text/csv"));
+    if wants_json {
+        return Ok(Json(csv::to_json(&String::from_utf8_lossy(&text))).into_response());
+    }
+    let facts = FileFacts { sha256: None, media_type: "text/csv".to_owned(), name: format!("{id}.csv") };
+    bytes_response(&text, &facts, &headers)
+}
+
+/// Errors, cost, stability of a finished job.
+#[utoipa::path(get, path = "/v1/jobs/{id}/report", tag = "results", params(("id" = String, Path)),
+    responses((status = 200, content_type = "application/json"), (status = 404, body = Problem)))]
+pub async fn report(State(application): State<Application>, Path(id): Path<String>, headers: HeaderMap) -> Result<Response, ApiError> {
+    let row = job(&application, &id).await?;
+    let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
+    let file = files.into_iter().find(|file| file.path == "report.json").ok_or(ApiError::NotFound("report yet"))?;
+    let facts = FileFacts { sha256: Some(file.sha256), media_type: file.media_type, name: "report.json".to_owned() };
+    let place = attempt_directory(&application.store.job_directory(&id), file.attempt).join(&file.path);
+    file_response(&place, &facts, &headers).await
+}

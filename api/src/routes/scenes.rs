@@ -1,0 +1,33 @@
+//! Kinds of scenes.
+
+use crate::error::{ApiError, Problem};
+use crate::views::{SceneKindList, SceneKindView};
+use axum::Json;
+use axum::extract::Path;
+use meniscus::scene::{SceneKind, json_schema};
+use meniscus::scenes::{SCENES, find};
+
+fn view(kind: &SceneKind) -> SceneKindView {
+    SceneKindView {
+        kind: kind.kind,
+        title: kind.title,
+        schema: json_schema::of_kind(kind),
+        presets: kind.presets.to_vec(),
+        restart_safe: json_schema::restart_safe(kind),
+        // Part of the program; a test runs every one.
+        example: serde_json::from_str(kind.example).unwrap_or_default(),
+    }
+}
+
+/// All kinds with their schemas.
+#[utoipa::path(get, path = "/v1/scenes", tag = "scenes", responses((status = 200, body = SceneKindList)))]
+pub async fn list() -> Json<SceneKindList> {
+    Json(SceneKindList { items: SCENES.iter().map(|kind| view(kind)).collect(), next: None })
+}
+
+/// One kind with its schema.
+#[utoipa::path(get, path = "/v1/scenes/{kind}", tag = "scenes", params(("kind" = String, Path)),
+    responses((status = 200, body = SceneKindView), (status = 404, body = Problem)))]
+pub async fn get(Path(kind): Path<String>) -> Result<Json<SceneKindView>, ApiError> {
+    find(&kind).map(|kind| Json(view(kind))).ok_or(ApiError::NotFound("kind of scene"))
+}
