@@ -93,7 +93,8 @@ pub fn understand(value: &Value, kinds: &[&'static SceneKind]) -> Result<Box<dyn
         return Err(vec![Violation::new("/kind", "required", detail, &Value::Null, names.into())]);
     };
     let Some(scene_kind) = kind.as_str().and_then(|name| kinds.iter().find(|k| k.kind == name)) else {
-        let mut violation = Violation::new("/kind", "unknown", "there is no such kind of scene", kind, names.clone().into());
+        let mut violation =
+            Violation::new("/kind", "unknown", "there is no such kind of scene", kind, names.clone().into());
         violation.did_you_mean = kind.as_str().and_then(|name| check::closest(name, &names));
         return Err(vec![violation]);
     };
@@ -105,7 +106,8 @@ pub fn understand(value: &Value, kinds: &[&'static SceneKind]) -> Result<Box<dyn
             Some(name) => given = check::laid_under((scene_kind.preset)(name, &given), given),
             None => {
                 let allowed = scene_kind.presets.to_vec();
-                let mut violation = Violation::new("/preset", "unknown", "there is no such preset", &preset, allowed.into());
+                let mut violation =
+                    Violation::new("/preset", "unknown", "there is no such preset", &preset, allowed.into());
                 violation.did_you_mean = preset.as_str().and_then(|name| check::closest(name, scene_kind.presets));
                 violations.push(violation);
             }

@@ -100,7 +100,9 @@ pub fn main() -> ExitCode {
         Command::Resume { checkpoint, out, threads } => {
             foreground::resume(&checkpoint, &out, threads).unwrap_or_else(|error| fail(&error))
         }
-        Command::Backup { target, data } => backup::back_up(&data, &target).map_or_else(|e| fail(&e), |()| ExitCode::SUCCESS),
+        Command::Backup { target, data } => {
+            backup::back_up(&data, &target).map_or_else(|e| fail(&e), |()| ExitCode::SUCCESS)
+        }
         Command::Worker { attempt } => worker_process::run(&attempt).map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS),
     }
 }

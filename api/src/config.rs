@@ -22,7 +22,9 @@ pub struct Config {
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// This version has no authentication.
-    #[error("{0} is not a loopback address, and this version has no authentication: bind 127.0.0.1 or [::1] and put a proxy in front")]
+    #[error(
+        "{0} is not a loopback address, and this version has no authentication: bind 127.0.0.1 or [::1] and put a proxy in front"
+    )]
     NotLoopback(SocketAddr),
 }
 
@@ -31,7 +33,12 @@ impl Config {
     ///
     /// # Errors
     /// [`ConfigError`].
-    pub fn new(data: PathBuf, bind: SocketAddr, slots: Option<usize>, threads: Option<usize>) -> Result<Self, ConfigError> {
+    pub fn new(
+        data: PathBuf,
+        bind: SocketAddr,
+        slots: Option<usize>,
+        threads: Option<usize>,
+    ) -> Result<Self, ConfigError> {
         if !bind.ip().is_loopback() {
             return Err(ConfigError::NotLoopback(bind));
         }

@@ -79,22 +79,35 @@ pub enum ApiError {
 impl ApiError {
     fn problem(&self) -> (StatusCode, &'static str, &'static str, Option<String>) {
         match self {
-            Self::Unparsable(detail) => (StatusCode::BAD_REQUEST, "unparsable", "the body is not valid JSON", Some(detail.clone())),
+            Self::Unparsable(detail) => {
+                (StatusCode::BAD_REQUEST, "unparsable", "the body is not valid JSON", Some(detail.clone()))
+            }
             Self::Invalid(items) => {
                 let detail = format!("{} thing{} wrong", items.len(), if items.len() == 1 { " is" } else { "s are" });
                 (StatusCode::UNPROCESSABLE_ENTITY, "invalid", "the request is not valid", Some(detail))
             }
-            Self::NotFound(what) => (StatusCode::NOT_FOUND, "not-found", "not found", Some(format!("there is no such {what}"))),
-            Self::MethodNotAllowed => (StatusCode::METHOD_NOT_ALLOWED, "method-not-allowed", "this resource does not do that", None),
-            Self::Conflict(detail) => (StatusCode::CONFLICT, "conflict", "the state does not allow that", Some(detail.clone())),
-            Self::TooLarge(limit) => {
-                (StatusCode::PAYLOAD_TOO_LARGE, "too-large", "the body is too large", Some(format!("at most {limit} bytes")))
+            Self::NotFound(what) => {
+                (StatusCode::NOT_FOUND, "not-found", "not found", Some(format!("there is no such {what}")))
             }
+            Self::MethodNotAllowed => {
+                (StatusCode::METHOD_NOT_ALLOWED, "method-not-allowed", "this resource does not do that", None)
+            }
+            Self::Conflict(detail) => {
+                (StatusCode::CONFLICT, "conflict", "the state does not allow that", Some(detail.clone()))
+            }
+            Self::TooLarge(limit) => (
+                StatusCode::PAYLOAD_TOO_LARGE,
+                "too-large",
+                "the body is too large",
+                Some(format!("at most {limit} bytes")),
+            ),
             Self::RangeNotSatisfiable(size) => {
                 let detail = Some(format!("the file has {size} bytes"));
                 (StatusCode::RANGE_NOT_SATISFIABLE, "range", "no byte of that range exists", detail)
             }
-            Self::NotReady => (StatusCode::SERVICE_UNAVAILABLE, "not-ready", "the service is starting or stopping", None),
+            Self::NotReady => {
+                (StatusCode::SERVICE_UNAVAILABLE, "not-ready", "the service is starting or stopping", None)
+            }
             Self::Internal(_) => (StatusCode::INTERNAL_SERVER_ERROR, "internal", "the service failed", None),
         }
     }
@@ -109,7 +122,13 @@ impl IntoResponse for ApiError {
         }
         let range = if let Self::RangeNotSatisfiable(size) = &self { Some(*size) } else { None };
         let errors = if let Self::Invalid(items) = self { items } else { Vec::new() };
-        let body = Problem { r#type: format!("/problems/{kind}"), title: title.to_owned(), status: status.as_u16(), detail, errors };
+        let body = Problem {
+            r#type: format!("/problems/{kind}"),
+            title: title.to_owned(),
+            status: status.as_u16(),
+            detail,
+            errors,
+        };
         let mut response = (status, Json(body)).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));

@@ -27,12 +27,16 @@ pub struct FileFacts {
 /// [`ApiError`].
 pub async fn file_response(path: &Path, facts: &FileFacts, headers: &HeaderMap) -> Result<Response, ApiError> {
     let mut file = match tokio::fs::File::open(path).await {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Err(ApiError::NotFound("file")),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(ApiError::NotFound("file"));
+        }
         file => file?,
     };
     let size = file.metadata().await?.len();
     let part = match part_of(facts, headers, size)? {
-        Part::NotModified => return answer(StatusCode::NOT_MODIFIED, facts, None, 0, Body::empty()),
+        Part::NotModified => {
+            return answer(StatusCode::NOT_MODIFIED, facts, None, 0, Body::empty());
+        }
         Part::Whole => None,
         Part::Range(first, last) => Some((first, last)),
     };
@@ -100,23 +104,34 @@ fn part_of(facts: &FileFacts, headers: &HeaderMap, size: u64) -> Result<Part, Ap
 /// `bytes=a-b`, `bytes=a-`, `bytes=-n`. Anything else, several ranges included, is ignored, as RFC 9110 allows.
 fn parse_range(text: &str) -> Option<(Option<u64>, Option<u64>)> {
     let (first, last) = text.trim().strip_prefix("bytes=")?.split_once('-')?;
-    let number = |text: &str| if text.is_empty() { Some(None) } else { text.parse::<u64>().ok().map(Some) };
+    let number = |text: &str| {
+        if text.is_empty() { Some(None) } else { text.parse::<u64>().ok().map(Some) }
+    };
     let (first, last) = (number(first.trim())?, number(last.trim())?);
     let ordered = first.zip(last).is_none_or(|(first, last)| first <= last);
     (ordered && (first.is_some() || last.is_some())).then_some((first, last))
 }
 
-fn answer(status: StatusCode, facts: &FileFacts, range: Option<String>, length: u64, body: Body) -> Result<Response, ApiError> {
+fn answer(
+    status: StatusCode,
+    facts: &FileFacts,
+    range: Option<String>,
+    length: u64,
+    body: Body,
+) -> Result<Response, ApiError> {
     let mut builder = Response::builder().status(status).header(header::ACCEPT_RANGES, "bytes");
     if let Some(sha256) = &facts.sha256 {
         builder = builder.header(header::ETAG, format!("\"{sha256}\""));
-        let raw: Vec<u8> = (0..sha256.len() / 2).filter_map(|k| u8::from_str_radix(&sha256[2 * k..2 * k + 2], 16).ok()).collect();
+        let raw: Vec<u8> =
+            (0..sha256.len() / 2).filter_map(|k| u8::from_str_radix(&sha256[2 * k..2 * k + 2], 16).ok()).collect();
         let digest = base64::engine::general_purpose::STANDARD.encode(raw);
         builder = builder.header("repr-digest", format!("sha-256=:{digest}:"));
     }
     if status != StatusCode::NOT_MODIFIED {
         builder = builder.header(header::CONTENT_TYPE, &facts.media_type).header(header::CONTENT_LENGTH, length);
-        if let Ok(name) = HeaderValue::from_str(&format!("inline; filename=\"{}\"", facts.name.replace(['"', '\\'], "_"))) {
+        if let Ok(name) =
+            HeaderValue::from_str(&format!("inline; filename=\"{}\"", facts.name.replace(['"', '\\'], "_")))
+        {
             builder = builder.header(header::CONTENT_DISPOSITION, name);
         }
     }

@@ -2,9 +2,9 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus_jobs::body::{self, Allowance};
+use meniscus_jobs::observers::Control;
 use meniscus_jobs::order::{Order, StartCheckpoint};
 use meniscus_jobs::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
-use meniscus_jobs::observers::Control;
 use meniscus_jobs::{checkpoint, process, strict_json, worker};
 use serde_json::{Value, json};
 use std::io::{self, Write};
@@ -114,7 +114,13 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
                 writeln!(output, "{:<14} {:<9} {value:.3e}  at t = {}", word("quantity"), word("norm"), error["time"])?;
             }
             let cost = |name: &str| report["cost"][name].as_f64().unwrap_or(0.0);
-            writeln!(output, "wall {:.2} s, cpu {:.2} s, {} steps", cost("wall_s"), cost("cpu_s"), report["cost"]["steps"])?;
+            writeln!(
+                output,
+                "wall {:.2} s, cpu {:.2} s, {} steps",
+                cost("wall_s"),
+                cost("cpu_s"),
+                report["cost"]["steps"]
+            )?;
             writeln!(output, "results in {}", out.display())?;
             Ok(ExitCode::SUCCESS)
         }

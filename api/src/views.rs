@@ -290,8 +290,19 @@ impl From<JobRow> for JobView {
         for name in ["cancel", "pause", "resume", "events", "log", "series", "report", "files", "checkpoints"] {
             links.insert(name, format!("{base}/{name}"));
         }
-        let Progress { fraction, time, end_time, step, steps_per_s, particles, phase, eta_s, eta_basis, health, usage: _ } =
-            job.progress;
+        let Progress {
+            fraction,
+            time,
+            end_time,
+            step,
+            steps_per_s,
+            particles,
+            phase,
+            eta_s,
+            eta_basis,
+            health,
+            usage: _,
+        } = job.progress;
         // A job at rest has no speed.
         let moving = job.state.has_worker();
         let HealthRecord { finite, max_cfl, volume_drift, rescued_fits } = health;
@@ -353,9 +364,14 @@ impl From<FileRow> for FileView {
 
 impl From<CheckpointRow> for CheckpointView {
     fn from(row: CheckpointRow) -> Self {
-        let CheckpointRow { id, job, attempt: _, path: _, step, time, size_bytes, sha256, created_at, isa, build } = row;
+        let CheckpointRow { id, job, attempt: _, path: _, step, time, size_bytes, sha256, created_at, isa, build } =
+            row;
         let base = format!("/v1/checkpoints/{id}");
-        let links = BTreeMap::from([("content", format!("{base}/content")), ("self", base), ("job", format!("/v1/jobs/{job}"))]);
+        let links = BTreeMap::from([
+            ("content", format!("{base}/content")),
+            ("self", base),
+            ("job", format!("/v1/jobs/{job}")),
+        ]);
         Self { id, job, step, time, size_bytes, sha256, created_at, isa, build, links }
     }
 }

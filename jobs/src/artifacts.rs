@@ -51,5 +51,12 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// When the file cannot be read.
 pub fn record(directory: &Path, path: &str, media_type: &str) -> io::Result<FileRecord> {
     let (sha256, size_bytes) = digest::of_file(&directory.join(path))?;
-    Ok(FileRecord { path: path.to_owned(), size_bytes, sha256, media_type: media_type.to_owned(), time: None, step: None })
+    Ok(FileRecord {
+        path: path.to_owned(),
+        size_bytes,
+        sha256,
+        media_type: media_type.to_owned(),
+        time: None,
+        step: None,
+    })
 }

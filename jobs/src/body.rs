@@ -1,10 +1,14 @@
 //! The body of a job: as written by a client, and as understood with every default.
 
+mod restart;
+mod wishes;
+
+pub use restart::RestartSource;
+pub use wishes::{CheckpointWishes, Limits, Output, Wishes};
+
 use meniscus::scene::schema::{NOT_NEGATIVE, POSITIVE};
 use meniscus::scene::{DefaultValue, Estimate, Kind, Parameter, Scene, Violation, check, understand};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::OutputPlan;
-use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -39,40 +43,70 @@ pub struct JobBody {
     pub restarted_from: Option<String>,
 }
 
-/// The checkpoint that a restart begins with, as the store knows it.
-#[derive(Debug, Clone)]
-pub struct RestartSource {
-    /// Its id.
-    pub checkpoint: String,
-    /// The resolved body of the job that wrote it.
-    pub resolved: Value,
-    /// Its job.
-    pub job: String,
-    /// Instruction set it was written on.
-    pub isa: String,
-    /// Its step.
-    pub step: u64,
-}
-
 /// Memory of a worker before it holds any particle.
 pub const WORKER_BASE_BYTES: u64 = 48 << 20;
 
 static OUTPUT: &[Parameter] = &[
-    Parameter::restart_safe("every_time", "a frame at every multiple of this time; first and last only when not given", POSITIVE, DefaultValue::Absent),
-    Parameter::restart_safe("series_every_steps", "a series row every so many steps", Kind::Integer { least: 1, most: u64::MAX }, DefaultValue::Json("10")),
+    Parameter::restart_safe(
+        "every_time",
+        "a frame at every multiple of this time; first and last only when not given",
+        POSITIVE,
+        DefaultValue::Absent,
+    ),
+    Parameter::restart_safe(
+        "series_every_steps",
+        "a series row every so many steps",
+        Kind::Integer { least: 1, most: u64::MAX },
+        DefaultValue::Json("10"),
+    ),
 ];
 
 static CHECKPOINT: &[Parameter] = &[
-    Parameter::restart_safe("every_wall_s", "a checkpoint every so many seconds; 60 when neither it nor every_steps is given", POSITIVE, DefaultValue::Absent),
-    Parameter::restart_safe("every_steps", "a checkpoint every so many steps", Kind::Integer { least: 1, most: u64::MAX }, DefaultValue::Absent),
-    Parameter::restart_safe("keep", "verified checkpoints to keep", Kind::Integer { least: 2, most: 1000 }, DefaultValue::Json("2")),
+    Parameter::restart_safe(
+        "every_wall_s",
+        "a checkpoint every so many seconds; 60 when neither it nor every_steps is given",
+        POSITIVE,
+        DefaultValue::Absent,
+    ),
+    Parameter::restart_safe(
+        "every_steps",
+        "a checkpoint every so many steps",
+        Kind::Integer { least: 1, most: u64::MAX },
+        DefaultValue::Absent,
+    ),
+    Parameter::restart_safe(
+        "keep",
+        "verified checkpoints to keep",
+        Kind::Integer { least: 2, most: 1000 },
+        DefaultValue::Json("2"),
+    ),
 ];
 
 static LIMITS: &[Parameter] = &[
-    Parameter::restart_safe("wall_s", "running time until the job is paused; it counts anew after a resume", POSITIVE, DefaultValue::Absent),
-    Parameter::restart_safe("memory_bytes", "resident memory of the worker", Kind::Integer { least: 1 << 20, most: u64::MAX }, DefaultValue::Absent),
-    Parameter::restart_safe("disk_bytes", "size of all files of the job, checkpoints included", NOT_NEGATIVE, DefaultValue::Absent),
-    Parameter::restart_safe("threads", "threads of the worker", Kind::Integer { least: 1, most: 1024 }, DefaultValue::Absent),
+    Parameter::restart_safe(
+        "wall_s",
+        "running time until the job is paused; it counts anew after a resume",
+        POSITIVE,
+        DefaultValue::Absent,
+    ),
+    Parameter::restart_safe(
+        "memory_bytes",
+        "resident memory of the worker",
+        Kind::Integer { least: 1 << 20, most: u64::MAX },
+        DefaultValue::Absent,
+    ),
+    Parameter::restart_safe(
+        "disk_bytes",
+        "size of all files of the job, checkpoints included",
+        NOT_NEGATIVE,
+        DefaultValue::Absent,
+    ),
+    Parameter::restart_safe(
+        "threads",
+        "threads of the worker",
+        Kind::Integer { least: 1, most: 1024 },
+        DefaultValue::Absent,
+    ),
 ];
 
 const FIELDS: [&str; 8] = ["name", "labels", "scene", "restart", "output", "checkpoint", "limits", "priority"];
@@ -116,7 +150,7 @@ pub fn parse(
             None
         }
         (Some(_), None) => None,
-        (None, Some(restart)) => parse_restart(restart, &find_checkpoint, &mut errors),
+        (None, Some(restart)) => restart::parse(restart, &find_checkpoint, &mut errors),
     };
     let scene_json = restart.as_ref().map(|(_, scene)| scene.clone()).or_else(|| given.get("scene").cloned());
     let prefix = if restart.is_some() { "/restart/overrides" } else { "/scene" };
@@ -127,7 +161,9 @@ pub fn parse(
     let fields = output_fields(given, scene.as_deref(), &mut errors);
     output.insert("fields".into(), fields);
     let mut checkpoint = section(given, "checkpoint", CHECKPOINT, None, &mut errors);
-    if checkpoint.get("every_wall_s").is_none_or(Value::is_null) && checkpoint.get("every_steps").is_none_or(Value::is_null) {
+    if checkpoint.get("every_wall_s").is_none_or(Value::is_null)
+        && checkpoint.get("every_steps").is_none_or(Value::is_null)
+    {
         checkpoint.insert("every_wall_s".into(), json!(60.0));
     }
     let mut limits = section(given, "limits", LIMITS, None, &mut errors);
@@ -142,7 +178,13 @@ pub fn parse(
                 estimate.particles
             );
             let spacing = scene.as_ref().map_or(Value::Null, |s| s.resolved()["spacing"].clone());
-            errors.push(Violation::new(format!("{prefix}/spacing"), "memory", detail, &spacing, json!(format!("≤ {memory} bytes"))));
+            errors.push(Violation::new(
+                format!("{prefix}/spacing"),
+                "memory",
+                detail,
+                &spacing,
+                json!(format!("≤ {memory} bytes")),
+            ));
         }
     }
     if let (Some((source, _)), Some(estimate)) = (&restart, estimate)
@@ -151,7 +193,9 @@ pub fn parse(
         let detail = format!("the checkpoint is at step {}, this scene ends at step {}", source.step, estimate.steps);
         errors.push(Violation::new("/restart/overrides", "range", detail, &json!(estimate.end_time), Value::Null));
     }
-    let (Some(scene), Some(estimate)) = (scene, estimate) else { return Err(errors) };
+    let (Some(scene), Some(estimate)) = (scene, estimate) else {
+        return Err(errors);
+    };
     if !errors.is_empty() {
         return Err(errors);
     }
@@ -179,74 +223,18 @@ pub fn parse(
     })
 }
 
-/// What a resolved body asks of the run: everything but the scene.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Wishes {
-    /// Output section.
-    pub output: Output,
-    /// Checkpoint section.
-    pub checkpoint: CheckpointWishes,
-    /// Limits section.
-    pub limits: Limits,
-}
-
-/// What to write.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Output {
-    /// A frame at every multiple of this time.
-    pub every_time: Option<f64>,
-    /// Fields of frames.
-    pub fields: Vec<String>,
-    /// A series row every so many steps.
-    pub series_every_steps: u64,
-}
-
-/// When to write checkpoints.
-#[derive(Debug, Clone, Deserialize)]
-pub struct CheckpointWishes {
-    /// By the wall clock.
-    pub every_wall_s: Option<f64>,
-    /// By steps.
-    pub every_steps: Option<u64>,
-    /// How many to keep.
-    pub keep: u64,
-}
-
-/// Limits of a job.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Limits {
-    /// Running time until the job is paused.
-    pub wall_s: Option<f64>,
-    /// Resident memory.
-    pub memory_bytes: u64,
-    /// Size of all files.
-    pub disk_bytes: Option<f64>,
-    /// Threads.
-    pub threads: u64,
-}
-
-impl Wishes {
-    /// From a resolved body.
-    ///
-    /// # Errors
-    /// When it is not one.
-    pub fn of(resolved: &Value) -> Result<Self, serde_json::Error> {
-        Self::deserialize(resolved)
-    }
-
-    /// The plan that the engine sees.
-    #[must_use]
-    pub fn plan(&self) -> OutputPlan {
-        OutputPlan { every_time: self.output.every_time, series_every_steps: self.output.series_every_steps }
-    }
-}
-
 fn text(given: &Map<String, Value>, name: &str, errors: &mut Vec<Violation>) -> Option<String> {
     match given.get(name) {
         None | Some(Value::Null) => None,
         Some(Value::String(text)) if text.len() <= 200 => Some(text.clone()),
         Some(value) => {
-            errors.push(Violation::new(format!("/{name}"), "type", "a text is needed", value, json!("a text of at most 200 bytes")));
+            errors.push(Violation::new(
+                format!("/{name}"),
+                "type",
+                "a text is needed",
+                value,
+                json!("a text of at most 200 bytes"),
+            ));
             None
         }
     }
@@ -264,13 +252,25 @@ fn labels(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> BTreeMap<S
                     }
                     _ => {
                         let at = format!("/labels/{}", check::escaped(key));
-                        errors.push(Violation::new(at, "type", "a label is a text", value, json!("a text of at most 200 bytes")));
+                        errors.push(Violation::new(
+                            at,
+                            "type",
+                            "a label is a text",
+                            value,
+                            json!("a text of at most 200 bytes"),
+                        ));
                     }
                 }
             }
         }
         Some(value) => {
-            errors.push(Violation::new("/labels", "type", "labels are an object of texts", value, json!("at most 64 texts by key")));
+            errors.push(Violation::new(
+                "/labels",
+                "type",
+                "labels are an object of texts",
+                value,
+                json!("at most 64 texts by key"),
+            ));
         }
     }
     labels
@@ -282,7 +282,13 @@ fn priority(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> i64 {
         Some(value) => match value.as_i64() {
             Some(number) if (-100..=100).contains(&number) => number,
             _ => {
-                errors.push(Violation::new("/priority", "range", "a priority is a whole number", value, json!("−100 to 100")));
+                errors.push(Violation::new(
+                    "/priority",
+                    "range",
+                    "a priority is a whole number",
+                    value,
+                    json!("−100 to 100"),
+                ));
                 0
             }
         },
@@ -311,7 +317,13 @@ fn section(
         rest.shift_remove("fields");
     }
     if let Some(value) = section.get("type") {
-        errors.push(Violation::new(format!("/{name}/type"), "unknown_field", "there is no such field", value, Value::Null));
+        errors.push(Violation::new(
+            format!("/{name}/type"),
+            "unknown_field",
+            "there is no such field",
+            value,
+            Value::Null,
+        ));
     }
     let before = errors.len();
     let checked = check(parameters, &rest, &format!("/{name}"), errors);
@@ -336,7 +348,8 @@ fn output_fields(given: &Map<String, Value>, scene: Option<&dyn Scene>, errors: 
                 let is_known = value.as_str().is_some_and(|name| known.contains(&name));
                 if !is_known && scene.is_some() {
                     let detail = "the scene has no such field";
-                    let mut violation = Violation::new(format!("/output/fields/{k}"), "unknown", detail, value, json!(known));
+                    let mut violation =
+                        Violation::new(format!("/output/fields/{k}"), "unknown", detail, value, json!(known));
                     violation.did_you_mean = value.as_str().and_then(|name| check::closest(name, &known));
                     errors.push(violation);
                 }
@@ -357,75 +370,16 @@ fn default_limit(limits: &mut Map<String, Value>, name: &str, most: u64, errors:
         }
         Some(asked) if asked > most => {
             let detail = "more than this service gives to a job";
-            errors.push(Violation::new(format!("/limits/{name}"), "range", detail, &json!(asked), json!(format!("at most {most}"))));
+            errors.push(Violation::new(
+                format!("/limits/{name}"),
+                "range",
+                detail,
+                &json!(asked),
+                json!(format!("at most {most}")),
+            ));
         }
         Some(_) => {}
     }
-}
-
-/// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields.
-fn parse_restart(
-    restart: &Value,
-    find_checkpoint: &impl Fn(&str) -> Option<RestartSource>,
-    errors: &mut Vec<Violation>,
-) -> Option<(RestartSource, Value)> {
-    const KNOWN: [&str; 3] = ["checkpoint", "overrides", "allow_other_isa"];
-    let Value::Object(map) = restart else {
-        errors.push(Violation::new("/restart", "type", "a restart is an object", restart, json!(KNOWN)));
-        return None;
-    };
-    for (name, value) in map {
-        if !KNOWN.contains(&name.as_str()) {
-            let at = format!("/restart/{}", check::escaped(name));
-            let mut violation = Violation::new(at, "unknown_field", "there is no such field", value, json!(KNOWN));
-            violation.did_you_mean = check::closest(name, &KNOWN);
-            errors.push(violation);
-        }
-    }
-    let id = map.get("checkpoint").unwrap_or(&Value::Null);
-    let Some(source) = id.as_str().and_then(find_checkpoint) else {
-        let code = if id.is_null() { "required" } else { "not_found" };
-        let detail = "there is no such checkpoint";
-        errors.push(Violation::new("/restart/checkpoint", code, detail, id, json!("the id of a checkpoint, ckpt_…")));
-        return None;
-    };
-    let allow = map.get("allow_other_isa").unwrap_or(&Value::Null);
-    if !(allow.is_null() || allow.is_boolean()) {
-        errors.push(Violation::new("/restart/allow_other_isa", "type", "true or false", allow, json!([true, false])));
-    }
-    if source.isa != crate::build::isa() && allow != &Value::Bool(true) {
-        let detail = format!(
-            "the checkpoint was written on {}, this service computes on {}; results would not be bit-identical",
-            source.isa,
-            crate::build::isa()
-        );
-        errors.push(Violation::new("/restart/allow_other_isa", "required", detail, allow, json!([true])));
-    }
-    let mut scene = source.resolved["scene"].clone();
-    let kind = scene["kind"].as_str().and_then(meniscus::scenes::find)?;
-    let safe = meniscus::scene::json_schema::restart_safe(kind);
-    match map.get("overrides") {
-        None | Some(Value::Null) => {}
-        Some(Value::Object(overrides)) => {
-            for (pointer, value) in overrides {
-                let at = format!("/restart/overrides/{}", check::escaped(pointer));
-                if !safe.contains(pointer) {
-                    let detail = "a restart may not change this field";
-                    let mut violation = Violation::new(at, "not_restart_safe", detail, value, json!(safe));
-                    let names: Vec<&str> = safe.iter().map(String::as_str).collect();
-                    violation.did_you_mean = check::closest(pointer, &names);
-                    errors.push(violation);
-                } else if let Some(slot) = scene.pointer_mut(pointer) {
-                    *slot = value.clone();
-                }
-            }
-        }
-        Some(value) => {
-            let detail = "overrides are an object from JSON pointers to values";
-            errors.push(Violation::new("/restart/overrides", "type", detail, value, json!(safe)));
-        }
-    }
-    Some((source, scene))
 }
 
 #[cfg(test)]

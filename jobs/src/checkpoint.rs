@@ -190,7 +190,8 @@ pub fn read(path: &Path, sha256: Option<&str>) -> Result<(Meta, State), Checkpoi
 pub fn is_same_scene(a: &Value, b: &Value) -> bool {
     let plain = |body: &Value| {
         let mut scene = body["scene"].clone();
-        let safe = scene["kind"].as_str().and_then(meniscus::scenes::find).map(meniscus::scene::json_schema::restart_safe);
+        let safe =
+            scene["kind"].as_str().and_then(meniscus::scenes::find).map(meniscus::scene::json_schema::restart_safe);
         if let Some(map) = scene.as_object_mut() {
             for pointer in safe.unwrap_or_default() {
                 map.shift_remove(pointer.trim_start_matches('/'));
@@ -220,7 +221,10 @@ pub fn meta(job: &str, body: &Value, step: u64, time: f64, counters: Counters) -
 fn check_finite(state: &State) -> Result<(), CheckpointError> {
     for array in &state.reals {
         if let Some(entry) = array.values.iter().position(|v| !v.is_finite()) {
-            return Err(CheckpointError::NonFinite { array: array.name.clone(), entry: entry / array.components.max(1) });
+            return Err(CheckpointError::NonFinite {
+                array: array.name.clone(),
+                entry: entry / array.components.max(1),
+            });
         }
     }
     Ok(())
@@ -274,21 +278,26 @@ mod tests {
     fn what_is_read_is_what_was_written() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("7.h5");
-        let (sha256, size) = write_verified(&path, meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap();
+        let (sha256, size) =
+            write_verified(&path, meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap();
         assert_eq!(std::fs::metadata(&path).unwrap().len(), size);
         let (meta, restored) = read(&path, Some(&sha256)).unwrap();
         assert_eq!(restored, state());
         assert_eq!(meta.job, "job");
         // Two writes give the same bytes: no times inside.
         let again = directory.path().join("again.h5");
-        assert_eq!(write_verified(&again, super::meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap().0, sha256);
+        assert_eq!(
+            write_verified(&again, super::meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap().0,
+            sha256
+        );
     }
 
     #[test]
     fn every_flipped_bit_of_the_content_is_refused_or_harmless() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("7.h5");
-        let (sha256, _) = write_verified(&path, meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap();
+        let (sha256, _) =
+            write_verified(&path, meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         for k in (0..bytes.len()).step_by(37) {
             let mut broken = bytes.clone();

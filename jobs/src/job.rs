@@ -179,12 +179,20 @@ impl Reason {
             Self::UserCancel => "canceled on request; submit the body again to run it anew",
             Self::UserPause => "paused on request; POST …/resume goes on from the last checkpoint",
             Self::LimitWalltime => "limits.wall_s is used up; POST …/resume grants it once more",
-            Self::LimitMemory => "the worker outgrew limits.memory_bytes; raise it, or use a larger spacing or a narrower band",
-            Self::WorkerOom => "the kernel ended the worker for lack of memory; run fewer jobs at once or lower limits.memory_bytes",
-            Self::LimitDisk => "limits.disk_bytes is used up; restart from the last checkpoint with a higher limit or fewer frames",
+            Self::LimitMemory => {
+                "the worker outgrew limits.memory_bytes; raise it, or use a larger spacing or a narrower band"
+            }
+            Self::WorkerOom => {
+                "the kernel ended the worker for lack of memory; run fewer jobs at once or lower limits.memory_bytes"
+            }
+            Self::LimitDisk => {
+                "limits.disk_bytes is used up; restart from the last checkpoint with a higher limit or fewer frames"
+            }
             Self::StorageEnospc => "the disk is full; the job resumes by itself when space is back",
             Self::StorageIo => "a file could not be read or written; the service's log names it",
-            Self::DivergedNonfinite => "a value stopped being finite; try a smaller time step, from the last checkpoint",
+            Self::DivergedNonfinite => {
+                "a value stopped being finite; try a smaller time step, from the last checkpoint"
+            }
             Self::DivergedInterface => "the interface vanished between the particles; try a smaller spacing",
             Self::WorkerCrash => "the worker died; its log may say why",
             Self::WorkerStalled => "the worker gave no sign of life and was ended",

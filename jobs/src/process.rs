@@ -66,7 +66,9 @@ pub fn free_space(path: &Path) -> Option<u64> {
 /// Bytes of all files below a directory.
 #[must_use]
 pub fn directory_bytes(directory: &Path) -> u64 {
-    let Ok(entries) = std::fs::read_dir(directory) else { return 0 };
+    let Ok(entries) = std::fs::read_dir(directory) else {
+        return 0;
+    };
     entries
         .flatten()
         .map(|entry| match entry.metadata() {
@@ -82,9 +84,9 @@ pub fn directory_bytes(directory: &Path) -> u64 {
 pub fn is_out_of_space(error: &(dyn std::error::Error + 'static)) -> bool {
     let mut current = Some(error);
     while let Some(error) = current {
-        let full = error.downcast_ref::<std::io::Error>().is_some_and(|e| {
-            matches!(e.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded)
-        });
+        let full = error
+            .downcast_ref::<std::io::Error>()
+            .is_some_and(|e| matches!(e.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded));
         // libhdf5 wraps the system's error in text.
         if full || error.to_string().contains("No space left on device") {
             return true;

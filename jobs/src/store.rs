@@ -221,7 +221,9 @@ impl Store {
     /// [`StoreError`].
     pub fn restart_source(&self, checkpoint: &str) -> Result<Option<RestartSource>, StoreError> {
         let connection = self.read();
-        let Some(row) = rows::checkpoint(&connection, checkpoint)? else { return Ok(None) };
+        let Some(row) = rows::checkpoint(&connection, checkpoint)? else {
+            return Ok(None);
+        };
         let job = rows::job(&connection, &row.job)?;
         Ok(job.map(|job| RestartSource {
             checkpoint: row.id,

@@ -93,7 +93,9 @@ mod tests {
 
     #[test]
     fn refuses_duplicates_nan_overflow_and_rests() {
-        for text in ["{\"a\": 1, \"a\": 2}", "{\"b\": {\"a\": 1, \"a\": 1}}", "NaN", "1e999", "{} {}", "{\"a\": Infinity}", "["] {
+        for text in
+            ["{\"a\": 1, \"a\": 2}", "{\"b\": {\"a\": 1, \"a\": 1}}", "NaN", "1e999", "{} {}", "{\"a\": Infinity}", "["]
+        {
             assert!(parse(text.as_bytes()).is_err(), "{text}");
         }
         assert!(parse(b"{\"a\": 1, \"a\": 2}").unwrap_err().to_string().contains("duplicate key \"a\""));

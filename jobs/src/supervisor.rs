@@ -4,8 +4,8 @@
 mod limits;
 mod settle;
 
-use crate::executor::{Executor, Worker};
 use crate::body::Wishes;
+use crate::executor::{Executor, Worker};
 use crate::job::{Reason, State, Trigger};
 use crate::order::{self, Order, StartCheckpoint, attempt_directory};
 use crate::process;
@@ -250,7 +250,9 @@ impl Supervisor {
         let available = process::available_memory().unwrap_or(u64::MAX);
         let is_alone = self.running.is_empty();
         // A job that alone is too large for this machine was refused at submission; it is not left waiting for ever.
-        let Some(job) = self.store.claim(|needed| is_alone || needed <= available)? else { return Ok(false) };
+        let Some(job) = self.store.claim(|needed| is_alone || needed <= available)? else {
+            return Ok(false);
+        };
         if let Err(error) = self.start(&job) {
             tracing::error!(job = job.id, %error, "a worker could not be started");
             let reason = if process::is_out_of_space(&error) { Reason::StorageEnospc } else { Reason::StorageIo };
@@ -258,7 +260,8 @@ impl Supervisor {
                 self.store_change(&job.id, Trigger::Pause, &Change::because(reason))?;
                 self.store_change(&job.id, Trigger::Rest, &Change::because(reason))?;
             } else {
-                let change = Change { reason: Some(reason), message: Some(error.to_string()), epoch: Some(job.attempt) };
+                let change =
+                    Change { reason: Some(reason), message: Some(error.to_string()), epoch: Some(job.attempt) };
                 self.store_change(&job.id, Trigger::Fail, &change)?;
             }
         }
@@ -345,3 +348,6 @@ impl Supervisor {
         Ok(self.store.job(job)?.map(|row| row.state))
     }
 }
+
+#[cfg(test)]
+mod tests;

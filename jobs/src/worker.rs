@@ -98,11 +98,14 @@ fn attempt(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
     log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
     pool.install(|| {
-        let context =
-            BuildContext { plan: wishes.plan(), interrupt: control.interrupt().clone(), cpu_clock: CpuClock(process::cpu_seconds) };
-        let mut simulation = scene
-            .build(context)
-            .map_err(|found| Failure::Known(Reason::InputDamaged, found.first().map_or_else(String::new, |v| v.detail.clone())))?;
+        let context = BuildContext {
+            plan: wishes.plan(),
+            interrupt: control.interrupt().clone(),
+            cpu_clock: CpuClock(process::cpu_seconds),
+        };
+        let mut simulation = scene.build(context).map_err(|found| {
+            Failure::Known(Reason::InputDamaged, found.first().map_or_else(String::new, |v| v.detail.clone()))
+        })?;
         if control.interrupt().is_raised() {
             return Err(Failure::Canceled);
         }
@@ -142,7 +145,12 @@ struct Start {
 }
 
 /// Restores the newest sound checkpoint of the order; damaged ones are reported and passed over.
-fn restore(order: &Order, simulation: &mut dyn Simulation, sink: &mut dyn RecordSink, log: &Log) -> Result<Start, Failure> {
+fn restore(
+    order: &Order,
+    simulation: &mut dyn Simulation,
+    sink: &mut dyn RecordSink,
+    log: &Log,
+) -> Result<Start, Failure> {
     for candidate in &order.checkpoints {
         match open_start(order, candidate) {
             Ok((meta, state)) => match simulation.restore(&state) {
@@ -184,7 +192,10 @@ fn open_start(order: &Order, candidate: &StartCheckpoint) -> Result<(Meta, State
     }
     let isa = crate::build::isa();
     if meta.isa != isa && !candidate.allow_other_isa {
-        return Err(Refusal::Incompatible(format!("the checkpoint was written on {}, this worker computes on {isa}", meta.isa)));
+        return Err(Refusal::Incompatible(format!(
+            "the checkpoint was written on {}, this worker computes on {isa}",
+            meta.isa
+        )));
     }
     Ok((meta, state))
 }
@@ -206,9 +217,12 @@ fn prepare<'a>(
 ) -> Result<Observers<'a>, Failure> {
     let plan = wishes.plan();
     let counters = &start.counters;
-    let earlier = start
-        .is_own
-        .then(|| (order.attempts_directory.join(counters.series_epoch.to_string()).join(series::FILE_NAME), counters.series_bytes));
+    let earlier = start.is_own.then(|| {
+        (
+            order.attempts_directory.join(counters.series_epoch.to_string()).join(series::FILE_NAME),
+            counters.series_bytes,
+        )
+    });
     Ok(Observers {
         frames: Frames::new(
             directory.to_owned(),
@@ -259,7 +273,8 @@ fn finish(
     let usage = observers.progress.usage();
     let steps = simulation.clock().step;
     let particles = simulation.particle_count() as u64;
-    let report = report::compose(&simulation.report(), &usage, &phases, steps, particles, threads, &order.body["scene"]);
+    let report =
+        report::compose(&simulation.report(), &usage, &phases, steps, particles, threads, &order.body["scene"]);
     artifacts::write(&directory.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
     let report = artifacts::record(directory, "report.json", "application/json")?;
     files.push(report.clone());
@@ -273,7 +288,12 @@ fn finish(
 }
 
 /// The first, the middle and the last frame side by side; a picture that fails is logged and left out.
-fn draw_picture(order: &Order, directory: &Path, observers: &Observers, log: &Log) -> Option<crate::records::FileRecord> {
+fn draw_picture(
+    order: &Order,
+    directory: &Path,
+    observers: &Observers,
+    log: &Log,
+) -> Option<crate::records::FileRecord> {
     let frames = observers.frames.written();
     let mut chosen = vec![0, frames.len() / 2, frames.len().saturating_sub(1)];
     chosen.dedup();
@@ -308,6 +328,10 @@ impl Log {
     fn line(&self, text: &str) {
         let line = format!("{} {text}\n", crate::clock::now());
         // A log that cannot be written must not end a run.
-        let _ = OpenOptions::new().create(true).append(true).open(&self.path).and_then(|mut f| f.write_all(line.as_bytes()));
+        let _ = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&self.path)
+            .and_then(|mut f| f.write_all(line.as_bytes()));
     }
 }

@@ -56,7 +56,9 @@ fn inside_of_cell<const D: usize>(surface: &Redistancing<D>, corner: &Vector<D>,
     let whole = edge.powi(D as i32);
     let centre = corner.add_scalar(0.5 * edge);
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();
-    let Some(foot) = surface.query(&centre, f64::INFINITY) else { return 0.0 };
+    let Some(foot) = surface.query(&centre, f64::INFINITY) else {
+        return 0.0;
+    };
     if foot.distance >= half_diagonal {
         return if foot.is_outside { 0.0 } else { whole };
     }

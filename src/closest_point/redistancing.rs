@@ -8,7 +8,9 @@ use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
 use crate::polynomials::{Fit, LocalPolynomial, Regression, RegressionScratch};
-use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
+use rayon::prelude::{
+    IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator, ParallelSlice, ParallelSliceMut,
+};
 
 /// The answer to a query.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -142,7 +144,12 @@ impl<const D: usize> Redistancing<D> {
     ///
     /// # Errors
     /// [`Interrupted`] when somebody asked to stop.
-    pub fn fit_samples(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
+    pub fn fit_samples(
+        &mut self,
+        positions: &[Vector<D>],
+        level: &[f64],
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
         let terms = self.regression.terms();
         self.fitted.resize(self.near.len(), None);
         self.coefficients.resize(self.near.len() * terms, 0.0);
@@ -242,7 +249,9 @@ impl<const D: usize> Redistancing<D> {
                     break;
                 }
                 NewtonEnd::LeftSupport(at) => {
-                    let Some((next, _)) = self.sample_cells.nearest(&at, f64::INFINITY) else { break };
+                    let Some((next, _)) = self.sample_cells.nearest(&at, f64::INFINITY) else {
+                        break;
+                    };
                     if next == current {
                         break;
                     }

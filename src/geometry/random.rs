@@ -62,7 +62,13 @@ mod tests {
 
     #[test]
     fn seeds_and_counters_decorrelate() {
-        assert_ne!(CounterRandom::new(1).symmetric(&[3, 4]).to_bits(), CounterRandom::new(2).symmetric(&[3, 4]).to_bits());
-        assert_ne!(CounterRandom::new(1).symmetric(&[3, 4]).to_bits(), CounterRandom::new(1).symmetric(&[4, 3]).to_bits());
+        assert_ne!(
+            CounterRandom::new(1).symmetric(&[3, 4]).to_bits(),
+            CounterRandom::new(2).symmetric(&[3, 4]).to_bits()
+        );
+        assert_ne!(
+            CounterRandom::new(1).symmetric(&[3, 4]).to_bits(),
+            CounterRandom::new(1).symmetric(&[4, 3]).to_bits()
+        );
     }
 }

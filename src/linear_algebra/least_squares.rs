@@ -78,7 +78,9 @@ impl LeastSquares {
         let condition = if rank < n {
             f64::INFINITY
         } else {
-            let (largest, least) = self.diagonal[..n].iter().fold((0.0_f64, f64::INFINITY), |(most, least), d| (most.max(d.abs()), least.min(d.abs())));
+            let (largest, least) = self.diagonal[..n]
+                .iter()
+                .fold((0.0_f64, f64::INFINITY), |(most, least), d| (most.max(d.abs()), least.min(d.abs())));
             largest / least
         };
         if rank == n {
@@ -160,7 +162,12 @@ mod tests {
     use super::{LeastSquares, dot};
     use crate::geometry::random::CounterRandom;
 
-    fn problem(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64, rhs: impl Fn(usize) -> f64) -> LeastSquares {
+    fn problem(
+        rows: usize,
+        columns: usize,
+        entry: impl Fn(usize, usize) -> f64,
+        rhs: impl Fn(usize) -> f64,
+    ) -> LeastSquares {
         let mut system = LeastSquares::default();
         system.reset(rows, columns);
         for i in 0..rows {

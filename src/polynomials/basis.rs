@@ -125,7 +125,8 @@ impl<const D: usize> PolynomialBasis<D> {
         let terms = coefficients.len();
         let stride = self.indices().len();
         for beta in (0..terms).rev() {
-            coefficients[beta] = (0..=beta).map(|alpha| coefficients[alpha] * self.lagrange[alpha * stride + beta]).sum();
+            coefficients[beta] =
+                (0..=beta).map(|alpha| coefficients[alpha] * self.lagrange[alpha * stride + beta]).sum();
         }
     }
 }

@@ -109,7 +109,9 @@ impl<const D: usize> Regression<D> {
         loop {
             let terms = PolynomialBasis::<D>::terms(degree);
             let enough = scratch.neighbors.len() >= terms;
-            if enough && let Some(condition) = self.solve(x, values, radius, degree, scratch, &mut coefficients[..terms]) {
+            if enough
+                && let Some(condition) = self.solve(x, values, radius, degree, scratch, &mut coefficients[..terms])
+            {
                 let unscaled = self.basis.kind() == BasisKind::MonomialUnscaled;
                 return Some(Fit {
                     centre: if unscaled { Vector::<D>::zeros() } else { *x },
@@ -137,7 +139,13 @@ impl<const D: usize> Regression<D> {
     }
 
     /// Fills the scratch with the neighbourhood; returns its radius and how often it grew.
-    fn collect(&self, search: &impl NeighborSearch<D>, x: &Vector<D>, degree: usize, scratch: &mut RegressionScratch<D>) -> (f64, u32) {
+    fn collect(
+        &self,
+        search: &impl NeighborSearch<D>,
+        x: &Vector<D>,
+        degree: usize,
+        scratch: &mut RegressionScratch<D>,
+    ) -> (f64, u32) {
         let terms = PolynomialBasis::<D>::terms(degree);
         let needed = (self.minimum_ratio * terms as f64).ceil() as usize;
         match self.neighborhood {
@@ -247,7 +255,8 @@ mod tests {
     #[test]
     fn every_basis_reproduces_polynomials_of_its_degree() {
         let points = cloud(0.45);
-        let values: Vec<f64> = points.iter().map(|x| 1.0 + x[0] - 2.0 * x[1] * x[0] + x[1].powi(4) - x[0].powi(3)).collect();
+        let values: Vec<f64> =
+            points.iter().map(|x| 1.0 + x[0] - 2.0 * x[1] * x[0] + x[1].powi(4) - x[0].powi(3)).collect();
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(points.iter().copied(), 0.1);
         for kind in [BasisKind::Minter, BasisKind::Monomial, BasisKind::MonomialUnscaled] {
@@ -255,9 +264,8 @@ mod tests {
                 let regression = regression(kind, 4, neighborhood);
                 let mut coefficients = vec![0.0; 15];
                 let at = Vector::<2>::new(0.21, -0.33);
-                let fit = regression
-                    .fit(&cells, &at, &values, &mut RegressionScratch::default(), &mut coefficients)
-                    .unwrap();
+                let fit =
+                    regression.fit(&cells, &at, &values, &mut RegressionScratch::default(), &mut coefficients).unwrap();
                 assert_eq!(fit.degree, 4);
                 assert!(fit.neighbors >= 23, "{} neighbours", fit.neighbors);
                 let x = Vector::<2>::new(0.25, -0.3);
@@ -276,8 +284,7 @@ mod tests {
         cells.rebuild(points.iter().copied(), 0.1);
         let regression = regression(BasisKind::Minter, 3, Neighborhood::Radius { cutoff: 0.3 });
         let mut coefficients = vec![0.0; 10];
-        let fit =
-            regression.fit(&cells, &points[20], &values, &mut RegressionScratch::default(), &mut coefficients);
+        let fit = regression.fit(&cells, &points[20], &values, &mut RegressionScratch::default(), &mut coefficients);
         assert!(fit.is_none());
     }
 
@@ -289,9 +296,8 @@ mod tests {
         cells.rebuild(points.iter().copied(), 0.1);
         let regression = regression(BasisKind::Monomial, 4, Neighborhood::Radius { cutoff: 0.2 });
         let mut coefficients = vec![0.0; 15];
-        let fit = regression
-            .fit(&cells, &points[2], &values, &mut RegressionScratch::default(), &mut coefficients)
-            .unwrap();
+        let fit =
+            regression.fit(&cells, &points[2], &values, &mut RegressionScratch::default(), &mut coefficients).unwrap();
         assert!(fit.degree <= 2 && fit.enlargements > 0);
         let x = Vector::<2>::new(-0.8, -0.9);
         let value = fit.polynomial(&regression.basis, &coefficients).value(&(x - fit.centre));

@@ -23,7 +23,13 @@ pub struct Violation {
 impl Violation {
     /// A violation without a suggestion.
     #[must_use]
-    pub fn new(pointer: impl Into<String>, code: &'static str, detail: impl Into<String>, got: &Value, allowed: Value) -> Self {
+    pub fn new(
+        pointer: impl Into<String>,
+        code: &'static str,
+        detail: impl Into<String>,
+        got: &Value,
+        allowed: Value,
+    ) -> Self {
         Self { pointer: pointer.into(), code, detail: detail.into(), got: got.clone(), allowed, did_you_mean: None }
     }
 
@@ -92,9 +98,17 @@ pub fn check(
     for parameter in parameters {
         let place = format!("{pointer}/{}", parameter.name);
         let value = match (given.get(parameter.name), parameter.default) {
-            (None | Some(Value::Null), Default::Absent) | (Some(Value::Null), Default::JsonOrNull(_)) => Some(Value::Null),
+            (None | Some(Value::Null), Default::Absent) | (Some(Value::Null), Default::JsonOrNull(_)) => {
+                Some(Value::Null)
+            }
             (None, Default::Required) => {
-                violations.push(Violation::new(place, "required", parameter.doc, &Value::Null, describe(&parameter.kind)));
+                violations.push(Violation::new(
+                    place,
+                    "required",
+                    parameter.doc,
+                    &Value::Null,
+                    describe(&parameter.kind),
+                ));
                 None
             }
             (None, Default::Json(text) | Default::JsonOrNull(text)) => {
@@ -116,9 +130,9 @@ fn check_value(kind: &Kind, value: &Value, pointer: &str, violations: &mut Vec<V
         Kind::Number { .. } => check_number(kind, value, pointer, violations),
         Kind::Integer { least, most } => {
             // 240.0 is a whole number too.
-            let whole = value.as_u64().or_else(|| {
-                value.as_f64().filter(|x| x.fract() == 0.0 && *x >= 0.0 && *x < 9e15).map(|x| x as u64)
-            });
+            let whole = value
+                .as_u64()
+                .or_else(|| value.as_f64().filter(|x| x.fract() == 0.0 && *x >= 0.0 && *x < 9e15).map(|x| x as u64));
             match whole {
                 Some(number) if (*least..=*most).contains(&number) => Some(json!(number)),
                 Some(_) => refuse(violations, pointer, "range", "the number is out of range", value, kind),
@@ -161,7 +175,9 @@ fn check_value(kind: &Kind, value: &Value, pointer: &str, violations: &mut Vec<V
 }
 
 fn check_number(kind: &Kind, value: &Value, pointer: &str, violations: &mut Vec<Violation>) -> Option<Value> {
-    let Kind::Number { above, least, below, most } = kind else { return None };
+    let Kind::Number { above, least, below, most } = kind else {
+        return None;
+    };
     let Some(number) = value.as_f64() else {
         return refuse(violations, pointer, "type", "a number is needed", value, kind);
     };
@@ -169,7 +185,11 @@ fn check_number(kind: &Kind, value: &Value, pointer: &str, violations: &mut Vec<
         && least.is_none_or(|bound| number >= bound)
         && below.is_none_or(|bound| number < bound)
         && most.is_none_or(|bound| number <= bound);
-    if fits { Some(json!(number)) } else { refuse(violations, pointer, "range", "the number is out of range", value, kind) }
+    if fits {
+        Some(json!(number))
+    } else {
+        refuse(violations, pointer, "range", "the number is out of range", value, kind)
+    }
 }
 
 fn check_choice(variants: &[Variant], value: &Value, pointer: &str, violations: &mut Vec<Violation>) -> Option<Value> {
@@ -232,7 +252,9 @@ pub fn describe(kind: &Kind) -> Value {
             parts.extend(most.map(|bound| format!("≤ {bound}")));
             if parts.is_empty() { json!("a number") } else { json!(format!("a number {}", parts.join(" and "))) }
         }
-        Kind::Integer { least, most } if *most == u64::MAX => json!(format!("a whole number ≥ {least}")),
+        Kind::Integer { least, most } if *most == u64::MAX => {
+            json!(format!("a whole number ≥ {least}"))
+        }
         Kind::Integer { least, most } => json!(format!("a whole number from {least} to {most}")),
         Kind::Vector { positive: true } => json!("two or three positive numbers"),
         Kind::Vector { positive: false } => json!("two or three numbers"),

@@ -73,10 +73,15 @@ fn of_value(kind: &Kind) -> Map<String, Value> {
             }
             return schema;
         }
-        Kind::Integer { least, most } if *most == u64::MAX => json!({"type": "integer", "minimum": least}),
-        Kind::Integer { least, most } => json!({"type": "integer", "minimum": least, "maximum": most}),
+        Kind::Integer { least, most } if *most == u64::MAX => {
+            json!({"type": "integer", "minimum": least})
+        }
+        Kind::Integer { least, most } => {
+            json!({"type": "integer", "minimum": least, "maximum": most})
+        }
         Kind::Vector { positive } => {
-            let item = if *positive { json!({"type": "number", "exclusiveMinimum": 0}) } else { json!({"type": "number"}) };
+            let item =
+                if *positive { json!({"type": "number", "exclusiveMinimum": 0}) } else { json!({"type": "number"}) };
             json!({"type": "array", "items": item, "minItems": 2, "maxItems": 3})
         }
         Kind::Choice(variants) => choice(variants()),

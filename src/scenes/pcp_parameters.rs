@@ -11,14 +11,24 @@ use serde_json::{Value, json};
 
 /// Parameters of `pcp`.
 pub static PARAMETERS: &[Parameter] = &[
-    Parameter::new("degree", "total degree of the local polynomials", Kind::Integer { least: 1, most: 8 }, DefaultValue::Json("4")),
+    Parameter::new(
+        "degree",
+        "total degree of the local polynomials",
+        Kind::Integer { least: 1, most: 8 },
+        DefaultValue::Json("4"),
+    ),
     Parameter::new(
         "basis",
         "basis of the regressions; monomial_unscaled is neither centred nor scaled, for comparison",
         Kind::Word(&["minter", "monomial", "monomial_unscaled"]),
         DefaultValue::Json("\"minter\""),
     ),
-    Parameter::new("neighborhood", "which particles take part in a fit; radius 2.5 h when not given", Kind::Choice(neighborhoods), DefaultValue::Absent),
+    Parameter::new(
+        "neighborhood",
+        "which particles take part in a fit; radius 2.5 h when not given",
+        Kind::Choice(neighborhoods),
+        DefaultValue::Absent,
+    ),
     Parameter::new("cutoff_h", "short for neighborhood radius {cutoff_h}", POSITIVE, DefaultValue::Absent),
     Parameter::new("weight", "k in the weight exp(−k r²/r_c²)", NOT_NEGATIVE, DefaultValue::Json("2")),
     Parameter::new(
@@ -33,8 +43,18 @@ pub static PARAMETERS: &[Parameter] = &[
         Kind::Number { above: Some(0.5), least: None, below: None, most: Some(10.0) },
         DefaultValue::Json("1.5"),
     ),
-    Parameter::new("tolerance", "error of a closest point at which iterations end", POSITIVE, DefaultValue::Json("1e-14")),
-    Parameter::new("max_iterations", "most iterations of a solve", Kind::Integer { least: 1, most: 100_000 }, DefaultValue::Json("1000")),
+    Parameter::new(
+        "tolerance",
+        "error of a closest point at which iterations end",
+        POSITIVE,
+        DefaultValue::Json("1e-14"),
+    ),
+    Parameter::new(
+        "max_iterations",
+        "most iterations of a solve",
+        Kind::Integer { least: 1, most: 100_000 },
+        DefaultValue::Json("1000"),
+    ),
 ];
 
 static NEIGHBORHOODS: &[Variant] = &[
@@ -46,7 +66,12 @@ static NEIGHBORHOODS: &[Variant] = &[
     Variant {
         name: "nearest",
         doc: "the nearest particles",
-        parameters: &[Parameter::new("count", "how many", Kind::Integer { least: 4, most: 10_000 }, DefaultValue::Json("30"))],
+        parameters: &[Parameter::new(
+            "count",
+            "how many",
+            Kind::Integer { least: 4, most: 10_000 },
+            DefaultValue::Json("30"),
+        )],
     },
 ];
 
@@ -93,12 +118,20 @@ pub fn understand(
     }
     let terms = if dimension == 2 { term_count::<2>(parsed.degree) } else { term_count::<3>(parsed.degree) };
     let neighborhood = match (parsed.neighborhood, parsed.cutoff_h) {
-        (Some(Neighborhood::Radius { cutoff_h }), _) | (None, Some(cutoff_h)) => NeighborhoodChoice::Radius { cutoff_h },
+        (Some(Neighborhood::Radius { cutoff_h }), _) | (None, Some(cutoff_h)) => {
+            NeighborhoodChoice::Radius { cutoff_h }
+        }
         (Some(Neighborhood::Nearest { count }), _) => {
             if count < terms {
                 let detail = format!("degree {} has {terms} coefficients", parsed.degree);
                 let at = format!("{pointer}/neighborhood/count");
-                return Err(vec![Violation::new(at, "range", detail, &json!(count), json!(format!("a whole number ≥ {terms}")))]);
+                return Err(vec![Violation::new(
+                    at,
+                    "range",
+                    detail,
+                    &json!(count),
+                    json!(format!("a whole number ≥ {terms}")),
+                )]);
             }
             NeighborhoodChoice::Nearest { count }
         }

@@ -1,16 +1,18 @@
 //! Shapes as parameters: their JSON and the surfaces they stand for.
 
 use crate::geometry::Vector;
-use crate::geometry::surfaces::{
-    Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, ZalesakDisk,
-};
+use crate::geometry::surfaces::{Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, ZalesakDisk};
 use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-const CENTER: Parameter =
-    Parameter::new("center", "centre; the origin when not given", Kind::Vector { positive: false }, DefaultValue::Absent);
+const CENTER: Parameter = Parameter::new(
+    "center",
+    "centre; the origin when not given",
+    Kind::Vector { positive: false },
+    DefaultValue::Absent,
+);
 
 const fn positive(name: &'static str, doc: &'static str) -> Parameter {
     Parameter::new(name, doc, POSITIVE, DefaultValue::Required)
@@ -19,9 +21,15 @@ const fn positive(name: &'static str, doc: &'static str) -> Parameter {
 const BALL: &[Parameter] = &[CENTER, positive("radius", "radius")];
 const ELLIPSOID: &[Parameter] = &[
     CENTER,
-    Parameter::new("semi_axes", "semi-axes along x, y (and z)", Kind::Vector { positive: true }, DefaultValue::Required),
+    Parameter::new(
+        "semi_axes",
+        "semi-axes along x, y (and z)",
+        Kind::Vector { positive: true },
+        DefaultValue::Required,
+    ),
 ];
-const SIZE: Parameter = Parameter::new("size", "full edge lengths", Kind::Vector { positive: true }, DefaultValue::Required);
+const SIZE: Parameter =
+    Parameter::new("size", "full edge lengths", Kind::Vector { positive: true }, DefaultValue::Required);
 
 macro_rules! plain_shapes {
     ($($more:expr)?) => {
@@ -132,14 +140,26 @@ impl Shape {
         let only = |dimension: usize, violations: &mut Vec<Violation>| {
             if D != dimension {
                 let detail = format!("this shape exists in {dimension} dimensions, the scene has {D}");
-                violations.push(Violation::new(format!("{pointer}/type"), "conflict", detail, &written["type"], Value::Null));
+                violations.push(Violation::new(
+                    format!("{pointer}/type"),
+                    "conflict",
+                    detail,
+                    &written["type"],
+                    Value::Null,
+                ));
             }
         };
         let vector = |name: &str, numbers: &[f64], violations: &mut Vec<Violation>| {
             if numbers.len() != D {
                 let detail = format!("the scene has {D} dimensions");
                 let allowed = json!(format!("{D} numbers"));
-                violations.push(Violation::new(format!("{pointer}/{name}"), "conflict", detail, &json!(numbers), allowed));
+                violations.push(Violation::new(
+                    format!("{pointer}/{name}"),
+                    "conflict",
+                    detail,
+                    &json!(numbers),
+                    allowed,
+                ));
             }
             Vector::<D>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(1.0))
         };
@@ -150,7 +170,13 @@ impl Shape {
         let less = |name: &str, got: f64, bound: f64, violations: &mut Vec<Violation>| {
             if got >= bound {
                 let allowed = json!(format!("a number > 0 and < {bound}"));
-                violations.push(Violation::new(format!("{pointer}/{name}"), "range", "it does not fit the shape", &json!(got), allowed));
+                violations.push(Violation::new(
+                    format!("{pointer}/{name}"),
+                    "range",
+                    "it does not fit the shape",
+                    &json!(got),
+                    allowed,
+                ));
             }
         };
         let errors = &mut violations;
@@ -161,7 +187,10 @@ impl Shape {
             }
             Self::Ellipse { center, semi_axes } | Self::Ellipsoid { center, semi_axes } => {
                 only(if matches!(self, Self::Ellipse { .. }) { 2 } else { 3 }, errors);
-                Some(Box::new(Ellipsoid { center: place(center, errors), semi_axes: vector("semi_axes", semi_axes, errors) }))
+                Some(Box::new(Ellipsoid {
+                    center: place(center, errors),
+                    semi_axes: vector("semi_axes", semi_axes, errors),
+                }))
             }
             Self::Box { center, size } => {
                 Some(Box::new(Cuboid { center: place(center, errors), size: vector("size", size, errors) }))
@@ -194,7 +223,13 @@ impl Shape {
                 if *separation <= joint {
                     let allowed = json!(format!("a number > {joint}"));
                     let detail = "the balls would swallow the neck";
-                    errors.push(Violation::new(format!("{pointer}/separation"), "range", detail, &json!(separation), allowed));
+                    errors.push(Violation::new(
+                        format!("{pointer}/separation"),
+                        "range",
+                        detail,
+                        &json!(separation),
+                        allowed,
+                    ));
                 }
                 Some(Box::new(Dumbbell::new(place(center, errors), *separation, *radius, *neck_radius)))
             }
@@ -211,7 +246,13 @@ impl Shape {
                         Ok(union) => Some(Box::new(union)),
                         Err(overlap) => {
                             let at = format!("{pointer}/of");
-                            errors.push(Violation::new(at, "conflict", overlap.to_string(), &written["of"], Value::Null));
+                            errors.push(Violation::new(
+                                at,
+                                "conflict",
+                                overlap.to_string(),
+                                &written["of"],
+                                Value::Null,
+                            ));
                             None
                         }
                     }

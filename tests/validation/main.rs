@@ -1,35 +1,138 @@
+//! The papers' cases and the hard ones, against figures with their reasons.
+#![expect(missing_docs, reason = "a test")]
+
 #[path = "../support/mod.rs"]
 mod support;
-use serde_json::json;
-use support::{error, run};
+
+use serde_json::{Value, json};
+use support::{PLAN, build, error, pool, run};
 
 #[test]
-fn explore() {
-    for n in [16, 32, 64, 128] {
-        let t = std::time::Instant::now();
-        let r = run(&json!({"kind": "redistance", "spacing": 1.0 / f64::from(n), "preset": "paper"}));
-        println!("2D paper 1/{n}: rms {:.2e} max {:.2e} cp {:.2e} n {:.2e} k {:.2e} {:?} {:?}", error(&r, "phi", "rms", None), error(&r, "phi", "max", None), error(&r,"closest_point","rms",None), error(&r,"normal","rms",None), error(&r,"curvature","rms",None), t.elapsed(), r.newton);
-        let r = run(&json!({"kind": "redistance", "spacing": 1.0 / f64::from(n)}));
-        println!("2D def   1/{n}: rms {:.2e} max {:.2e} cp {:.2e} n {:.2e} k {:.2e} {:?}", error(&r, "phi", "rms", None), error(&r, "phi", "max", None), error(&r,"closest_point","rms",None), error(&r,"normal","rms",None), error(&r,"curvature","rms",None), r.rescued_fits);
-    }
-    for n in [8, 16, 32] {
-        let t = std::time::Instant::now();
-        let r = run(&json!({"kind": "redistance", "dimension": 3, "spacing": 1.0 / f64::from(n), "preset": "paper"}));
-        println!("3D paper 1/{n}: rms {:.2e} max {:.2e} cp {:.2e} n {:.2e} k {:.2e} {:?} {:?}", error(&r, "phi", "rms", None), error(&r, "phi", "max", None), error(&r,"closest_point","rms",None), error(&r,"normal","rms",None), error(&r,"curvature","rms",None), t.elapsed(), r.newton);
+fn spiraling_vortex_of_the_paper() {
+    // PCP table 2 at h = 1/64: RMS 1.42e-2, maximum 2.4e-2. A quarter is what the choice of random and rounding
+    // details leaves open in a flow this unstable to them.
+    let report = run(&json!({"kind": "vortex", "preset": "paper", "spacing": 0.015625}));
+    let (rms, max) = (error(&report, "phi", "rms", Some(8.0)), error(&report, "phi", "max", Some(8.0)));
+    assert!((rms / 1.42e-2 - 1.0).abs() < 0.25, "RMS {rms}");
+    assert!((max / 2.4e-2 - 1.0).abs() < 0.25, "maximum {max}");
+}
+
+#[test]
+fn a_dual_field_leaves_only_the_integrators_error() {
+    let report = run(&json!({"kind": "vortex", "spacing": 0.015625}));
+    assert!(error(&report, "phi", "rms", Some(8.0)) < 3e-6);
+    assert!(error(&report, "area", "relative", Some(8.0)) < 2e-5);
+    // Half way the filament is thinner than the neighbourhoods, which then mix its two sides; the paper's method has
+    // 6e-2 here.
+    assert!(error(&report, "phi", "rms", Some(4.0)) < 1.5e-2);
+}
+
+#[test]
+fn overwriting_by_count_beats_the_papers_method() {
+    let report = run(&json!({"kind": "vortex", "field": "overwrite", "spacing": 0.015625}));
+    assert!(error(&report, "phi", "rms", Some(8.0)) < 3.5e-3);
+}
+
+#[test]
+fn rigid_motions_keep_the_shape() {
+    // A whole turn in 240 steps: the fourth-order paths are exact to 1e-8; fits of a circle of 7.5 h to about
+    // (h/R)⁵/10 h.
+    let turn = json!({
+        "kind": "vortex", "spacing": 0.02, "band_h": 12, "end_time": std::f64::consts::TAU, "steps": 240,
+        "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 1}
+    });
+    let report = run(&turn);
+    assert!(error(&report, "phi", "rms", None) < 5e-6);
+    assert!(error(&report, "area", "relative", None) < 2e-5);
+    let glide = json!({
+        "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 1, "steps": 10,
+        "shape": {"type": "sphere", "radius": 0.5}, "flow": {"type": "translation", "velocity": [0.3, -1, 2]}
+    });
+    let report = run(&glide);
+    assert!(error(&report, "phi", "rms", None) < 1e-4);
+    assert!(error(&report, "volume", "relative", None) < 1e-2);
+}
+
+#[test]
+fn zalesak_disk_turns_once() {
+    let body = json!({
+        "kind": "vortex", "spacing": 0.01, "band_h": 12, "end_time": std::f64::consts::TAU, "steps": 200,
+        "shape": {"type": "zalesak_disk", "center": [0.5, 0.75], "radius": 0.15, "slot_width": 0.05, "slot_depth": 0.25},
+        "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 1}
+    });
+    // The slot is five particles wide: corners cost half a spacing at most.
+    let report = run(&body);
+    assert!(error(&report, "phi", "max", None) < 0.006);
+    assert!(error(&report, "area", "relative", None) < 5e-3);
+}
+
+#[test]
+fn bases_agree_and_distortion_costs_little() {
+    // A backward-stable solver makes minter and scaled monomials equal; numerics.md measured four digits.
+    let at = |basis: &str, jitter: f64| {
+        let body = json!({"kind": "redistance", "jitter": jitter, "method": {"type": "pcp", "basis": basis}});
+        error(&run(&body), "phi", "rms", None)
+    };
+    let (calm, wild) = (at("minter", 0.0), at("minter", 0.49));
+    assert!(wild / calm < 4.0, "{wild} for {calm}");
+    for basis in ["monomial", "monomial_unscaled"] {
+        assert!((at(basis, 0.49) / wild - 1.0).abs() < 1e-2, "{basis}");
     }
 }
 
 #[test]
-fn vortex() {
-    for (n, v) in [(64, json!({"preset":"paper"})), (32, json!({"preset":"paper"})), (64, json!({})), (128, json!({})),
-      (64, json!({"method":{"type":"pcp","neighborhood":{"type":"nearest","count":30}}})),
-      (64, json!({"method":{"type":"pcp","degree":2,"neighborhood":{"type":"nearest","count":20}}})),
-      (64, json!({"method":{"type":"pcp","degree":3,"neighborhood":{"type":"nearest","count":25}}})),
-      (64, json!({"field":"overwrite"}))] {
-        let t = std::time::Instant::now();
-        let mut s = v.clone();
-        s["kind"] = json!("vortex"); s["spacing"] = json!(1.0/f64::from(n));
-        let r = run(&s);
-        println!("vortex 1/{n} {v}: T/2 rms {:.2e} max {:.2e}; T rms {:.2e} max {:.2e} area {:.2e} samples {:.2e} {:?} {:?} {:?}", error(&r,"phi","rms",Some(4.0)), error(&r,"phi","max",Some(4.0)), error(&r,"phi","rms",Some(8.0)), error(&r,"phi","max",Some(8.0)), error(&r,"area","relative",Some(8.0)), error(&r,"samples","max",None), t.elapsed(), r.newton, r.rescued_fits);
+fn starved_neighbourhoods_grow_and_say_so() {
+    let body = json!({
+        "kind": "redistance", "dimension": 3, "spacing": 0.03125, "jitter": 0.49,
+        "method": {"type": "pcp", "cutoff_h": 2.1}
+    });
+    let report = run(&body);
+    // 1e-7 at 1/64 in scenes.md is 32 times as much at 1/32 by the fifth order.
+    assert!(error(&report, "phi", "rms", None) < 3.2e-6);
+    assert!(report.rescued_fits["fits.larger_radius"] > 1000);
+}
+
+#[test]
+fn repeated_redistancing_at_rest_stays_bounded() {
+    let report = run(&json!({"kind": "redistance", "repeat": 200}));
+    assert!(error(&report, "phi", "max", None) < 1e-4, "{}", error(&report, "phi", "max", None));
+}
+
+/// Nothing here may panic, hang, or fail without a count.
+#[test]
+fn hard_geometries() {
+    let hard: Vec<(&str, Value)> = vec![
+        (
+            "two circles closer than 3 h",
+            json!({"shape": {"type": "union", "of": [
+            {"type": "circle", "center": [-0.32, 0], "radius": 0.3}, {"type": "circle", "center": [0.32, 0], "radius": 0.3}]}}),
+        ),
+        ("a filament thinner than 2 h", json!({"shape": {"type": "box", "size": [1, 0.03]}})),
+        ("square corners", json!({"shape": {"type": "box", "size": [1, 1]}})),
+        (
+            "a circle of two particles' width",
+            json!({"shape": {"type": "circle", "radius": 0.03}, "initial": "distance"}),
+        ),
+        ("the highest degree", json!({"method": {"type": "pcp", "degree": 8}})),
+        ("the lowest degree", json!({"method": {"type": "pcp", "degree": 1}})),
+    ];
+    for (name, extra) in hard {
+        let mut body = json!({"kind": "redistance", "spacing": 0.02});
+        body.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+        let report = run(&body);
+        let max = error(&report, "phi", "max", None);
+        // No query worse than half a spacing, or a count in the report says why.
+        let excused = !report.newton.rescued.is_empty() || !report.rescued_fits.is_empty();
+        assert!(max <= 0.01 || excused && max <= 0.05, "{name}: {max} {:?} {:?}", report.newton, report.rescued_fits);
     }
+}
+
+#[test]
+fn a_surface_between_the_particles_is_reported_as_lost() {
+    pool(1).install(|| {
+        let body = json!({"kind": "redistance", "shape": {"type": "circle", "radius": 0.001, "center": [0.005, 0.005]}, "spacing": 0.02, "jitter": 0, "initial": "distance"});
+        let mut simulation = build(&body, PLAN);
+        let message = simulation.step().unwrap_err().to_string();
+        assert!(message.contains("no sample particle"), "{message}");
+    });
 }

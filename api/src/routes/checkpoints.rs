@@ -17,7 +17,10 @@ use meniscus_jobs::store::CheckpointRow;
 /// A job's verified checkpoints, newest first.
 #[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 200, body = CheckpointList), (status = 404, body = Problem)))]
-pub async fn list(State(application): State<Application>, Path(id): Path<String>) -> Result<Json<CheckpointList>, ApiError> {
+pub async fn list(
+    State(application): State<Application>,
+    Path(id): Path<String>,
+) -> Result<Json<CheckpointList>, ApiError> {
     let row = job(&application, &id).await?;
     let rows = with_store(&application, move |store| Ok(store.checkpoints(&row.id)?)).await?;
     Ok(Json(CheckpointList { items: rows.into_iter().map(CheckpointView::from).collect(), next: None }))
@@ -52,7 +55,10 @@ async fn checkpoint(application: &Application, id: String) -> Result<CheckpointR
 /// One checkpoint.
 #[utoipa::path(get, path = "/v1/checkpoints/{id}", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 200, body = CheckpointView), (status = 404, body = Problem)))]
-pub async fn get(State(application): State<Application>, Path(id): Path<String>) -> Result<Json<CheckpointView>, ApiError> {
+pub async fn get(
+    State(application): State<Application>,
+    Path(id): Path<String>,
+) -> Result<Json<CheckpointView>, ApiError> {
     Ok(Json(checkpoint(&application, id).await?.into()))
 }
 
@@ -63,7 +69,10 @@ pub async fn delete(State(application): State<Application>, Path(id): Path<Strin
     let row = checkpoint(&application, id).await?;
     let owner = job(&application, &row.job).await?;
     if !owner.state.is_terminal() {
-        return Err(ApiError::Conflict(format!("the job that wrote it is {} and may go on from it", owner.state.word())));
+        return Err(ApiError::Conflict(format!(
+            "the job that wrote it is {} and may go on from it",
+            owner.state.word()
+        )));
     }
     with_store(&application, move |store| Ok(store.delete_checkpoint(&row)?)).await?;
     Ok(StatusCode::NO_CONTENT)

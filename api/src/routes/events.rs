@@ -58,7 +58,8 @@ pub async fn events(
 fn number(name: &str, text: Option<&String>) -> Result<Option<u64>, ApiError> {
     text.map(|text| {
         text.trim().parse::<u64>().map_err(|_| {
-            let violation = Violation::new(name, "type", "a whole number is needed", &json!(text), json!("a whole number ≥ 0"));
+            let violation =
+                Violation::new(name, "type", "a whole number is needed", &json!(text), json!("a whole number ≥ 0"));
             ApiError::Invalid(vec![ProblemItem::from(violation)])
         })
     })
@@ -78,19 +79,28 @@ fn stream(application: Application, id: String, after: u64) -> Response {
 }
 
 /// Sends what is there, waits for more, ends after the terminal event, with the client, or with the service.
-async fn feed(application: Application, id: String, mut after: u64, sender: mpsc::Sender<Result<SseEvent, Infallible>>) {
+async fn feed(
+    application: Application,
+    id: String,
+    mut after: u64,
+    sender: mpsc::Sender<Result<SseEvent, Infallible>>,
+) {
     let mut changes = application.store.watch();
     let mut stopping = application.stopping.clone();
     loop {
         changes.mark_unchanged();
-        let Ok(events) = page(&application, &id, after, PAGE.1).await else { return };
+        let Ok(events) = page(&application, &id, after, PAGE.1).await else {
+            return;
+        };
         let is_empty = events.is_empty();
         for event in events {
             after = event.id;
             let ends = event.kind == "state"
                 && event.data["to"].as_str().and_then(JobState::from_word).is_some_and(JobState::is_terminal);
             let kind = event.kind.clone();
-            let Ok(message) = SseEvent::default().id(event.id.to_string()).event(kind).json_data(EventView::from(event)) else {
+            let Ok(message) =
+                SseEvent::default().id(event.id.to_string()).event(kind).json_data(EventView::from(event))
+            else {
                 return;
             };
             if sender.send(Ok(message)).await.is_err() || ends {

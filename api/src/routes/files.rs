@@ -31,7 +31,7 @@ fn location(application: &Application, job: &str, file: &FileRow) -> PathBuf {
 }
 
 /// A file, or a part of it. The tag is its SHA-256.
-#[utoipa::path(get, path = "/v1/jobs/{id}/files/{path}", tag = "files",
+#[utoipa::path(get, path = "/v1/jobs/{id}/files/{*path}", tag = "files",
     params(("id" = String, Path), ("path" = String, Path, description = "a path of the list"),
         ("Range" = Option<String>, Header), ("If-Range" = Option<String>, Header), ("If-None-Match" = Option<String>, Header)),
     responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304),
@@ -56,7 +56,8 @@ pub async fn get(
 pub async fn tar(State(application): State<Application>, Path(id): Path<String>) -> Result<Response, ApiError> {
     let row = job(&application, &id).await?;
     let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
-    let places: Vec<(String, PathBuf)> = files.iter().map(|f| (f.path.clone(), location(&application, &id, f))).collect();
+    let places: Vec<(String, PathBuf)> =
+        files.iter().map(|f| (f.path.clone(), location(&application, &id, f))).collect();
     // A reader that is slow holds up this thread and nothing else.
     let (sender, receiver) = mpsc::channel::<Result<Bytes, io::Error>>(8);
     let top = id.clone();

@@ -29,8 +29,13 @@ const PAGE: (u64, u64) = (50, 500);
     request_body(content = Object, description = "a job body: {\"scene\": {\"kind\": …}} at least; see /v1/scenes"),
     responses((status = 201, body = JobView, headers(("Location" = String))), (status = 400, body = Problem),
         (status = 413, body = Problem), (status = 422, body = Problem), (status = 503, body = Problem)))]
-pub async fn submit(State(application): State<Application>, headers: HeaderMap, content: Body) -> Result<Response, ApiError> {
-    let announced = headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()).and_then(|v| v.parse::<usize>().ok());
+pub async fn submit(
+    State(application): State<Application>,
+    headers: HeaderMap,
+    content: Body,
+) -> Result<Response, ApiError> {
+    let announced =
+        headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()).and_then(|v| v.parse::<usize>().ok());
     if announced.is_some_and(|length| length > BODY_LIMIT) {
         return Err(ApiError::TooLarge(BODY_LIMIT));
     }
@@ -44,7 +49,8 @@ pub async fn submit(State(application): State<Application>, headers: HeaderMap, 
     })
     .await?;
     application.supervisor.wake();
-    let location = HeaderValue::from_str(&format!("/v1/jobs/{}", row.id)).map_err(|e| ApiError::Internal(e.to_string()))?;
+    let location =
+        HeaderValue::from_str(&format!("/v1/jobs/{}", row.id)).map_err(|e| ApiError::Internal(e.to_string()))?;
     let mut response = (StatusCode::CREATED, Json(JobView::from(row))).into_response();
     response.headers_mut().insert(header::LOCATION, location);
     Ok(response)
@@ -82,11 +88,20 @@ pub async fn list(
 fn next_link(query: &[(String, String)], cursor: &str) -> String {
     let escape = |text: &str| {
         text.bytes()
-            .map(|b| if b.is_ascii_alphanumeric() || b"-._~".contains(&b) { char::from(b).to_string() } else { format!("%{b:02X}") })
+            .map(|b| {
+                if b.is_ascii_alphanumeric() || b"-._~".contains(&b) {
+                    char::from(b).to_string()
+                } else {
+                    format!("%{b:02X}")
+                }
+            })
             .collect::<String>()
     };
-    let mut parts: Vec<String> =
-        query.iter().filter(|(name, _)| name != "cursor").map(|(name, value)| format!("{}={}", escape(name), escape(value))).collect();
+    let mut parts: Vec<String> = query
+        .iter()
+        .filter(|(name, _)| name != "cursor")
+        .map(|(name, value)| format!("{}={}", escape(name), escape(value)))
+        .collect();
     parts.push(format!("cursor={}", escape(cursor)));
     format!("</v1/jobs?{}>; rel=\"next\"", parts.join("&"))
 }
@@ -95,7 +110,9 @@ fn filter(query: &[(String, String)]) -> Result<JobFilter, ApiError> {
     const KNOWN: [&str; 8] = ["state", "kind", "name", "created_after", "created_before", "sort", "limit", "cursor"];
     let mut filter = JobFilter { limit: PAGE.0, ..JobFilter::default() };
     let mut errors: Vec<ProblemItem> = Vec::new();
-    let refuse = |name: &str, code: &'static str, detail: &str, got: &str, allowed: Value| Violation::new(name, code, detail, &json!(got), allowed);
+    let refuse = |name: &str, code: &'static str, detail: &str, got: &str, allowed: Value| {
+        Violation::new(name, code, detail, &json!(got), allowed)
+    };
     for (name, value) in query {
         match name.as_str() {
             "state" => {
@@ -104,7 +121,8 @@ fn filter(query: &[(String, String)]) -> Result<JobFilter, ApiError> {
                         Some(state) => filter.states.push(state),
                         None => {
                             let words: Vec<&str> = JobState::ALL.iter().map(|s| s.word()).collect();
-                            errors.push(refuse("state", "unknown", "there is no such state", word, json!(words)).into());
+                            errors
+                                .push(refuse("state", "unknown", "there is no such state", word, json!(words)).into());
                         }
                     }
                 }
@@ -209,11 +227,15 @@ async fn request(
     already: &'static [JobState],
 ) -> Result<Response, ApiError> {
     let change = Change { reason, ..Change::default() };
-    let row = with_store(application, move |store| match store.change(&id, trigger, &change) {
-        Err(ChangeError::Illegal(state, _)) if already.contains(&state) => store.job(&id)?.ok_or(ApiError::NotFound("job")),
-        // Somebody else changed it in the same moment: once more, on what it is now.
-        Err(ChangeError::Stale) => Ok(store.change(&id, trigger, &change)?),
-        result => Ok(result?),
+    let row = with_store(application, move |store| {
+        match store.change(&id, trigger, &change) {
+            Err(ChangeError::Illegal(state, _)) if already.contains(&state) => {
+                store.job(&id)?.ok_or(ApiError::NotFound("job"))
+            }
+            // Somebody else changed it in the same moment: once more, on what it is now.
+            Err(ChangeError::Stale) => Ok(store.change(&id, trigger, &change)?),
+            result => Ok(result?),
+        }
     })
     .await?;
     application.supervisor.wake();

@@ -37,7 +37,8 @@ pub async fn log(
         None => None,
         Some((_, Ok(tail))) => Some(tail),
         Some((text, Err(_))) => {
-            let violation = Violation::new("tail", "type", "a whole number is needed", &json!(text), json!("a whole number ≥ 0"));
+            let violation =
+                Violation::new("tail", "type", "a whole number is needed", &json!(text), json!("a whole number ≥ 0"));
             return Err(ApiError::Invalid(vec![ProblemItem::from(violation)]));
         }
     };
@@ -51,7 +52,8 @@ pub async fn log(
             lines[lines.len().saturating_sub(tail)..].concat()
         }
     };
-    let facts = FileFacts { sha256: None, media_type: "text/plain; charset=utf-8".to_owned(), name: format!("{id}.log") };
+    let facts =
+        FileFacts { sha256: None, media_type: "text/plain; charset=utf-8".to_owned(), name: format!("{id}.log") };
     bytes_response(&text, &facts, &headers)
 }
 
@@ -59,11 +61,17 @@ pub async fn log(
 #[utoipa::path(get, path = "/v1/jobs/{id}/series", tag = "results",
     params(("id" = String, Path), ("Accept" = Option<String>, Header)),
     responses((status = 200, content_type = "text/csv"), (status = 404, body = Problem)))]
-pub async fn series(State(application): State<Application>, Path(id): Path<String>, headers: HeaderMap) -> Result<Response, ApiError> {
+pub async fn series(
+    State(application): State<Application>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
     let row = job(&application, &id).await?;
     let reader = application.clone();
     // The newest attempt that has come so far continues all earlier ones.
-    let text = with_store(&application, move |_| Ok(of_attempts(&reader, &row, series::FILE_NAME).pop().unwrap_or_default())).await?;
+    let text =
+        with_store(&application, move |_| Ok(of_attempts(&reader, &row, series::FILE_NAME).pop().unwrap_or_default()))
+            .await?;
     let wants_json = headers
         .get(header::ACCEPT)
         .and_then(|v| v.to_str().ok())
@@ -78,7 +86,11 @@ pub async fn series(State(application): State<Application>, Path(id): Path<Strin
 /// Errors, cost, stability of a finished job.
 #[utoipa::path(get, path = "/v1/jobs/{id}/report", tag = "results", params(("id" = String, Path)),
     responses((status = 200, content_type = "application/json"), (status = 404, body = Problem)))]
-pub async fn report(State(application): State<Application>, Path(id): Path<String>, headers: HeaderMap) -> Result<Response, ApiError> {
+pub async fn report(
+    State(application): State<Application>,
+    Path(id): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
     let row = job(&application, &id).await?;
     let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
     let file = files.into_iter().find(|file| file.path == "report.json").ok_or(ApiError::NotFound("report yet"))?;

@@ -38,5 +38,9 @@ pub async fn health() -> Json<StatusView> {
 #[utoipa::path(get, path = "/readyz", tag = "service",
     responses((status = 200, body = StatusView), (status = 503, body = Problem)))]
 pub async fn ready(State(application): State<Application>) -> Result<Json<StatusView>, ApiError> {
-    if application.ready.load(Ordering::Acquire) { Ok(Json(StatusView { status: "ok" })) } else { Err(ApiError::NotReady) }
+    if application.ready.load(Ordering::Acquire) {
+        Ok(Json(StatusView { status: "ok" }))
+    } else {
+        Err(ApiError::NotReady)
+    }
 }

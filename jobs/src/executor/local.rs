@@ -26,7 +26,12 @@ impl LocalExecutor {
 }
 
 impl Executor for LocalExecutor {
-    fn start(&self, attempt_directory: &Path, memory_bytes: u64, news: Box<dyn Fn() + Send>) -> io::Result<Box<dyn Worker>> {
+    fn start(
+        &self,
+        attempt_directory: &Path,
+        memory_bytes: u64,
+        news: Box<dyn Fn() + Send>,
+    ) -> io::Result<Box<dyn Worker>> {
         let errors =
             OpenOptions::new().create(true).append(true).open(attempt_directory.join(crate::worker::LOG_NAME))?;
         let mut child = Command::new(&self.program)
@@ -80,7 +85,9 @@ impl Worker for LocalWorker {
     }
 
     fn poll(&mut self) -> io::Result<Option<Exit>> {
-        let Some(status) = self.child.try_wait()? else { return Ok(None) };
+        let Some(status) = self.child.try_wait()? else {
+            return Ok(None);
+        };
         let out_of_memory = self.group.as_ref().is_some_and(MemoryGroup::has_killed);
         Ok(Some(Exit { code: status.code(), signal: status.signal(), out_of_memory }))
     }

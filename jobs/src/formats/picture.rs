@@ -2,10 +2,10 @@
 //! the particles of a slice through the middle.
 
 use super::vtkhdf::FrameView;
+use plotters::coord::Shift;
 use plotters::prelude::{
     ChartBuilder, Circle, DrawingArea, IntoDrawingArea, PathElement, RGBColor, SVGBackend, ShapeStyle, WHITE,
 };
-use plotters::coord::Shift;
 use std::path::Path;
 
 /// Width and height of one panel in pixels.
@@ -72,7 +72,11 @@ fn slice_of(frame: &FrameView, spacing: f64) -> Vec<usize> {
         frame.points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[2]), high.max(p[2])));
     let middle = 0.5 * (low + high);
     let all = 0..frame.points.len();
-    if low < high { all.filter(|&i| (frame.points[i][2] - middle).abs() <= 0.5 * spacing).collect() } else { all.collect() }
+    if low < high {
+        all.filter(|&i| (frame.points[i][2] - middle).abs() <= 0.5 * spacing).collect()
+    } else {
+        all.collect()
+    }
 }
 
 /// Blue inside, white at the surface, red outside, grey where there is no value.
@@ -82,5 +86,9 @@ fn colour(value: f64) -> RGBColor {
     }
     let strength = value.abs().min(1.0).sqrt();
     let fade = |full: f64| (235.0 + (full - 235.0) * strength) as u8;
-    if value < 0.0 { RGBColor(fade(30.0), fade(80.0), fade(190.0)) } else { RGBColor(fade(190.0), fade(50.0), fade(40.0)) }
+    if value < 0.0 {
+        RGBColor(fade(30.0), fade(80.0), fade(190.0))
+    } else {
+        RGBColor(fade(190.0), fade(50.0), fade(40.0))
+    }
 }

@@ -71,10 +71,14 @@ pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
     let file = File::open(path)?;
     let root = file.group("VTKHDF")?;
     let data = root.group("PointData")?;
-    let Ok(phi) = data.dataset("phi") else { return Ok(None) };
+    let Ok(phi) = data.dataset("phi") else {
+        return Ok(None);
+    };
     let triples = |values: Vec<f64>| values.as_chunks::<3>().0.to_vec();
     let surface = match (data.dataset("closest_point"), data.dataset("normal")) {
-        (Ok(points), Ok(normals)) => triples(points.read_raw()?).into_iter().zip(triples(normals.read_raw()?)).collect(),
+        (Ok(points), Ok(normals)) => {
+            triples(points.read_raw()?).into_iter().zip(triples(normals.read_raw()?)).collect()
+        }
         _ => Vec::new(),
     };
     let time = root.dataset("FieldData/Time")?.read_raw::<f64>()?;

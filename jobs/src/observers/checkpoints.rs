@@ -23,7 +23,13 @@ pub struct Checkpoints {
 impl Checkpoints {
     /// For an attempt; the clock starts now.
     #[must_use]
-    pub fn new(directory: PathBuf, job: String, body: Value, every_wall_s: Option<f64>, every_steps: Option<u64>) -> Self {
+    pub fn new(
+        directory: PathBuf,
+        job: String,
+        body: Value,
+        every_wall_s: Option<f64>,
+        every_steps: Option<u64>,
+    ) -> Self {
         let every = every_wall_s.and_then(|s| Duration::try_from_secs_f64(s).ok());
         Self { directory, job, body, every, every_steps, last: Instant::now(), last_step: None }
     }
@@ -40,7 +46,11 @@ impl Checkpoints {
     ///
     /// # Errors
     /// [`CheckpointError`].
-    pub fn write(&mut self, simulation: &dyn Simulation, counters: Counters) -> Result<CheckpointRecord, CheckpointError> {
+    pub fn write(
+        &mut self,
+        simulation: &dyn Simulation,
+        counters: Counters,
+    ) -> Result<CheckpointRecord, CheckpointError> {
         let clock = simulation.clock();
         let folder = self.directory.join("checkpoints");
         std::fs::create_dir_all(&folder)?;

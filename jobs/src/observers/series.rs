@@ -33,7 +33,10 @@ impl Series {
         {
             File::open(earlier)?.take(bytes).read_to_end(&mut held)?;
             if held.len() as u64 != bytes {
-                return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the earlier series is shorter than its checkpoint says"));
+                return Err(io::Error::new(
+                    io::ErrorKind::UnexpectedEof,
+                    "the earlier series is shorter than its checkpoint says",
+                ));
             }
         }
         artifacts::write(&path, &held)?;

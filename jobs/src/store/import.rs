@@ -33,16 +33,22 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn import(&self, job: &str, epoch: u64, pace: &mut ProgressPace) -> Result<Imported, StoreError> {
-        let Some(row) = self.job(job)?.filter(|row| row.attempt == epoch) else { return Ok(Imported::default()) };
+        let Some(row) = self.job(job)?.filter(|row| row.attempt == epoch) else {
+            return Ok(Imported::default());
+        };
         let directory = crate::order::attempt_directory(&self.job_directory(job), epoch);
         let lines = records::read_from(&directory, row.records_offset)?;
-        let Some((_, end)) = lines.last() else { return Ok(Imported::default()) };
+        let Some((_, end)) = lines.last() else {
+            return Ok(Imported::default());
+        };
         let end = *end;
         let mut imported = Imported { any: true, ..Imported::default() };
         self.write(|transaction| -> Result<(), StoreError> {
             // The epoch and the offset are checked again inside the transaction: this is the fence.
             let changed = transaction
-                .prepare_cached("UPDATE jobs SET records_offset = ?4 WHERE id = ?1 AND attempt = ?2 AND records_offset = ?3")?
+                .prepare_cached(
+                    "UPDATE jobs SET records_offset = ?4 WHERE id = ?1 AND attempt = ?2 AND records_offset = ?3",
+                )?
                 .execute(params![job, epoch as i64, row.records_offset as i64, end as i64])?;
             if changed != 1 {
                 return Ok(());
@@ -144,8 +150,8 @@ fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Re
         Record::Started { frames, pid, step, .. } => {
             // Frames after the checkpoint are written again; until then they are not part of the job.
             let paths: Vec<String> = {
-                let mut statement =
-                    transaction.prepare_cached("SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path")?;
+                let mut statement = transaction
+                    .prepare_cached("SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path")?;
                 let rows = statement.query_map([job], |row| row.get(0))?;
                 rows.collect::<Result<_, _>>()?
             };
@@ -173,15 +179,20 @@ fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Re
                     file.step.map(|step| step as i64),
                 ])?;
             if file.step.is_some() {
-                let data = json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
+                let data =
+                    json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
                 events::append(transaction, job, epoch, "frame", &data)?;
             }
         }
         Record::Warning { code, message } => {
-            let warnings: String = transaction.query_row("SELECT warnings FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
+            let warnings: String =
+                transaction.query_row("SELECT warnings FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
             let mut warnings: Vec<String> = serde_json::from_str(&warnings)?;
             warnings.push(message.clone());
-            transaction.execute("UPDATE jobs SET warnings = ?2 WHERE id = ?1", params![job, serde_json::to_string(&warnings)?])?;
+            transaction.execute(
+                "UPDATE jobs SET warnings = ?2 WHERE id = ?1",
+                params![job, serde_json::to_string(&warnings)?],
+            )?;
             events::append(transaction, job, epoch, "warning", &json!({"code": code, "message": message}))?;
         }
         Record::Finding { name, message, time } => {
@@ -193,7 +204,12 @@ fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Re
     Ok(())
 }
 
-fn take_checkpoint(transaction: &Transaction, job: &str, epoch: u64, checkpoint: &CheckpointRecord) -> Result<(), StoreError> {
+fn take_checkpoint(
+    transaction: &Transaction,
+    job: &str,
+    epoch: u64,
+    checkpoint: &CheckpointRecord,
+) -> Result<(), StoreError> {
     transaction
         .prepare_cached(
             "INSERT OR REPLACE INTO checkpoints (id, job, attempt, path, step, time, size_bytes, sha256, created_at, isa, build)

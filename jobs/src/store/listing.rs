@@ -2,8 +2,8 @@
 
 use super::{JobRow, Store, StoreError, rows};
 use crate::job::State;
-use rusqlite::types::Value as SqlValue;
 use rusqlite::params_from_iter;
+use rusqlite::types::Value as SqlValue;
 
 /// Which jobs, in which order, from where on.
 #[derive(Debug, Clone, Default)]
@@ -79,7 +79,8 @@ impl Store {
     /// [`StoreError`].
     pub fn counts(&self) -> Result<Vec<(String, u64)>, StoreError> {
         let connection = self.read();
-        let mut statement = connection.prepare_cached("SELECT state, COUNT(*) FROM jobs GROUP BY state ORDER BY state")?;
+        let mut statement =
+            connection.prepare_cached("SELECT state, COUNT(*) FROM jobs GROUP BY state ORDER BY state")?;
         let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)? as u64)))?;
         Ok(rows.collect::<Result<_, _>>()?)
     }

@@ -179,12 +179,15 @@ fn checkpoint_of(row: &Row) -> rusqlite::Result<CheckpointRow> {
 }
 
 pub(super) fn checkpoint(connection: &Connection, id: &str) -> Result<Option<CheckpointRow>, StoreError> {
-    Ok(connection.prepare_cached("SELECT * FROM checkpoints WHERE id = ?1")?.query_row([id], checkpoint_of).optional()?)
+    Ok(connection
+        .prepare_cached("SELECT * FROM checkpoints WHERE id = ?1")?
+        .query_row([id], checkpoint_of)
+        .optional()?)
 }
 
 pub(super) fn checkpoints(connection: &Connection, job: &str) -> Result<Vec<CheckpointRow>, StoreError> {
-    let mut statement =
-        connection.prepare_cached("SELECT * FROM checkpoints WHERE job = ?1 ORDER BY step DESC, attempt DESC, id DESC")?;
+    let mut statement = connection
+        .prepare_cached("SELECT * FROM checkpoints WHERE job = ?1 ORDER BY step DESC, attempt DESC, id DESC")?;
     let rows = statement.query_map([job], checkpoint_of)?;
     Ok(rows.collect::<Result<_, _>>()?)
 }

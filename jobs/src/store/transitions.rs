@@ -125,7 +125,12 @@ impl Store {
     }
 }
 
-pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, change: &Change) -> Result<JobRow, ChangeError> {
+pub(super) fn apply(
+    transaction: &Transaction,
+    id: &str,
+    trigger: Trigger,
+    change: &Change,
+) -> Result<JobRow, ChangeError> {
     let job = rows::job(transaction, id)?.ok_or(ChangeError::NotFound)?;
     if change.epoch.is_some_and(|epoch| epoch != job.attempt) {
         return Err(ChangeError::Stale);

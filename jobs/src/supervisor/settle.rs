@@ -33,7 +33,9 @@ pub(super) fn settle(
     lost: Loss,
     draining: bool,
 ) -> Result<(), StoreError> {
-    let Some(row) = store.job(job)?.filter(|row| row.attempt == epoch) else { return Ok(()) };
+    let Some(row) = store.job(job)?.filter(|row| row.attempt == epoch) else {
+        return Ok(());
+    };
     let at = |reason: Option<Reason>, message: Option<String>| Change { reason, message, epoch: Some(epoch) };
     if row.state == State::Canceling {
         // Whatever the worker came to, it was canceled before.
@@ -62,13 +64,16 @@ pub(super) fn settle(
 }
 
 fn lose(store: &Store, row: &JobRow, lost: Loss) -> Result<(), StoreError> {
-    let at = |reason: Reason, message: Option<String>| Change { reason: Some(reason), message, epoch: Some(row.attempt) };
+    let at =
+        |reason: Reason, message: Option<String>| Change { reason: Some(reason), message, epoch: Some(row.attempt) };
     if matches!(lost.reason, Reason::LimitMemory | Reason::WorkerOom) {
         return change(store, &row.id, Trigger::Fail, &at(lost.reason, None)).map(|_| ());
     }
     let was_pausing = row.state == State::Pausing;
     let pause_reason = row.reason;
-    let Some(interrupted) = change(store, &row.id, Trigger::Lose, &at(lost.reason, None))? else { return Ok(()) };
+    let Some(interrupted) = change(store, &row.id, Trigger::Lose, &at(lost.reason, None))? else {
+        return Ok(());
+    };
     if lost.is_death {
         let deaths = store.count_death(&row.id, row.attempt)?;
         if deaths >= MOST_DEATHS {
@@ -105,7 +110,9 @@ pub(super) fn change(store: &Store, job: &str, trigger: Trigger, what: &Change) 
 
 /// Books the size of a job's files.
 pub(super) fn book_disk(store: &Store, job: &str, epoch: u64) -> Result<(), StoreError> {
-    let Some(row) = store.job(job)? else { return Ok(()) };
+    let Some(row) = store.job(job)? else {
+        return Ok(());
+    };
     let disk_bytes = process::directory_bytes(&store.job_directory(job));
     store.book_usage(job, epoch, &Usage { disk_bytes, ..row.usage })
 }

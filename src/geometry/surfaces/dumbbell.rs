@@ -63,11 +63,8 @@ impl<const D: usize> Surface<D> for Dumbbell<D> {
         };
         let in_balls = (plane[0].abs() - self.half_separation).hypot(plane[1]) < self.radius;
         let in_neck = plane[0].abs() < self.half_separation && plane[1] < self.neck_radius;
-        let curvature = if foot.bend > 0.0 {
-            (D as f64 - 1.0) / self.radius
-        } else {
-            (D as f64 - 2.0) / self.neck_radius
-        };
+        let curvature =
+            if foot.bend > 0.0 { (D as f64 - 1.0) / self.radius } else { (D as f64 - 2.0) / self.neck_radius };
         SurfacePoint {
             distance: if in_balls || in_neck { -foot.distance } else { foot.distance },
             point: self.center + lift(&foot.point),

@@ -46,7 +46,8 @@ impl<const D: usize> Ellipsoid<D> {
         let mut s = shortest * reach;
         for _ in 0..200 {
             let value = (0..D).filter(pulled).map(|i| (e[i] * y[i] / (s + gap[i])).powi(2)).sum::<f64>() - 1.0;
-            let slope: f64 = (0..D).filter(pulled).map(|i| -2.0 * (e[i] * y[i] / (s + gap[i])).powi(2) / (s + gap[i])).sum();
+            let slope: f64 =
+                (0..D).filter(pulled).map(|i| -2.0 * (e[i] * y[i] / (s + gap[i])).powi(2) / (s + gap[i])).sum();
             let next = s - value / slope;
             if !(next > s) {
                 break;

@@ -1,8 +1,6 @@
 //! Properties that every shape must have, each checked against something independent of its formulas.
 
-use super::{
-    Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, Vector, ZalesakDisk,
-};
+use super::{Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, Vector, ZalesakDisk};
 use crate::geometry::random::CounterRandom;
 
 fn plane_shapes() -> Vec<(&'static str, Box<dyn Surface<2>>)> {

@@ -26,16 +26,31 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         Kind::Number { above: None, least: Some(0.0), below: Some(0.5), most: None },
         DefaultValue::Json("0.3"),
     ),
-    Parameter::new("seed", "seed of the jitter", Kind::Integer { least: 0, most: 9_007_199_254_740_991 }, DefaultValue::Json("1")),
+    Parameter::new(
+        "seed",
+        "seed of the jitter",
+        Kind::Integer { least: 0, most: 9_007_199_254_740_991 },
+        DefaultValue::Json("1"),
+    ),
     Parameter::new(
         "initial",
         "level-set function at the start; quadric for ellipses and ellipsoids, else distance, when not given",
         Kind::Choice(initial_variants),
         DefaultValue::Absent,
     ),
-    Parameter::new("band_h", "width w of the narrow band in h; 12 when neither it nor band is given", POSITIVE, DefaultValue::Absent),
+    Parameter::new(
+        "band_h",
+        "width w of the narrow band in h; 12 when neither it nor band is given",
+        POSITIVE,
+        DefaultValue::Absent,
+    ),
     Parameter::new("band", "width w of the narrow band", POSITIVE, DefaultValue::Absent),
-    Parameter::restart_safe("repeat", "redistancings in a row", Kind::Integer { least: 1, most: 1_000_000 }, DefaultValue::Json("1")),
+    Parameter::restart_safe(
+        "repeat",
+        "redistancings in a row",
+        Kind::Integer { least: 1, most: 1_000_000 },
+        DefaultValue::Json("1"),
+    ),
     Parameter::new("method", "the method", Kind::Choice(method_variants), DefaultValue::Json("\"pcp\"")),
 ];
 
@@ -72,7 +87,8 @@ pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Val
         "sample_threshold_h": 1.5, "tolerance": 1e-14, "max_iterations": 1000
     });
     let mut preset = Map::from_iter([("jitter".to_owned(), json!(0.3)), ("method".to_owned(), method)]);
-    let own_neighborhood = given.get("method").is_some_and(|m| m.get("neighborhood").is_some() || m.get("cutoff_h").is_some());
+    let own_neighborhood =
+        given.get("method").is_some_and(|m| m.get("neighborhood").is_some() || m.get("cutoff_h").is_some());
     if !own_neighborhood {
         preset["method"]["neighborhood"] = json!({"type": "radius", "cutoff_h": cutoff});
     }

@@ -34,8 +34,11 @@ pub(super) fn understand(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Viola
 
 fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Result<Box<dyn Scene>, Vec<Violation>> {
     let mut violations = Vec::new();
-    let default_shape =
-        if D == 2 { json!({"type": "ellipse", "semi_axes": [0.75, 0.5]}) } else { json!({"type": "ellipsoid", "semi_axes": [0.75, 0.5, 0.5]}) };
+    let default_shape = if D == 2 {
+        json!({"type": "ellipse", "semi_axes": [0.75, 0.5]})
+    } else {
+        json!({"type": "ellipsoid", "semi_axes": [0.75, 0.5, 0.5]})
+    };
     let shape = written.shape.clone().unwrap_or(default_shape);
     if let Err(found) = shapes::surface::<D>(&shape, "/shape") {
         violations.extend(found);
@@ -61,7 +64,13 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Result<Box<d
         _ => {
             if !is_ellipse {
                 let detail = "the quadric belongs to circles, spheres, ellipses and ellipsoids";
-                violations.push(Violation::new("/initial", "conflict", detail, &json!(initial_name), json!(["distance", "scaled"])));
+                violations.push(Violation::new(
+                    "/initial",
+                    "conflict",
+                    detail,
+                    &json!(initial_name),
+                    json!(["distance", "scaled"]),
+                ));
             }
             quadric::<D>(&shape)
         }
@@ -71,7 +80,9 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Result<Box<d
         violations.push(Violation::new("/band", "conflict", detail, &json!(written.band), Value::Null));
     }
     let band = written.band.unwrap_or(written.band_h.unwrap_or(12.0) * written.spacing);
-    let Some(method) = method.filter(|_| violations.is_empty()) else { return Err(violations) };
+    let Some(method) = method.filter(|_| violations.is_empty()) else {
+        return Err(violations);
+    };
     resolved["dimension"] = json!(D);
     resolved["shape"] = shape.clone();
     resolved["initial"] = json!({"type": initial_name});

@@ -29,13 +29,23 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         Kind::Number { above: None, least: Some(0.0), below: Some(0.5), most: None },
         DefaultValue::Json("0"),
     ),
-    Parameter::new("seed", "seed of the jitter", Kind::Integer { least: 0, most: 9_007_199_254_740_991 }, DefaultValue::Json("1")),
+    Parameter::new(
+        "seed",
+        "seed of the jitter",
+        Kind::Integer { least: 0, most: 9_007_199_254_740_991 },
+        DefaultValue::Json("1"),
+    ),
     Parameter::restart_safe("end_time", "scene time at the end", POSITIVE, DefaultValue::Json("8")),
     Parameter::new("time_step", "Δt; end_time/240 when neither it nor steps is given", POSITIVE, DefaultValue::Absent),
     Parameter::new("steps", "number of equal steps, instead of time_step", STEPS, DefaultValue::Absent),
     Parameter::new("integrator", "path integrator", Kind::Choice(integrator_variants), DefaultValue::Json("\"rk4\"")),
     Parameter::new("band_h", "width w of the narrow band in h", POSITIVE, DefaultValue::Json("40")),
-    Parameter::new("redistance", "when to redistance", Kind::Choice(redistance_variants), DefaultValue::Json("\"auto\"")),
+    Parameter::new(
+        "redistance",
+        "when to redistance",
+        Kind::Choice(redistance_variants),
+        DefaultValue::Json("\"auto\""),
+    ),
     Parameter::new(
         "field",
         "dual: a transported value that is never touched, distances apart; overwrite: the distance replaces it (the paper)",
@@ -49,7 +59,12 @@ static FLOWS: &[Variant] = &[
     Variant {
         name: "single_vortex",
         doc: "the spiraling vortex in the unit square (2D)",
-        parameters: &[Parameter::new("period", "T of the reversal; null never turns; 8 when not given", POSITIVE, DefaultValue::JsonOrNull("8"))],
+        parameters: &[Parameter::new(
+            "period",
+            "T of the reversal; null never turns; 8 when not given",
+            POSITIVE,
+            DefaultValue::JsonOrNull("8"),
+        )],
     },
     Variant {
         name: "rotation",
@@ -113,7 +128,8 @@ pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Val
         "type": "pcp", "degree": 4, "basis": "minter", "weight": 0, "minimum_ratio": 1,
         "sample_threshold_h": 1.5, "tolerance": 1e-10, "max_iterations": 100
     });
-    let own_neighborhood = given.get("method").is_some_and(|m| m.get("neighborhood").is_some() || m.get("cutoff_h").is_some());
+    let own_neighborhood =
+        given.get("method").is_some_and(|m| m.get("neighborhood").is_some() || m.get("cutoff_h").is_some());
     if !own_neighborhood {
         method["neighborhood"] = json!({"type": "radius", "cutoff_h": 15});
     }

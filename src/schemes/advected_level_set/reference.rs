@@ -110,7 +110,9 @@ impl<const D: usize> ExactFront<'_, D> {
 
 impl<const D: usize> AdvectedFront<D> {
     fn distance(&self, x: &Vector<D>) -> f64 {
-        let Some((nearest, distance)) = self.cells.nearest(x, f64::INFINITY) else { return f64::INFINITY };
+        let Some((nearest, distance)) = self.cells.nearest(x, f64::INFINITY) else {
+            return f64::INFINITY;
+        };
         let chord = |k: usize| {
             let (a, b) = (self.points[k], self.points[k + 1]);
             let along = b - a;

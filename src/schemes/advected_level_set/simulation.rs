@@ -5,8 +5,8 @@ use crate::closest_point::enclosed_measure::enclosed_measure;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, entry, rescued};
 use crate::simulation::state::check_length;
 use crate::simulation::{
-    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, OutputPlan, Phases, Report, RestoreError, Simulation, State,
-    StepError,
+    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, OutputPlan, Phases, Report, RestoreError, Simulation,
+    State, StepError,
 };
 use crate::time::{Clock, FixedStep};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
@@ -20,8 +20,9 @@ pub struct AdvectedLevelSet<const D: usize> {
     step: u64,
     /// Step of the last redistancing; the start counts as one, since its distances are exact.
     redistanced: u64,
-    /// Enclosed measure at the last redistancing that was asked for it.
+    /// Enclosed measure at the last redistancing that was asked for it, and the step of that.
     measure: f64,
+    measured: u64,
     max_cfl: f64,
     errors: Vec<MeasuredErrors>,
     phases: Phases,
@@ -75,7 +76,19 @@ impl<const D: usize> AdvectedLevelSet<D> {
     ) -> Self {
         let measure = system.motion.surface().measure();
         let phases = Phases::new(cpu_clock);
-        Self { system, fixed, plan, step: 0, redistanced: 0, measure, max_cfl: 0.0, errors: Vec::new(), phases, method }
+        Self {
+            system,
+            fixed,
+            plan,
+            step: 0,
+            redistanced: 0,
+            measure,
+            measured: 0,
+            max_cfl: 0.0,
+            errors: Vec::new(),
+            phases,
+            method,
+        }
     }
 
     /// Whether the step that ends at `step` redistances.
@@ -84,7 +97,9 @@ impl<const D: usize> AdvectedLevelSet<D> {
         match (self.system.when, self.system.field) {
             (RedistanceWhen::ForOutput, _) => needed,
             // Overwriting for a frame would make the output part of the physics: such frames use a copy.
-            (RedistanceWhen::Every(every), FieldChoice::Overwrite) => step.is_multiple_of(every) || step >= self.fixed.steps,
+            (RedistanceWhen::Every(every), FieldChoice::Overwrite) => {
+                step.is_multiple_of(every) || step >= self.fixed.steps
+            }
             (RedistanceWhen::Every(every), FieldChoice::Dual) => step.is_multiple_of(every) || needed,
         }
     }
@@ -106,7 +121,9 @@ impl<const D: usize> AdvectedLevelSet<D> {
 
     fn measure_errors(&mut self, time: f64) {
         let system = &self.system;
-        let Some(front) = system.motion.front(time, system.spacing) else { return };
+        let Some(front) = system.motion.front(time, system.spacing) else {
+            return;
+        };
         let particles = &system.particles;
         let band = particles.flag(system.columns.in_band);
         let phi = particles.scalar(system.columns.phi);
@@ -162,6 +179,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
                 let system = &self.system;
                 self.measure =
                     self.phases.measure("measure", || enclosed_measure(&system.redistancing, system.spacing));
+                self.measured = next.step;
             }
             if error_due {
                 let start = (self.phases.clock())();
@@ -176,12 +194,16 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     fn observables(&self) -> Observables {
         let exact = self.system.motion.surface().measure();
         let band = self.system.particles.flag(self.system.columns.in_band);
+        // Between redistancings nobody knows the surface, and a stale number would look like knowledge.
+        let known = |fresh: bool, value: f64| if fresh { value } else { f64::NAN };
+        let is_measured = self.measured == self.step;
+        let in_band = known(self.redistanced == self.step, band.iter().map(|b| f64::from(*b)).sum());
         vec![
             ("time", self.clock().time),
             ("time_step", self.fixed.time_step),
-            (if D == 2 { "area" } else { "volume" }, self.measure),
-            ("volume_drift", (self.measure - exact) / exact),
-            ("band_particles", band.iter().map(|b| f64::from(*b)).sum()),
+            (if D == 2 { "area" } else { "volume" }, known(is_measured, self.measure)),
+            ("volume_drift", known(is_measured, (self.measure - exact) / exact)),
+            ("band_particles", in_band),
             ("cfl", self.max_cfl),
             ("rescued_fits", rescued(self.system.redistancing.counts()) as f64),
         ]
@@ -212,7 +234,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         state.push_particles(&self.system.particles);
         let surface = &self.system.redistancing;
         state.push_counts("rescues", surface.counts().entries().iter().map(|e| e.1).collect());
-        state.push_counts("redistanced", vec![self.redistanced]);
+        state.push_counts("redistanced", vec![self.redistanced, self.measured]);
         state.push_reals("monitors", &[self.measure, self.max_cfl, surface.worst_condition()]);
         let errors: Vec<f64> = self.errors.iter().flat_map(|e| e.to_numbers()).collect();
         state.push_reals("errors", &errors);
@@ -227,7 +249,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let (rescues, redistanced) = (state.counts("rescues")?, state.counts("redistanced")?);
         let (monitors, errors) = (state.reals("monitors")?, state.reals("errors")?);
         check_length("rescues", rescues.len(), surface.counts().entries().len())?;
-        check_length("redistanced", redistanced.len(), 1)?;
+        check_length("redistanced", redistanced.len(), 2)?;
         check_length("monitors", monitors.len(), 3)?;
         check_length("errors", errors.len(), errors.len() / MeasuredErrors::NUMBERS * MeasuredErrors::NUMBERS)?;
         state.pull_particles(&mut self.system.particles)?;
@@ -236,6 +258,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         self.measure = monitors[0];
         self.max_cfl = monitors[1];
         self.redistanced = redistanced[0];
+        self.measured = redistanced[1];
         self.errors = errors.chunks_exact(MeasuredErrors::NUMBERS).map(MeasuredErrors::from_numbers).collect();
         self.step = state.step;
         Ok(())

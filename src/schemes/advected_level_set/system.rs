@@ -137,7 +137,8 @@ impl<const D: usize> AdvectedSystem<D> {
         phases.measure("redistancing/regression", || surface.fit_samples(positions, psi, interrupt))?;
         let answers = &mut self.answers;
         // Whoever is nearer than w/2 to a sample is asked for the exact distance (PCP 3.4).
-        phases.measure("redistancing/query", || surface.closest_points(positions, self.half_band, answers, interrupt))?;
+        phases
+            .measure("redistancing/query", || surface.closest_points(positions, self.half_band, answers, interrupt))?;
         self.columns.store(&mut self.particles, self.psi, &self.answers, self.half_band);
         if self.field == FieldChoice::Overwrite {
             for i in 0..self.particles.len() {

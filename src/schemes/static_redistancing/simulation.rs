@@ -3,7 +3,8 @@
 use super::system::StaticSystem;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, rescued};
 use crate::simulation::{
-    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State, StepError,
+    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State,
+    StepError,
 };
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
@@ -115,7 +116,8 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
     fn observables(&self) -> Observables {
         let counts = self.system.redistancing.counts();
         let errors = self.errors();
-        let of_phi = |norm: &str| errors.iter().find(|e| e.quantity == "phi" && e.norm == norm).map_or(0.0, |e| e.value);
+        let of_phi =
+            |norm: &str| errors.iter().find(|e| e.quantity == "phi" && e.norm == norm).map_or(0.0, |e| e.value);
         vec![
             ("time", self.clock().time),
             ("phi_error_rms", of_phi("rms")),

@@ -1,0 +1,193 @@
+//! What every scene must do, whatever it is: run its example, go on from any step bit for bit, not depend on the
+//! number of threads, and declare defaults that are valid.
+#![expect(missing_docs, reason = "a test")]
+
+#[path = "support/mod.rs"]
+mod support;
+
+use meniscus::scene::schema::{Default, Kind, Parameter};
+use meniscus::scenes::SCENES;
+use meniscus::simulation::{OutputPlan, Simulation, State};
+use serde_json::{Value, json};
+use support::{build, pool, scene};
+
+const PLAN: OutputPlan = OutputPlan { every_time: Some(0.21), series_every_steps: 3 };
+
+/// Scenes that between them use every choice which feeds back into the state.
+fn bodies() -> Vec<Value> {
+    let mut bodies: Vec<Value> =
+        SCENES.iter().map(|kind| serde_json::from_str::<Value>(kind.example).unwrap()["scene"].clone()).collect();
+    let vortex = |extra: Value| {
+        let mut body = json!({"kind": "vortex", "spacing": 0.05, "band_h": 16, "end_time": 1, "steps": 12});
+        body.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+        body
+    };
+    bodies.push(vortex(json!({"field": "overwrite"})));
+    bodies.push(vortex(
+        json!({"field": "overwrite", "redistance": {"type": "every", "steps": 5}, "integrator": "tvd_rk2"}),
+    ));
+    bodies.push(vortex(json!({"redistance": {"type": "every", "steps": 4}, "integrator": "dopri5", "jitter": 0.2})));
+    bodies.push(vortex(json!({"flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3}})));
+    bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
+    bodies.push(json!({
+        "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,
+        "shape": {"type": "sphere", "radius": 0.4}, "flow": {"type": "translation", "velocity": [1, 0, 0.5]},
+        "field": "overwrite", "method": {"type": "pcp", "degree": 2}
+    }));
+    bodies
+}
+
+fn states(body: &Value, threads: usize) -> Vec<State> {
+    pool(threads).install(|| {
+        let mut simulation = build(body, PLAN);
+        let mut states = vec![simulation.state()];
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+            states.push(simulation.state());
+        }
+        states
+    })
+}
+
+/// Equality to the last bit, NaN included.
+fn assert_same(a: &State, b: &State, what: &str) {
+    assert_eq!((a.step, a.time.to_bits()), (b.step, b.time.to_bits()), "{what}");
+    assert_eq!(a.counts, b.counts, "{what}, step {}", a.step);
+    assert_eq!(a.reals.len(), b.reals.len());
+    for (x, y) in a.reals.iter().zip(&b.reals) {
+        assert_eq!(x.name, y.name);
+        let place = x.values.iter().zip(&y.values).position(|(x, y)| x.to_bits() != y.to_bits());
+        assert_eq!(place, None, "{what}: {} differs at step {}", x.name, a.step);
+    }
+}
+
+#[test]
+fn every_example_runs_to_its_end_with_finite_results() {
+    for kind in SCENES {
+        let body: Value = serde_json::from_str(kind.example).unwrap();
+        pool(2).install(|| {
+            let mut simulation = build(&body["scene"], PLAN);
+            while !simulation.is_finished() {
+                simulation.step().unwrap();
+            }
+            let report = simulation.report();
+            assert!(report.health.finite, "{}", kind.kind);
+            assert!(report.errors.iter().all(|e| e.value.is_finite()), "{}: {:?}", kind.kind, report.errors);
+            assert!(!report.errors.is_empty(), "{}", kind.kind);
+            let names: Vec<&str> = simulation.fields().columns.iter().map(|c| c.name).collect();
+            let mut promised = scene(&body["scene"]).field_names();
+            promised.sort_unstable();
+            let mut shown = names.clone();
+            shown.sort_unstable();
+            assert_eq!(shown, promised, "{}", kind.kind);
+        });
+    }
+}
+
+#[test]
+fn k_steps_and_a_restore_and_the_rest_equal_the_unbroken_run_for_1_2_and_3_threads() {
+    for body in bodies() {
+        let unbroken = states(&body, 1);
+        for threads in [2, 3] {
+            for (a, b) in states(&body, threads).iter().zip(&unbroken) {
+                assert_same(a, b, &format!("{threads} threads, {body}"));
+            }
+        }
+        let last = unbroken.len() - 1;
+        for k in [0, 1, last / 2, last - 1, last] {
+            let threads = 1 + k % 3;
+            pool(threads).install(|| {
+                let mut simulation = build(&body, PLAN);
+                simulation.restore(&unbroken[k]).unwrap();
+                assert_same(&simulation.state(), &unbroken[k], "restored");
+                while !simulation.is_finished() {
+                    simulation.step().unwrap();
+                }
+                assert_same(
+                    &simulation.state(),
+                    &unbroken[last],
+                    &format!("restart at {k} on {threads} threads, {body}"),
+                );
+            });
+        }
+    }
+}
+
+#[test]
+fn looking_changes_nothing() {
+    for body in bodies() {
+        pool(2).install(|| {
+            let mut watched = build(&body, PLAN);
+            while !watched.is_finished() {
+                watched.step().unwrap();
+                let (fields, again) = (watched.fields(), watched.fields());
+                assert_eq!(fields.points, again.points);
+                let _ = (watched.observables(), watched.report(), watched.health());
+            }
+            assert_same(&watched.state(), states(&body, 1).last().unwrap(), &body.to_string());
+        });
+    }
+}
+
+#[test]
+fn a_state_of_another_scene_is_refused_and_nothing_changes() {
+    let small = build(&json!({"kind": "redistance", "spacing": 0.1}), PLAN);
+    let mut large = build(&json!({"kind": "redistance", "spacing": 0.05}), PLAN);
+    let before = large.state();
+    assert!(large.restore(&small.state()).unwrap_err().to_string().contains("numbers, this scene needs"));
+    assert_same(&large.state(), &before, "after a refused restore");
+    let mut vortex = build(&json!({"kind": "vortex", "spacing": 0.1}), PLAN);
+    assert!(vortex.restore(&small.state()).is_err());
+    let mut beyond = before.clone();
+    beyond.step = 99;
+    assert!(large.restore(&beyond).unwrap_err().to_string().contains("ends at step 1"));
+}
+
+#[test]
+fn an_interrupt_drops_the_step() {
+    let context = meniscus::scene::BuildContext {
+        plan: PLAN,
+        interrupt: meniscus::parallel::Interrupt::default(),
+        cpu_clock: meniscus::simulation::CpuClock::still(),
+    };
+    let mut simulation = scene(&json!({"kind": "redistance"})).build(context.clone()).unwrap();
+    context.interrupt.raise();
+    assert_eq!(simulation.step().unwrap_err(), meniscus::simulation::StepError::Interrupted);
+}
+
+/// Every default that a scene declares is accepted by its own declaration, at every depth.
+#[test]
+fn declared_defaults_are_valid() {
+    fn walk(parameters: &'static [Parameter], place: &str) {
+        for parameter in parameters {
+            let place = format!("{place}/{}", parameter.name);
+            if let Default::Json(text) | Default::JsonOrNull(text) = parameter.default {
+                let value: Value = serde_json::from_str(text).unwrap_or_else(|e| panic!("{place}: {e}"));
+                let mut violations = Vec::new();
+                let given = serde_json::Map::from_iter([(parameter.name.to_owned(), value)]);
+                meniscus::scene::check(std::slice::from_ref(parameter), &given, "", &mut violations);
+                assert!(violations.is_empty(), "{place}: {violations:?}");
+            }
+            if let Kind::Choice(variants) | Kind::Choices { variants, .. } = parameter.kind {
+                for variant in variants() {
+                    walk(variant.parameters, &format!("{place}/{}", variant.name));
+                }
+            }
+        }
+    }
+    for kind in SCENES {
+        walk(kind.parameters, kind.kind);
+        for preset in kind.presets {
+            scene(&json!({"kind": kind.kind, "preset": preset, "spacing": 0.1}));
+        }
+    }
+}
+
+#[test]
+fn estimates_of_particles_are_within_five_per_cent() {
+    for body in bodies() {
+        let estimated = scene(&body).estimate().particles as f64;
+        let made = build(&body, PLAN).particle_count() as f64;
+        assert!((estimated / made - 1.0).abs() < 0.05, "{estimated} for {made}: {body}");
+    }
+}

@@ -1,0 +1,20 @@
+//! The HTTP contract, on the real binary over a real socket.
+#![expect(missing_docs, reason = "a test")]
+
+#[path = "../support/service.rs"]
+#[expect(dead_code, reason = "each test target uses a part")]
+mod support;
+
+mod files;
+mod jobs;
+mod readers;
+mod requests;
+
+use support::Service;
+
+/// A service on a directory of its own.
+fn service(arguments: &[&str]) -> (tempfile::TempDir, Service) {
+    let directory = tempfile::tempdir().unwrap();
+    let service = Service::start(directory.path(), arguments);
+    (directory, service)
+}

@@ -1,0 +1,264 @@
+//! The real binary over a real socket, in a data directory of its own.
+
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// The program under test: built by the Makefile with debug assertions, `MENISCUS_BIN` says where.
+pub fn program() -> PathBuf {
+    let beside = || {
+        let mut path = std::env::current_exe().unwrap();
+        path.pop();
+        path.pop();
+        path.join("meniscus")
+    };
+    let path = std::env::var_os("MENISCUS_BIN").map_or_else(beside, PathBuf::from);
+    assert!(
+        path.is_file(),
+        "{} is not there: run `make test`, or `cargo build --profile test -p meniscus-api` first",
+        path.display()
+    );
+    path
+}
+
+pub struct Service {
+    child: Child,
+    pub url: String,
+    pub data: PathBuf,
+    arguments: Vec<String>,
+    agent: ureq::Agent,
+}
+
+pub struct Answer {
+    pub status: u16,
+    pub headers: ureq::http::HeaderMap,
+    pub bytes: Vec<u8>,
+}
+
+impl Answer {
+    pub fn json(&self) -> Value {
+        serde_json::from_slice(&self.bytes).unwrap_or_else(|e| panic!("{e}: {}", self.text()))
+    }
+
+    pub fn text(&self) -> String {
+        String::from_utf8_lossy(&self.bytes).into_owned()
+    }
+
+    pub fn header(&self, name: &str) -> Option<&str> {
+        self.headers.get(name).and_then(|v| v.to_str().ok())
+    }
+
+    /// The pointers of a problem's errors.
+    pub fn pointers(&self) -> Vec<String> {
+        self.json()["errors"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .map(|e| e["pointer"].as_str().unwrap().to_owned())
+            .collect()
+    }
+}
+
+fn launch(data: &Path, arguments: &[String]) -> (Child, String) {
+    let mut child = Command::new(program())
+        .args(["serve", "--bind", "127.0.0.1:0", "--data"])
+        .arg(data)
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::from(
+            std::fs::OpenOptions::new().create(true).append(true).open(data.join("service.log")).unwrap(),
+        ))
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    let url = line.trim().strip_prefix("listening on ").unwrap_or_else(|| panic!("first line: {line:?}")).to_owned();
+    (child, url)
+}
+
+impl Service {
+    pub fn start(data: &Path, arguments: &[&str]) -> Self {
+        let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
+        let (child, url) = launch(data, &arguments);
+        let agent = ureq::Agent::config_builder().http_status_as_error(false).max_redirects(0).build().into();
+        let service = Self { child, url, data: data.to_owned(), arguments, agent };
+        service.wait_ready();
+        service
+    }
+
+    fn wait_ready(&self) {
+        eventually("the service is ready", Duration::from_secs(20), || {
+            (self.get("/readyz").status == 200).then_some(())
+        });
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// `kill -9`, and a new service on the same directory.
+    pub fn kill_and_restart(&mut self) {
+        self.kill();
+        self.restart();
+    }
+
+    pub fn kill(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    pub fn restart(&mut self) {
+        (self.child, self.url) = launch(&self.data, &self.arguments);
+        self.wait_ready();
+    }
+
+    /// SIGTERM, and the wait for an orderly end.
+    pub fn stop(&mut self) -> bool {
+        signal(self.pid(), rustix::process::Signal::TERM);
+        let deadline = Instant::now() + Duration::from_secs(30);
+        while Instant::now() < deadline {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status.success();
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        false
+    }
+
+    pub fn request(&self, method: &str, path: &str, headers: &[(&str, &str)], body: Option<&[u8]>) -> Answer {
+        let mut builder = ureq::http::Request::builder().method(method).uri(format!("{}{path}", self.url));
+        for (name, value) in headers {
+            builder = builder.header(*name, *value);
+        }
+        let answer = match body {
+            Some(body) => self.agent.run(builder.body(body).unwrap()),
+            None => self.agent.run(builder.body(()).unwrap()),
+        };
+        let mut answer = answer.unwrap_or_else(|e| panic!("{method} {path}: {e}"));
+        let mut bytes = Vec::new();
+        answer.body_mut().as_reader().read_to_end(&mut bytes).unwrap();
+        Answer { status: answer.status().as_u16(), headers: answer.headers().clone(), bytes }
+    }
+
+    pub fn get(&self, path: &str) -> Answer {
+        self.request("GET", path, &[], None)
+    }
+
+    pub fn post(&self, path: &str, body: &Value) -> Answer {
+        self.request("POST", path, &[("content-type", "application/json")], Some(body.to_string().as_bytes()))
+    }
+
+    pub fn submit(&self, body: &Value) -> String {
+        let answer = self.post("/v1/jobs", body);
+        assert_eq!(answer.status, 201, "{}", answer.text());
+        answer.json()["id"].as_str().unwrap().to_owned()
+    }
+
+    pub fn job(&self, id: &str) -> Value {
+        let answer = self.get(&format!("/v1/jobs/{id}"));
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        answer.json()
+    }
+
+    pub fn act(&self, id: &str, action: &str) -> Answer {
+        self.request("POST", &format!("/v1/jobs/{id}/{action}"), &[], Some(b""))
+    }
+
+    /// Waits until the job is in one of the states, and fails at any other terminal one.
+    pub fn wait_for(&self, id: &str, states: &[&str]) -> Value {
+        eventually(&format!("{id} is {states:?}"), Duration::from_secs(120), || {
+            let job = self.job(id);
+            let state = job["state"].as_str().unwrap();
+            let terminal = ["succeeded", "failed", "canceled"].contains(&state);
+            assert!(states.contains(&state) || !terminal, "{id} is {state}: {} {}", job["reason"], job["message"]);
+            states.contains(&state).then_some(job)
+        })
+    }
+
+    pub fn files(&self, id: &str) -> Vec<Value> {
+        self.get(&format!("/v1/jobs/{id}/files")).json()["items"].as_array().unwrap().clone()
+    }
+
+    /// Digests of all frames, by path.
+    pub fn frames(&self, id: &str) -> Vec<(String, String)> {
+        self.files(id)
+            .iter()
+            .filter(|f| f["path"].as_str().unwrap().starts_with("frames/"))
+            .map(|f| (f["path"].as_str().unwrap().to_owned(), f["sha256"].as_str().unwrap().to_owned()))
+            .collect()
+    }
+
+    pub fn series(&self, id: &str) -> String {
+        self.get(&format!("/v1/jobs/{id}/series")).text()
+    }
+
+    pub fn events(&self, id: &str) -> Vec<Value> {
+        let mut all = Vec::new();
+        let mut after = 0;
+        loop {
+            let page = self.get(&format!("/v1/jobs/{id}/events?after={after}&limit=1000")).json();
+            all.extend(page["items"].as_array().unwrap().clone());
+            match page["next"].as_u64() {
+                Some(next) => after = next,
+                None => return all,
+            }
+        }
+    }
+
+    /// The process of the job's worker, once there is one for the present attempt.
+    pub fn worker(&self, id: &str) -> Option<u32> {
+        let attempt = self.job(id)["attempt"].as_u64().unwrap();
+        let directory = self.data.join("jobs").join(id).join("attempts").join(attempt.to_string());
+        let wanted = std::fs::canonicalize(directory).ok()?;
+        std::fs::read_dir("/proc").unwrap().flatten().find_map(|entry| {
+            let pid: u32 = entry.file_name().to_str()?.parse().ok()?;
+            let command = std::fs::read(entry.path().join("cmdline")).ok()?;
+            command.split(|b| *b == 0).any(|word| word == wanted.as_os_str().as_encoded_bytes()).then_some(pid)
+        })
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+pub fn signal(pid: u32, signal: rustix::process::Signal) {
+    let pid = rustix::process::Pid::from_raw(pid.cast_signed()).unwrap();
+    // It may be gone.
+    let _ = rustix::process::kill_process(pid, signal);
+}
+
+pub fn eventually<R>(what: &str, patience: Duration, mut look: impl FnMut() -> Option<R>) -> R {
+    let deadline = Instant::now() + patience;
+    loop {
+        if let Some(result) = look() {
+            return result;
+        }
+        assert!(Instant::now() < deadline, "it never came true that {what}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// A job of about two seconds with frames, series and many checkpoints, whose physics feeds back into itself.
+pub fn steady_job() -> Value {
+    json!({
+        "scene": {"kind": "redistance", "spacing": 0.03125, "repeat": 240},
+        "output": {"every_time": 60, "series_every_steps": 7},
+        "checkpoint": {"every_wall_s": 0.05}
+    })
+}
+
+/// A job whose only step takes minutes: fits of 165 coefficients about tens of thousands of particles.
+pub fn endless_job() -> Value {
+    json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.015625, "method": {"type": "pcp", "degree": 8}}})
+}
+
+/// A number in [0, 1) from a seed and a counter, printed seeds make a run repeatable.
+pub fn chance(seed: u64, counter: u64) -> f64 {
+    0.5 + 0.5 * meniscus::geometry::random::CounterRandom::new(seed).symmetric(&[counter.cast_signed()])
+}
