@@ -29,8 +29,11 @@ pub struct SceneKind {
     /// A small job body that runs in seconds.
     pub example: &'static str,
     /// From checked parameters (all defaults present) to a scene.
-    pub understand: fn(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Violation>>,
+    pub understand: fn(parameters: &Value) -> Understood,
 }
+
+/// A scene, or all that is wrong with its parameters.
+pub type Understood = Result<Box<dyn Scene>, Vec<Violation>>;
 
 /// A valid scene.
 pub trait Scene: Send + Sync {
@@ -83,7 +86,7 @@ pub struct Estimate {
 ///
 /// # Errors
 /// All violations at once.
-pub fn understand(value: &Value, kinds: &[&'static SceneKind]) -> Result<Box<dyn Scene>, Vec<Violation>> {
+pub fn understand(value: &Value, kinds: &[&'static SceneKind]) -> Understood {
     let Value::Object(given) = value else {
         return Err(vec![Violation::new("", "type", "a scene is an object", value, "an object with a kind".into())]);
     };

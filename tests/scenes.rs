@@ -1,13 +1,14 @@
 //! What every scene must do, whatever it is: run its example, go on from any step bit for bit, not depend on the
 //! number of threads, and declare defaults that are valid.
-#![expect(missing_docs, reason = "a test")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "support/mod.rs"]
+#[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
 use meniscus::scene::schema::{Default, Kind, Parameter};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::{OutputPlan, Simulation, State};
+use meniscus::simulation::{OutputPlan, State};
 use serde_json::{Value, json};
 use support::{build, pool, scene};
 
@@ -180,6 +181,19 @@ fn declared_defaults_are_valid() {
         for preset in kind.presets {
             scene(&json!({"kind": kind.kind, "preset": preset, "spacing": 0.1}));
         }
+    }
+}
+
+/// A restart takes its scene from what was resolved before: the same must come out again.
+#[test]
+fn what_is_resolved_resolves_to_itself() {
+    let mut bodies = bodies();
+    bodies.push(json!({"kind": "vortex", "preset": "paper"}));
+    bodies.push(json!({"kind": "redistance", "preset": "paper", "dimension": 3}));
+    bodies.push(json!({"kind": "redistance", "shape": {"type": "box", "size": [1, 1]}, "band": 0.3}));
+    for body in bodies {
+        let once = scene(&body).resolved();
+        assert_eq!(scene(&once).resolved(), once, "{body}");
     }
 }
 

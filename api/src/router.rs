@@ -8,6 +8,7 @@ use axum::http::{HeaderName, HeaderValue, Method};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::{Json, Router};
+use serde_json::Value;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -49,10 +50,19 @@ fn documented() -> OpenApiRouter<Application> {
         .routes(routes!(checkpoints::content))
 }
 
+/// The document as clients read it: a wildcard `{*path}` is axum's spelling of the parameter `{path}`.
+fn published(document: &utoipa::openapi::OpenApi) -> Value {
+    let mut document = serde_json::to_value(document).unwrap_or_default();
+    if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
+        *paths = std::mem::take(paths).into_iter().map(|(path, item)| (path.replace("{*", "{"), item)).collect();
+    }
+    document
+}
+
 /// The whole service.
 pub fn router(application: Application) -> Router {
     let (routes, document) = documented().split_for_parts();
-    let document = Json(serde_json::to_value(document).unwrap_or_default());
+    let document = Json(published(&document));
     routes
         .route("/openapi.json", axum::routing::get(move || async move { document }))
         .fallback(|| async { ApiError::NotFound("resource") })
@@ -90,12 +100,13 @@ async fn with_request_id(request: Request, next: Next) -> Response {
 
 #[cfg(test)]
 mod tests {
-    use super::documented;
+    use super::{documented, published};
 
     #[test]
     fn the_document_is_openapi_31_and_names_every_schema_it_uses() {
         let (_, document) = documented().split_for_parts();
-        let json = serde_json::to_value(&document).unwrap();
+        let json = published(&document);
+        assert!(json["paths"]["/v1/jobs/{id}/files/{path}"]["get"].is_object());
         assert!(json["openapi"].as_str().unwrap().starts_with("3.1"));
         let text = json.to_string();
         for reference in text.split("\"#/components/schemas/").skip(1) {

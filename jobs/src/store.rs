@@ -134,21 +134,18 @@ impl Store {
     /// [`StoreError`].
     pub fn submit(&self, body: &JobBody) -> Result<JobRow, StoreError> {
         let id = format!("job_{}", self.next_id());
+        let mut restart_sha256 = None;
         if let Some(checkpoint) = &body.restarted_from {
-            let (row, job) = {
-                let connection = self.read();
-                let row = rows::checkpoint(&connection, checkpoint)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
-                let job = row.job.clone();
-                (row, job)
-            };
+            let row = self.checkpoint(checkpoint)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
             let folder = self.job_directory(&id);
             std::fs::create_dir_all(&folder)?;
-            let source = self.job_directory(&job).join("attempts").join(row.attempt.to_string()).join(&row.path);
+            let source = crate::order::attempt_directory(&self.job_directory(&row.job), row.attempt).join(&row.path);
             let target = folder.join(START_CHECKPOINT);
             if std::fs::hard_link(&source, &target).is_err() {
                 std::fs::copy(&source, &target)?;
             }
             crate::artifacts::sync_directory(&folder)?;
+            restart_sha256 = Some(row.sha256);
         }
         let now = crate::clock::now();
         self.write(|transaction| {
@@ -158,8 +155,8 @@ impl Store {
             });
             transaction
                 .prepare_cached(
-                    "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at, restarted_from)
-                     VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+                    "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at, restarted_from, restart_sha256)
+                     VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
                 )?
                 .execute(params![
                     id,
@@ -172,6 +169,7 @@ impl Store {
                     body.priority,
                     now,
                     body.restarted_from,
+                    restart_sha256,
                 ])?;
             events::append(transaction, &id, 0, "state", &json!({"from": Value::Null, "to": State::Queued.word()}))?;
             rows::job(transaction, &id)?.ok_or_else(|| rusqlite::Error::QueryReturnedNoRows.into())

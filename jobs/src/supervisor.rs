@@ -322,7 +322,7 @@ impl Supervisor {
             checkpoints.push(StartCheckpoint {
                 id: id.clone(),
                 path: job_directory.join(START_CHECKPOINT),
-                sha256: None,
+                sha256: job.restart_sha256.clone(),
                 is_own: false,
                 allow_other_isa,
             });

@@ -175,7 +175,7 @@ impl<const D: usize> Regression<D> {
                 if neighbors.len() > count {
                     neighbors.select_nth_unstable_by(count - 1, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                     neighbors.truncate(count);
-                    neighbors.sort_unstable_by(|a, b| a.1.cmp(&b.1));
+                    neighbors.sort_unstable_by_key(|n| n.1);
                 }
                 let farthest = neighbors.iter().map(|n| n.0).fold(0.0, f64::max).sqrt();
                 (farthest.max(self.spacing * 1e-3), 0)

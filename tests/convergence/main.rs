@@ -1,6 +1,6 @@
 //! Orders of accuracy by fitted slopes against exact surfaces. Max norms of one random cloud scatter between two
 //! levels, so slopes are fitted over five and judged by the root mean square.
-#![expect(missing_docs, reason = "a test")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,5 +1,5 @@
 //! What must survive: `kill -9` at any moment, damaged checkpoints, an orderly shutdown in the middle of work.
-#![expect(missing_docs, reason = "a test")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../support/service.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]
@@ -152,7 +152,8 @@ fn an_orderly_shutdown_checkpoints_and_requeues() {
 
 fn checkpoint_files(service: &Service, id: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
-    for attempt in std::fs::read_dir(service.data.join("jobs").join(id).join("attempts")).unwrap().flatten() {
+    let attempts = service.data.join("jobs").join(id).join("attempts");
+    for attempt in std::fs::read_dir(attempts).into_iter().flatten().flatten() {
         for entry in std::fs::read_dir(attempt.path().join("checkpoints")).into_iter().flatten().flatten() {
             if entry.path().extension().is_some_and(|e| e == "h5") {
                 files.push(entry.path());
@@ -162,6 +163,8 @@ fn checkpoint_files(service: &Service, id: &str) -> Vec<PathBuf> {
     files.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     files
 }
+
+type Damage = fn(&Path);
 
 fn truncate(path: &Path) {
     let length = std::fs::metadata(path).unwrap().len();
@@ -181,7 +184,7 @@ fn damaged_checkpoints_fall_back_to_the_one_before_and_at_last_to_the_start() {
     let service = Service::start(directory.path(), &["--slots", "1"]);
     let body = steady_job();
     let expected = Expected::of(&service, &body);
-    let damages: [(fn(&Path), usize); 3] = [(truncate, 1), (flip_a_bit, 1), (truncate, 2)];
+    let damages: [(Damage, usize); 3] = [(truncate, 1), (flip_a_bit, 1), (truncate, 2)];
     for (damage, how_many) in damages {
         let id = service.submit(&body);
         eventually("two checkpoints are kept", Duration::from_secs(20), || {

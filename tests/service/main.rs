@@ -1,5 +1,5 @@
 //! The HTTP contract, on the real binary over a real socket.
-#![expect(missing_docs, reason = "a test")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../support/service.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]

@@ -1,5 +1,4 @@
 //! What the tests of the engine share: a scene from JSON, run to its end in a pool of its own.
-#![expect(dead_code, reason = "each test target uses a part")]
 
 use meniscus::parallel::Interrupt;
 use meniscus::scene::{BuildContext, Scene, understand};

@@ -98,12 +98,7 @@ impl Service {
         self.child.id()
     }
 
-    /// `kill -9`, and a new service on the same directory.
-    pub fn kill_and_restart(&mut self) {
-        self.kill();
-        self.restart();
-    }
-
+    /// `kill -9`.
     pub fn kill(&mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();

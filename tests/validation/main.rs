@@ -1,7 +1,8 @@
 //! The papers' cases and the hard ones, against figures with their reasons.
-#![expect(missing_docs, reason = "a test")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../support/mod.rs"]
+#[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
 use serde_json::{Value, json};

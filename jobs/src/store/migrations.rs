@@ -33,7 +33,8 @@ const MIGRATIONS: &[&str] = &["
         usage TEXT,
         leg_wall_s REAL NOT NULL DEFAULT 0,
         message TEXT,
-        restarted_from TEXT
+        restarted_from TEXT,
+        restart_sha256 TEXT
     ) STRICT;
     CREATE INDEX jobs_by_queue ON jobs (state, priority DESC, id);
     CREATE TABLE events (

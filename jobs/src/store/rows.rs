@@ -64,6 +64,8 @@ pub struct JobRow {
     pub leg_wall_s: f64,
     /// Checkpoint of another job that this one began with.
     pub restarted_from: Option<String>,
+    /// Digest of that checkpoint's file.
+    pub restart_sha256: Option<String>,
 }
 
 /// A published file.
@@ -155,6 +157,7 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         usage: json(row, "usage")?,
         leg_wall_s: row.get("leg_wall_s")?,
         restarted_from: row.get("restarted_from")?,
+        restart_sha256: row.get("restart_sha256")?,
     })
 }
 

@@ -61,9 +61,9 @@ impl<const D: usize> Surface<D> for Cuboid<D> {
         let half = self.size * 0.5;
         let local = x - self.center;
         let (axis, depth) = Self::nearest_face(&half, &local);
-        let inside = depth < 0.0;
-        inside && (0..D).any(|d| d != axis && depth - (local[d].abs() - half[d]) <= tolerance)
-            || inside && local[axis].abs() <= tolerance
+        // Inside, two faces are as near; outside every closest point is the only one.
+        let second = (0..D).filter(|&d| d != axis).map(|d| local[d].abs() - half[d]).fold(f64::NEG_INFINITY, f64::max);
+        depth < 0.0 && (depth - second <= tolerance || local[axis].abs() <= tolerance)
     }
 
     fn outline(&self, spacing: f64) -> Vec<Vec<Vector<D>>> {

@@ -49,7 +49,7 @@ impl<const D: usize> Ellipsoid<D> {
             let slope: f64 =
                 (0..D).filter(pulled).map(|i| -2.0 * (e[i] * y[i] / (s + gap[i])).powi(2) / (s + gap[i])).sum();
             let next = s - value / slope;
-            if !(next > s) {
+            if next <= s || next.is_nan() {
                 break;
             }
             s = next;

@@ -4,7 +4,7 @@ use super::parameters::Written;
 use crate::closest_point::PcpMethod;
 use crate::geometry::Vector;
 use crate::geometry::lattice::Lattice;
-use crate::scene::{BuildContext, Estimate, Scene, Violation};
+use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::particle_estimate::{band_particles, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
 use crate::schemes::static_redistancing::{InitialLevel, StaticRedistancing, StaticSystem};
@@ -22,7 +22,7 @@ struct RedistanceScene<const D: usize> {
     repeats: u64,
 }
 
-pub(super) fn understand(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Violation>> {
+pub(super) fn understand(parameters: &Value) -> Understood {
     let written: Written = serde_json::from_value(parameters.clone())
         .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
     let implied = written.shape.as_ref().and_then(shapes::implied_dimension);
@@ -32,12 +32,12 @@ pub(super) fn understand(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Viola
     }
 }
 
-fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Result<Box<dyn Scene>, Vec<Violation>> {
+fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let mut violations = Vec::new();
     let default_shape = if D == 2 {
-        json!({"type": "ellipse", "semi_axes": [0.75, 0.5]})
+        json!({"type": "ellipse", "center": null, "semi_axes": [0.75, 0.5]})
     } else {
-        json!({"type": "ellipsoid", "semi_axes": [0.75, 0.5, 0.5]})
+        json!({"type": "ellipsoid", "center": null, "semi_axes": [0.75, 0.5, 0.5]})
     };
     let shape = written.shape.clone().unwrap_or(default_shape);
     if let Err(found) = shapes::surface::<D>(&shape, "/shape") {

@@ -5,7 +5,7 @@ use crate::closest_point::PcpMethod;
 use crate::geometry::flows::{Rotation, SingleVortex, Translation};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{self, Vector};
-use crate::scene::{BuildContext, Estimate, Scene, Violation};
+use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::particle_estimate::{band_particles, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
 use crate::schemes::advected_level_set::{AdvectedLevelSet, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen};
@@ -34,7 +34,7 @@ const AUTO_DUAL: (u64, u64) = (4, 24);
 /// Fits that stay stable when the distance is overwritten every step.
 const AUTO_OVERWRITE: (u64, u64) = (3, 60);
 
-pub(super) fn understand(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Violation>> {
+pub(super) fn understand(parameters: &Value) -> Understood {
     let written: Written = serde_json::from_value(parameters.clone())
         .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
     match written.dimension.or_else(|| shapes::implied_dimension(&written.shape)).unwrap_or(2) {
@@ -43,7 +43,7 @@ pub(super) fn understand(parameters: &Value) -> Result<Box<dyn Scene>, Vec<Viola
     }
 }
 
-fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Result<Box<dyn Scene>, Vec<Violation>> {
+fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let mut violations = Vec::new();
     if let Err(found) = shapes::surface::<D>(&written.shape, "/shape") {
         violations.extend(found);
