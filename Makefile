@@ -1,0 +1,49 @@
+# Two commands do all the set-up on a fresh Debian machine: `make demo` and `make test`.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.PHONY: help build demo test check setup clean
+
+# Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
+ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
+export HDF5_DIR ?= $(firstword $(wildcard /usr/lib/*/hdf5/serial))
+endif
+
+PACKAGES := gcc pkg-config libhdf5-dev curl jq python3-venv ca-certificates
+VENV := .venv
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+
+help:
+	@echo "make demo   build, run the spiraling vortex as a job, show its errors and a picture"
+	@echo "make test   build and run all tests"
+	@echo "make build  the release binary, $(TARGET)/release/meniscus"
+	@echo "make check  format and lints"
+
+# Installs what is missing, and nothing where nothing is missing.
+setup:
+	@deploy/setup.sh $(PACKAGES)
+
+build: setup
+	cargo build --release --locked -p meniscus-api
+
+demo: build
+	deploy/demo.sh $(TARGET)/release/meniscus
+
+$(VENV)/ready: tests/python/requirements.txt | setup
+	python3 -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/python/requirements.txt
+	touch $@
+
+# The binary under test has debug assertions, like the tests.
+test: setup $(VENV)/ready
+	cargo build --profile test --locked -p meniscus-api
+	export MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)"; \
+	if cargo nextest --version > /dev/null 2>&1; then cargo nextest run --locked --workspace --no-fail-fast; \
+	else cargo test --locked --workspace --no-fail-fast; fi
+
+check:
+	cargo fmt --all --check
+	cargo clippy --locked --workspace --all-targets -- -D warnings
+
+clean:
+	rm -rf $(TARGET) $(VENV) demo-output
