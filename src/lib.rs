@@ -6,15 +6,15 @@
 //! The engine knows no job, no HTTP, no file path and no wall clock; it prints nothing. A simulation's future depends
 //! on (scene, state) alone, for any number of threads. A module uses only modules above it in this list:
 
-pub mod closest_point;
 pub mod geometry;
 pub mod linear_algebra;
-pub mod neighbors;
 pub mod parallel;
 pub mod particles;
+pub mod neighbors;
 pub mod polynomials;
+pub mod closest_point;
+pub mod time;
+pub mod simulation;
+pub mod schemes;
 pub mod scene;
 pub mod scenes;
-pub mod schemes;
-pub mod simulation;
-pub mod time;
