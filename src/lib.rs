@@ -6,9 +6,9 @@
 //! The engine knows no job, no HTTP, no file path and no wall clock; it prints nothing. A simulation's future depends
 //! on (scene, state) alone, for any number of threads. A module uses only modules above it in this list:
 
+pub mod parallel;
 pub mod geometry;
 pub mod linear_algebra;
-pub mod parallel;
 pub mod particles;
 pub mod neighbors;
 pub mod polynomials;

@@ -197,6 +197,28 @@ fn what_is_resolved_resolves_to_itself() {
     }
 }
 
+/// Parameters that would make nonsense of a legal-looking scene are refused at their place.
+#[test]
+fn nonsense_is_refused_at_its_place() {
+    for (body, place) in [
+        (
+            json!({"kind": "redistance", "initial": "scaled", "shape": {"type": "circle", "center": [-5, 0], "radius": 0.5}}),
+            "/initial",
+        ),
+        (
+            json!({"kind": "redistance", "shape": {"type": "zalesak_disk", "radius": 0.15, "slot_width": 0.28, "slot_depth": 0.05}}),
+            "/shape/slot_depth",
+        ),
+        (json!({"kind": "redistance", "type": "foo"}), "/type"),
+        (json!({"kind": "redistance", "method": {"type": "pcp", "weight": 1e5}}), "/method/weight"),
+    ] {
+        let found = meniscus::scene::understand(&body, SCENES).err().unwrap();
+        assert!(found.iter().any(|v| v.pointer == place), "{body}: {found:?}");
+    }
+    let bare = scene(&json!({"kind": "redistance", "preset": "paper", "method": "pcp"})).resolved();
+    assert_eq!(bare, scene(&json!({"kind": "redistance", "preset": "paper"})).resolved());
+}
+
 #[test]
 fn estimates_of_particles_are_within_five_per_cent() {
     for body in bodies() {

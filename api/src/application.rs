@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
-use tokio::sync::watch;
+use tokio::sync::{Semaphore, watch};
 
 /// What every handler can reach.
 #[derive(Clone)]
@@ -25,6 +25,10 @@ pub struct Application {
     pub config: Arc<Config>,
     /// Whether recovery is done and no shutdown has begun.
     pub ready: Arc<AtomicBool>,
+    /// Whether a shutdown has begun: the store can still be read.
+    pub draining: Arc<AtomicBool>,
+    /// Archives that may be under way at once; each holds a thread for as long as its reader takes.
+    pub archives: Arc<Semaphore>,
     /// Turns true when the service stops; long answers end then.
     pub stopping: watch::Receiver<bool>,
 }
@@ -43,6 +47,8 @@ pub enum ServeError {
     Io(#[from] std::io::Error),
 }
 
+/// Archives at once.
+const ARCHIVES: usize = 16;
 /// Time that open answers have to end after the supervisor has.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
@@ -56,7 +62,8 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
     let config = Config { data: std::fs::canonicalize(&config.data)?, ..config };
     let _lock = DirectoryLock::take(&config.data)?;
     let store = Arc::new(Store::open(&config.data)?);
-    let executor = Box::new(LocalExecutor::new(std::env::current_exe()?));
+    // This very program, even when an upgrade has replaced its file: all attempts of a service are of one build.
+    let executor = Box::new(LocalExecutor::new("/proc/self/exe".into()));
     let supervisor = Supervisor::new(Arc::clone(&store), executor, Settings::with_slots(config.slots));
     let (stop, stopping) = watch::channel(false);
     let application = Application {
@@ -64,6 +71,8 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
         supervisor: supervisor.handle(),
         config: Arc::new(config),
         ready: Arc::new(AtomicBool::new(false)),
+        draining: Arc::new(AtomicBool::new(false)),
+        archives: Arc::new(Semaphore::new(ARCHIVES)),
         stopping,
     };
     let mut terminate = signal(SignalKind::terminate())?;
@@ -81,6 +90,7 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
         supervisor.run();
     })?;
     let handle = application.supervisor.clone();
+    let draining = Arc::clone(&application.draining);
     let ready = Arc::clone(&application.ready);
     let mut stopped = application.stopping.clone();
     let answers = tokio::spawn(
@@ -95,6 +105,7 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
         _ = interrupt.recv() => {}
     }
     tracing::info!("stopping: running jobs checkpoint and go back to the queue");
+    draining.store(true, Ordering::Release);
     ready.store(false, Ordering::Release);
     handle.shut_down();
     let joined = tokio::task::spawn_blocking(move || supervision.join()).await;

@@ -62,6 +62,10 @@ pub enum ApiError {
     Invalid(Vec<ProblemItem>),
     /// Nothing is there.
     NotFound(&'static str),
+    /// The path or the query is not text as it must be.
+    BadRequest,
+    /// Too many of the same are under way.
+    Busy,
     /// The path exists, the method does not.
     MethodNotAllowed,
     /// The state does not allow it.
@@ -89,6 +93,8 @@ impl ApiError {
             Self::NotFound(what) => {
                 (StatusCode::NOT_FOUND, "not-found", "not found", Some(format!("there is no such {what}")))
             }
+            Self::BadRequest => (StatusCode::BAD_REQUEST, "bad-request", "the path or the query cannot be read", None),
+            Self::Busy => (StatusCode::SERVICE_UNAVAILABLE, "busy", "too many of these are under way", None),
             Self::MethodNotAllowed => {
                 (StatusCode::METHOD_NOT_ALLOWED, "method-not-allowed", "this resource does not do that", None)
             }
@@ -144,7 +150,17 @@ impl IntoResponse for ApiError {
 
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
-        Self::Internal(error.to_string())
+        match error {
+            StoreError::CheckpointGone => Self::Invalid(vec![ProblemItem {
+                pointer: "/restart/checkpoint".to_owned(),
+                code: "not_found".to_owned(),
+                detail: error.to_string(),
+                got: Value::Null,
+                allowed: "the id of a checkpoint, ckpt_…".into(),
+                did_you_mean: None,
+            }]),
+            error => Self::Internal(error.to_string()),
+        }
     }
 }
 

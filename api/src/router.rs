@@ -4,7 +4,7 @@ use crate::application::Application;
 use crate::error::ApiError;
 use crate::routes::{checkpoints, events, files, jobs, results, scenes, service};
 use axum::extract::{Request, State};
-use axum::http::{HeaderName, HeaderValue, Method};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::{Json, Router};
@@ -73,12 +73,12 @@ pub fn router(application: Application) -> Router {
         .with_state(application)
 }
 
-/// Nothing under `/v1` is answered from a store that is not recovered yet.
+/// Nothing under `/v1` is answered from a store that is not recovered yet; during a shutdown it can still be read.
 async fn only_when_ready(State(application): State<Application>, request: Request, next: Next) -> Response {
     let reads = request.method() == Method::GET || request.method() == Method::HEAD;
     let is_ready = application.ready.load(Ordering::Acquire);
-    let is_stopping = *application.stopping.borrow();
-    if !is_ready && request.uri().path().starts_with("/v1") && (!reads || !is_stopping) {
+    let is_readable = reads && application.draining.load(Ordering::Acquire);
+    if !is_ready && !is_readable && request.uri().path().starts_with("/v1") {
         return ApiError::NotReady.into_response();
     }
     next.run(request).await
@@ -89,6 +89,12 @@ async fn with_request_id(request: Request, next: Next) -> Response {
     let id = format!("req_{}", Ulid::generate());
     let (method, path, began) = (request.method().clone(), request.uri().path().to_owned(), Instant::now());
     let mut response = next.run(request).await;
+    let kind = response.headers().get(header::CONTENT_TYPE);
+    let is_plain = kind.is_none_or(|kind| kind.as_bytes().starts_with(b"text/plain"));
+    if response.status() == StatusCode::BAD_REQUEST && is_plain {
+        // axum's own words for a path or query that is no text.
+        response = ApiError::BadRequest.into_response();
+    }
     if let Ok(value) = HeaderValue::from_str(&id) {
         response.headers_mut().insert(HeaderName::from_static("x-request-id"), value);
     }

@@ -72,12 +72,11 @@ fn copy_files(data: &Path, target: &Path) -> Result<bool, BackupError> {
         let into = copy.job_directory(&job.id);
         // Everything the job has, so that a running attempt's records and series come along.
         copy_tree(&source(&job.id), &into)?;
-        let listed = copy.files(&job.id)?.into_iter().map(|f| (f.attempt, f.path, f.size_bytes));
+        let listed = copy.files(&job.id)?.into_iter().map(|f| (f.attempt, f.stored, f.size_bytes));
         let checkpoints = copy.checkpoints(&job.id)?.into_iter().map(|c| (c.attempt, c.path, c.size_bytes));
         for (attempt, path, size) in listed.chain(checkpoints) {
-            let is_index = path == crate::observers::frames::INDEX;
             let found = fs::metadata(attempt_directory(&into, attempt).join(&path)).map(|meta| meta.len());
-            if !found.is_ok_and(|found| found == size || is_index) {
+            if !found.is_ok_and(|found| found == size) {
                 return Ok(false);
             }
         }

@@ -39,6 +39,8 @@ pub struct JobBody {
     pub scene: Box<dyn Scene>,
     /// Size of the run.
     pub estimate: Estimate,
+    /// Size of its files.
+    pub disk_bytes: u64,
     /// The job whose checkpoint this one starts from.
     pub restarted_from: Option<String>,
 }
@@ -121,7 +123,7 @@ const OUTPUT_FIELDS: [&str; 3] = ["every_time", "fields", "series_every_steps"];
 pub fn parse(
     spec: &Value,
     allowance: Allowance,
-    find_checkpoint: impl Fn(&str) -> Option<RestartSource>,
+    mut find_checkpoint: impl FnMut(&str) -> Option<RestartSource>,
 ) -> Result<JobBody, Vec<Violation>> {
     let Value::Object(given) = spec else {
         return Err(vec![Violation::new("", "type", "a job is an object", spec, json!("an object with a scene"))]);
@@ -150,7 +152,7 @@ pub fn parse(
             None
         }
         (Some(_), None) => None,
-        (None, Some(restart)) => restart::parse(restart, &find_checkpoint, &mut errors),
+        (None, Some(restart)) => restart::parse(restart, &mut find_checkpoint, &mut errors),
     };
     let scene_json = restart.as_ref().map(|(_, scene)| scene.clone()).or_else(|| given.get("scene").cloned());
     let prefix = if restart.is_some() { "/restart/overrides" } else { "/scene" };
@@ -171,7 +173,7 @@ pub fn parse(
     default_limit(&mut limits, "memory_bytes", allowance.memory_bytes, &mut errors);
     let estimate = scene.as_ref().map(|scene| scene.estimate());
     if let (Some(estimate), Some(memory)) = (estimate, limits.get("memory_bytes").and_then(Value::as_u64)) {
-        let needed = WORKER_BASE_BYTES + estimate.memory_bytes;
+        let needed = WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes);
         if needed > memory {
             let detail = format!(
                 "about {} particles need {needed} bytes, the limit is {memory} (/limits/memory_bytes); a larger spacing or a narrower band needs less",
@@ -199,6 +201,7 @@ pub fn parse(
     if !errors.is_empty() {
         return Err(errors);
     }
+    let disk_bytes = disk_estimate(&estimate, &output, &checkpoint);
     let mut resolved = Map::new();
     resolved.insert("name".into(), json!(name));
     resolved.insert("labels".into(), json!(labels));
@@ -219,8 +222,21 @@ pub fn parse(
         priority,
         scene,
         estimate,
+        disk_bytes,
         restarted_from: restart.map(|(source, _)| source.checkpoint),
     })
+}
+
+/// Bytes of all files of a run: frames and checkpoints by the particle.
+fn disk_estimate(estimate: &Estimate, output: &Map<String, Value>, checkpoint: &Map<String, Value>) -> u64 {
+    const FRAME: u64 = 200;
+    const CHECKPOINT: u64 = 120;
+    let every = output.get("every_time").and_then(Value::as_f64).unwrap_or(f64::INFINITY);
+    let frames = ((estimate.end_time / every).min(estimate.steps as f64) + 2.0) as u64;
+    let kept = checkpoint.get("keep").and_then(Value::as_u64).unwrap_or(2).saturating_add(1);
+    let per_particle = FRAME.saturating_mul(frames).saturating_add(CHECKPOINT.saturating_mul(kept));
+    // SQLite's whole numbers end at 2⁶³.
+    estimate.particles.saturating_mul(per_particle).saturating_add(1 << 20).min(1 << 62)
 }
 
 fn text(given: &Map<String, Value>, name: &str, errors: &mut Vec<Violation>) -> Option<String> {
@@ -315,15 +331,6 @@ fn section(
     let mut rest = section.clone();
     if known.is_some() {
         rest.shift_remove("fields");
-    }
-    if let Some(value) = section.get("type") {
-        errors.push(Violation::new(
-            format!("/{name}/type"),
-            "unknown_field",
-            "there is no such field",
-            value,
-            Value::Null,
-        ));
     }
     let before = errors.len();
     let checked = check(parameters, &rest, &format!("/{name}"), errors);
@@ -441,6 +448,19 @@ mod tests {
     fn more_particles_than_memory_names_both_fields() {
         let body = json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.002}, "limits": {"memory_bytes": 100_000_000}});
         assert_eq!(errors(&body), [("/scene/spacing".to_owned(), "memory".to_owned())]);
+        for scene in [
+            json!({"kind": "redistance", "spacing": 1e-6}),
+            json!({"kind": "redistance", "spacing": 1e-9}),
+            json!({"kind": "vortex", "spacing": 1e-300}),
+            json!({"kind": "redistance", "spacing": 1e308}),
+            json!({"kind": "redistance", "shape": {"type": "circle", "radius": 1e200}}),
+            json!({"kind": "redistance", "shape": {"type": "box", "size": [1e8, 1e-8]}, "spacing": 1e-9}),
+            json!({"kind": "vortex", "band_h": 1e10}),
+            json!({"kind": "redistance", "band_h": 1e300}),
+        ] {
+            let found = errors(&json!({"scene": scene}));
+            assert!(found.iter().any(|(pointer, _)| pointer == "/scene/spacing"), "{scene}: {found:?}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod import;
 pub mod listing;
 pub mod migrations;
 pub mod rows;
+pub mod settle;
 pub mod transitions;
 
 pub use events::Event;
@@ -51,6 +52,9 @@ pub enum StoreError {
     /// The system failed.
     #[error("the data directory failed: {0}")]
     Io(#[from] std::io::Error),
+    /// The checkpoint of a restart was removed in the meantime.
+    #[error("the checkpoint is gone")]
+    CheckpointGone,
     /// A row does not say what it should.
     #[error("a stored value is unreadable: {0}")]
     Json(#[from] serde_json::Error),
@@ -136,13 +140,15 @@ impl Store {
         let id = format!("job_{}", self.next_id());
         let mut restart_sha256 = None;
         if let Some(checkpoint) = &body.restarted_from {
-            let row = self.checkpoint(checkpoint)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
+            let row = self.checkpoint(checkpoint)?.ok_or(StoreError::CheckpointGone)?;
             let folder = self.job_directory(&id);
             std::fs::create_dir_all(&folder)?;
             let source = crate::order::attempt_directory(&self.job_directory(&row.job), row.attempt).join(&row.path);
             let target = folder.join(START_CHECKPOINT);
-            if std::fs::hard_link(&source, &target).is_err() {
-                std::fs::copy(&source, &target)?;
+            // Its row may have been there a moment ago and its file be gone by now.
+            if std::fs::hard_link(&source, &target).is_err() && std::fs::copy(&source, &target).is_err() {
+                remove_directory(&folder)?;
+                return Err(StoreError::CheckpointGone);
             }
             crate::artifacts::sync_directory(&folder)?;
             restart_sha256 = Some(row.sha256);
@@ -151,7 +157,8 @@ impl Store {
         self.write(|transaction| {
             let estimate = json!({
                 "particles": body.estimate.particles, "steps": body.estimate.steps,
-                "time_step": body.estimate.time_step, "memory_bytes": crate::body::WORKER_BASE_BYTES + body.estimate.memory_bytes,
+                "time_step": body.estimate.time_step, "memory_bytes": crate::body::WORKER_BASE_BYTES.saturating_add(body.estimate.memory_bytes),
+                "disk_bytes": body.disk_bytes,
             });
             transaction
                 .prepare_cached(

@@ -2,7 +2,6 @@
 //! and settles how they ended. It also brings unfinished jobs to a legal state when the service starts.
 
 mod limits;
-mod settle;
 
 use crate::body::Wishes;
 use crate::executor::{Executor, Worker};
@@ -11,7 +10,8 @@ use crate::order::{self, Order, StartCheckpoint, attempt_directory};
 use crate::process;
 use crate::records::Usage;
 use crate::store::import::ProgressPace;
-use crate::store::{Change, JobRow, START_CHECKPOINT, Store, StoreError};
+use crate::store::settle::Loss;
+use crate::store::{Change, ChangeError, JobRow, START_CHECKPOINT, Store, StoreError};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
@@ -87,8 +87,10 @@ struct Running {
     leg_wall_s: f64,
     told_pause: Option<Instant>,
     told_cancel: Option<Instant>,
-    /// Why it was ended by us, written down before the end.
-    condemned: Option<Reason>,
+    /// When its verdict came; the process is to end soon after.
+    verdict_since: Option<Instant>,
+    /// Memory that it was admitted with.
+    memory_bytes: u64,
     disk_checked: Instant,
     lease_renewed: Instant,
 }
@@ -103,12 +105,18 @@ pub struct Supervisor {
     receiver: Receiver<Message>,
     draining: bool,
     space_checked: Instant,
+    /// No worker is started before this time, after one could not be.
+    start_again: Instant,
 }
 
 /// Time between two looks at workers without news.
 const TICK: Duration = Duration::from_millis(100);
 /// Time that running jobs have to checkpoint at a shutdown.
 const DRAIN: Duration = Duration::from_secs(15);
+/// Time that a worker has to end after its verdict.
+const LAST_WORDS: Duration = Duration::from_secs(5);
+/// Time without starts after one that failed.
+const START_PAUSE: Duration = Duration::from_secs(1);
 /// Term of a lease.
 const LEASE: Duration = Duration::from_secs(30);
 
@@ -117,8 +125,18 @@ impl Supervisor {
     #[must_use]
     pub fn new(store: Arc<Store>, executor: Box<dyn Executor>, settings: Settings) -> Self {
         let (sender, receiver) = channel();
-        let space_checked = Instant::now();
-        Self { store, executor, settings, running: Vec::new(), sender, receiver, draining: false, space_checked }
+        let now = Instant::now();
+        Self {
+            store,
+            executor,
+            settings,
+            running: Vec::new(),
+            sender,
+            receiver,
+            draining: false,
+            space_checked: now,
+            start_again: now,
+        }
     }
 
     /// How others speak to it.
@@ -135,10 +153,12 @@ impl Supervisor {
     pub fn recover(&self) -> Result<(), StoreError> {
         for job in self.store.unfinished_attempts()? {
             self.end_orphan(&job);
-            // What the worker managed to say before counts, its verdict above all.
-            let imported = self.store.import(&job.id, job.attempt, &mut ProgressPace::default())?;
-            let lost = settle::Loss { reason: Reason::ServerRestart, is_death: false };
-            settle::settle(&self.store, &job.id, job.attempt, imported.verdict, lost, false)?;
+            // What the worker managed to say before counts, its verdict above all. Records that cannot be read are as
+            // good as none: the job goes on from its last checkpoint.
+            if let Err(error) = self.store.import(&job.id, job.attempt, &mut ProgressPace::default()) {
+                tracing::error!(job = job.id, %error, "records could not be imported");
+            }
+            self.store.settle(&job.id, job.attempt, Loss { reason: Reason::ServerRestart, is_death: false })?;
             tracing::info!(job = job.id, attempt = job.attempt, "recovered");
         }
         self.store.sweep()
@@ -187,14 +207,19 @@ impl Supervisor {
     fn tick(&mut self) -> Result<(), StoreError> {
         let mut ended = Vec::new();
         for k in 0..self.running.len() {
-            if self.attend(k)? {
-                ended.push(k);
+            match self.attend(k) {
+                Ok(false) => {}
+                Ok(true) => ended.push(k),
+                // One job's trouble is not another's.
+                Err(error) => {
+                    tracing::error!(job = self.running[k].job, %error, "a worker could not be attended");
+                }
             }
         }
         for k in ended.into_iter().rev() {
             self.running.swap_remove(k);
         }
-        if !self.draining {
+        if !self.draining && Instant::now() >= self.start_again {
             self.resume_when_space_is_back()?;
             while self.running.len() < self.settings.slots && self.start_next()? {}
         }
@@ -208,64 +233,74 @@ impl Supervisor {
         let exit = running.worker.poll()?;
         let imported = self.store.import(&running.job, running.epoch, &mut running.pace)?;
         if imported.has_checkpoint {
-            let directory = self.store.job_directory(&running.job);
-            for old in self.store.prune_checkpoints(&running.job, running.wishes.checkpoint.keep as usize)? {
-                let path = attempt_directory(&directory, old.attempt).join(&old.path);
-                if let Err(error) = std::fs::remove_file(&path) {
-                    tracing::warn!(job = running.job, %error, "an old checkpoint could not be removed");
-                }
-            }
+            self.prune_checkpoints(k)?;
         }
+        let running = &mut self.running[k];
         if let Some(exit) = exit {
-            // A verdict may have come with an earlier import and still be unsettled: the worker's last word is kept.
-            let lost = settle::Loss::of(exit, running.condemned);
-            settle::book_disk(&self.store, &running.job, running.epoch)?;
-            settle::settle(&self.store, &running.job, running.epoch, imported.verdict, lost, self.draining)?;
+            let reason = if exit.out_of_memory { Reason::WorkerOom } else { Reason::WorkerCrash };
+            self.book_disk(k)?;
+            let running = &self.running[k];
+            self.store.settle(&running.job, running.epoch, Loss { reason, is_death: true })?;
             tracing::info!(job = running.job, attempt = running.epoch, ?exit, "worker ended");
             return Ok(true);
         }
         if imported.verdict.is_some() {
-            // The process is about to end; until then the offset must not hide the verdict from the settling import.
-            let verdict = imported.verdict;
-            let patience = Instant::now();
-            while running.worker.poll()?.is_none() && patience.elapsed() < Duration::from_secs(5) {
-                std::thread::sleep(Duration::from_millis(2));
+            running.verdict_since = Some(Instant::now());
+        }
+        if let Some(since) = running.verdict_since {
+            if since.elapsed() >= LAST_WORDS {
+                running.worker.kill();
             }
-            running.worker.kill();
-            let lost = settle::Loss { reason: Reason::WorkerCrash, is_death: true };
-            settle::book_disk(&self.store, &running.job, running.epoch)?;
-            settle::settle(&self.store, &running.job, running.epoch, verdict, lost, self.draining)?;
-            return Ok(true);
+            return Ok(false);
         }
         self.hold_to_limits(k)?;
         Ok(false)
     }
 
+    /// Removes checkpoints beyond those to keep.
+    fn prune_checkpoints(&self, k: usize) -> Result<(), StoreError> {
+        let running = &self.running[k];
+        let directory = self.store.job_directory(&running.job);
+        for old in self.store.prune_checkpoints(&running.job, running.wishes.checkpoint.keep as usize)? {
+            if let Err(error) = std::fs::remove_file(attempt_directory(&directory, old.attempt).join(&old.path)) {
+                tracing::warn!(job = running.job, %error, "an old checkpoint could not be removed");
+            }
+        }
+        Ok(())
+    }
+
+    /// Books the size of a job's files.
+    fn book_disk(&self, k: usize) -> Result<(), StoreError> {
+        let running = &self.running[k];
+        let Some(row) = self.store.job(&running.job)? else { return Ok(()) };
+        let disk_bytes = process::directory_bytes(&self.store.job_directory(&running.job));
+        self.store.book_usage(&running.job, running.epoch, &Usage { disk_bytes, ..row.usage })
+    }
+
     /// Takes and starts the next job of the queue; false when there is none that fits.
     fn start_next(&mut self) -> Result<bool, StoreError> {
         let free = process::free_space(self.store.directory()).unwrap_or(u64::MAX);
-        if free < self.settings.disk_reserve_bytes {
-            return Ok(false);
-        }
-        let available = process::available_memory().unwrap_or(u64::MAX);
-        let is_alone = self.running.is_empty();
+        let room = free.saturating_sub(self.settings.disk_reserve_bytes);
+        // Workers that have just started have not taken their memory yet.
+        let promised: u64 = self
+            .running
+            .iter()
+            .map(|r| r.memory_bytes.saturating_sub(process::resident_bytes(r.worker.pid()).unwrap_or(0)))
+            .sum();
+        let available = process::available_memory().unwrap_or(u64::MAX).saturating_sub(promised);
         // A job that alone is too large for this machine was refused at submission; it is not left waiting for ever.
-        let Some(job) = self.store.claim(|needed| is_alone || needed <= available)? else {
-            return Ok(false);
-        };
-        if let Err(error) = self.start(&job) {
-            tracing::error!(job = job.id, %error, "a worker could not be started");
-            let reason = if process::is_out_of_space(&error) { Reason::StorageEnospc } else { Reason::StorageIo };
-            if reason == Reason::StorageEnospc {
-                self.store_change(&job.id, Trigger::Pause, &Change::because(reason))?;
-                self.store_change(&job.id, Trigger::Rest, &Change::because(reason))?;
-            } else {
-                let change =
-                    Change { reason: Some(reason), message: Some(error.to_string()), epoch: Some(job.attempt) };
-                self.store_change(&job.id, Trigger::Fail, &change)?;
-            }
+        let is_alone = self.running.is_empty();
+        let fits = |memory: u64, disk: u64| disk <= room && (is_alone || memory <= available);
+        let Some(job) = self.store.claim(fits)? else { return Ok(false) };
+        let Err(error) = self.start(&job) else { return Ok(true) };
+        tracing::error!(job = job.id, %error, "a worker could not be started");
+        self.start_again = Instant::now() + START_PAUSE;
+        if process::is_out_of_space(&error) {
+            let change = Change { reason: Some(Reason::StorageEnospc), message: None, epoch: Some(job.attempt) };
+            self.store_change(&job.id, Trigger::Pause, &change)?;
         }
-        Ok(true)
+        self.store.settle(&job.id, job.attempt, Loss { reason: Reason::StorageIo, is_death: true })?;
+        Ok(false)
     }
 
     fn start(&mut self, job: &JobRow) -> std::io::Result<()> {
@@ -295,7 +330,8 @@ impl Supervisor {
             leg_wall_s: job.leg_wall_s,
             told_pause: None,
             told_cancel: None,
-            condemned: None,
+            verdict_since: None,
+            memory_bytes: job.estimate["memory_bytes"].as_u64().unwrap_or(0),
             disk_checked: now,
             lease_renewed: now,
         });
@@ -339,8 +375,15 @@ impl Supervisor {
     }
 
     /// Applies a trigger; a job that has moved on in between is no error.
-    fn store_change(&self, job: &str, trigger: Trigger, change: &Change) -> Result<(), StoreError> {
-        settle::change(&self.store, job, trigger, change).map(|_| ())
+    fn store_change(&self, job: &str, trigger: Trigger, what: &Change) -> Result<(), StoreError> {
+        match self.store.change(job, trigger, what) {
+            Err(ChangeError::Store(error)) => Err(error),
+            Err(error) => {
+                tracing::debug!(job, %error, "a change came too late");
+                Ok(())
+            }
+            Ok(_) => Ok(()),
+        }
     }
 
     /// The state of a job as the store has it.

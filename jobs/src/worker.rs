@@ -32,13 +32,29 @@ pub fn run_attempt(order: &Order, directory: &Path, control: &Control, sink: &mu
     let outcome = catch_unwind(AssertUnwindSafe(|| attempt(order, directory, control, sink, &log)));
     let verdict = match outcome {
         Ok(Ok(verdict)) => verdict,
-        Ok(Err(failure)) => failure.verdict(directory),
+        Ok(Err(failure)) => without_places(failure.verdict(directory), order, directory),
         Err(_) => Verdict::Failed { reason: Reason::Internal, message: "the worker panicked".to_owned() },
     };
     log.line(&format!("{verdict:?}"));
     // Without a verdict the service treats the worker as lost, which is the truth then.
     let _ = sink.put(&Record::Verdict(verdict.clone()), true);
     verdict
+}
+
+/// A verdict whose message names no place of this machine: clients read it.
+fn without_places(verdict: Verdict, order: &Order, directory: &Path) -> Verdict {
+    match verdict {
+        Verdict::Failed { reason, message } => Verdict::Failed { reason, message: hide(&message, order, directory) },
+        other => other,
+    }
+}
+
+/// A text without the directories of the job.
+fn hide(text: &str, order: &Order, directory: &Path) -> String {
+    let attempts = order.attempts_directory.display().to_string();
+    let job = order.attempts_directory.parent().map(|p| p.display().to_string()).filter(|p| p.len() > 1);
+    let hidden = text.replace(&directory.display().to_string(), "…").replace(&attempts, "…");
+    job.map_or_else(|| hidden.clone(), |job| hidden.replace(&job, "…"))
 }
 
 /// Whatever ends an attempt early.
@@ -164,12 +180,14 @@ fn restore(
                     }
                     return Ok(Start { counters, is_own: candidate.is_own, step: state.step });
                 }
-                Err(error) => refuse(candidate, &error.to_string(), sink, log)?,
+                Err(error) => refuse(order, candidate, &error.to_string(), sink, log)?,
             },
             Err(Refusal::Incompatible(message)) if !candidate.is_own => {
                 return Err(Failure::Known(Reason::CheckpointIncompatible, message));
             }
-            Err(Refusal::Incompatible(message) | Refusal::Damaged(message)) => refuse(candidate, &message, sink, log)?,
+            Err(Refusal::Incompatible(message) | Refusal::Damaged(message)) => {
+                refuse(order, candidate, &message, sink, log)?
+            }
         }
     }
     if order.may_start_afresh {
@@ -200,8 +218,15 @@ fn open_start(order: &Order, candidate: &StartCheckpoint) -> Result<(Meta, State
     Ok((meta, state))
 }
 
-fn refuse(candidate: &StartCheckpoint, message: &str, sink: &mut dyn RecordSink, log: &Log) -> Result<(), Failure> {
+fn refuse(
+    order: &Order,
+    candidate: &StartCheckpoint,
+    message: &str,
+    sink: &mut dyn RecordSink,
+    log: &Log,
+) -> Result<(), Failure> {
     let message = format!("checkpoint {} is passed over: {message}", candidate.id);
+    let message = hide(&message, order, &order.attempts_directory);
     log.line(&message);
     sink.put(&Record::Warning { code: "checkpoint.refused".to_owned(), message }, true)?;
     Ok(())
@@ -306,7 +331,7 @@ fn draw_picture(
             Ok(Some(view)) => views.push(view),
             Ok(None) => return None,
             Err(error) => {
-                log.line(&format!("no picture: {error}"));
+                log.line(&hide(&format!("no picture: {error}"), order, directory));
                 return None;
             }
         }
@@ -316,7 +341,7 @@ fn draw_picture(
     let drawn = picture::draw(&artifacts::unfinished(&path), &views, spacing)
         .and_then(|()| artifacts::finish(&path).map_err(|e| e.to_string()))
         .and_then(|()| artifacts::record(directory, "picture.svg", "image/svg+xml").map_err(|e| e.to_string()));
-    drawn.map_err(|error| log.line(&format!("no picture: {error}"))).ok()
+    drawn.map_err(|error| log.line(&hide(&format!("no picture: {error}"), order, directory))).ok()
 }
 
 /// The attempt's log: whole lines with a time, each written at once.

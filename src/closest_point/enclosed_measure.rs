@@ -1,11 +1,12 @@
 //! The area or volume inside the surface by quadrature on the fitted polynomials.
 //!
-//! A grid of cells of the particle spacing covers the samples. Cells away from the surface count whole or not at
+//! A coarse grid of cells covers the samples. Cells away from the surface count whole or not at
 //! all; cells that it cuts are halved along every axis, and the smallest ones count the share that a linear
 //! function with their corner values leaves inside.
 
 use super::redistancing::Redistancing;
 use crate::geometry::Vector;
+use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
 /// Halvings of a cut cell: 2⁴ in 2D leaves the linear share with an error of (h/16)² per cut length; 3D stops earlier,
@@ -14,13 +15,22 @@ const fn halvings(dimension: usize) -> u32 {
     if dimension == 2 { 4 } else { 1 }
 }
 
+/// Cells along the longest side of the samples' box before any is halved.
+const COARSE_CELLS: f64 = 16.0;
+
 /// The measure of all points with a negative level, for a bounded surface in an unbounded space.
 ///
 /// Zero without samples. The sum runs over cells in a fixed order.
-#[must_use]
-pub fn enclosed_measure<const D: usize>(surface: &Redistancing<D>, spacing: f64) -> f64 {
+///
+/// # Errors
+/// [`Interrupted`] when somebody asked to stop.
+pub fn enclosed_measure<const D: usize>(
+    surface: &Redistancing<D>,
+    spacing: f64,
+    interrupt: &Interrupt,
+) -> Result<f64, Interrupted> {
     if surface.is_lost() {
-        return 0.0;
+        return Ok(0.0);
     }
     let mut low = Vector::<D>::repeat(f64::INFINITY);
     let mut high = Vector::<D>::repeat(f64::NEG_INFINITY);
@@ -28,8 +38,12 @@ pub fn enclosed_measure<const D: usize>(surface: &Redistancing<D>, spacing: f64)
         low = low.inf(&x);
         high = high.sup(&x);
     }
+    // Coarse cells that the surface does not cut are settled at one query each.
+    let coarsening = ((high - low).max() / (COARSE_CELLS * spacing)).log2().ceil().max(0.0);
+    let edge = spacing * coarsening.exp2();
+    let halvings = halvings(D) + coarsening as u32;
     let low = low.add_scalar(-2.0 * spacing);
-    let counts: [usize; D] = std::array::from_fn(|d| ((high[d] + 2.0 * spacing - low[d]) / spacing).ceil() as usize);
+    let counts: [usize; D] = std::array::from_fn(|d| ((high[d] + 2.0 * spacing - low[d]) / edge).ceil() as usize);
     let rows: usize = counts[1..].iter().product();
     let sums: Vec<f64> = (0..rows)
         .into_par_iter()
@@ -37,18 +51,19 @@ pub fn enclosed_measure<const D: usize>(surface: &Redistancing<D>, spacing: f64)
             let mut corner = low;
             let mut rest = row;
             for d in 1..D {
-                corner[d] += (rest % counts[d]) as f64 * spacing;
+                corner[d] += (rest % counts[d]) as f64 * edge;
                 rest /= counts[d];
             }
             (0..counts[0])
                 .map(|k| {
-                    corner[0] = low[0] + k as f64 * spacing;
-                    inside_of_cell(surface, &corner, spacing, halvings(D))
+                    corner[0] = low[0] + k as f64 * edge;
+                    if interrupt.is_raised() { 0.0 } else { inside_of_cell(surface, &corner, edge, halvings) }
                 })
                 .sum()
         })
         .collect();
-    sums.iter().sum()
+    interrupt.check()?;
+    Ok(sums.iter().sum())
 }
 
 /// The inside part of one cubic cell.

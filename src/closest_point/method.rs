@@ -1,6 +1,7 @@
 //! The parameters of a closest-point level set, as understood.
 
 use crate::geometry::Vector;
+use crate::polynomials::regression::radius_of_count;
 use crate::polynomials::{BasisKind, Neighborhood, PolynomialBasis, Regression};
 
 /// How particles are redistanced. Lengths are in multiples of the spacing h.
@@ -59,8 +60,7 @@ impl PcpMethod {
     #[must_use]
     pub fn reach_h<const D: usize>(&self) -> f64 {
         let terms = PolynomialBasis::<D>::terms(self.degree) as f64;
-        let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
-        let by_count = |count: f64| (count / ball).powf(1.0 / D as f64);
+        let by_count = radius_of_count::<D>;
         let cutoff = match self.neighborhood {
             NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,
             NeighborhoodChoice::Nearest { count } => by_count(count as f64),

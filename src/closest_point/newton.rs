@@ -56,7 +56,8 @@ pub fn closest_point<const D: usize>(
         };
         let length = step.norm();
         let stalled = length <= ACCEPTED * fit.radius && length >= 0.5 * last;
-        if method.is_converged(&step) || stalled {
+        // Coordinates cannot move by less than their own last bit.
+        if method.is_converged(&step) || stalled || length <= f64::EPSILON * x.amax() {
             // The jet is evaluated at most one converged step away: its change is below the step itself.
             return (NewtonEnd::Converged(Foot { point: x + step, jet }), iteration);
         }

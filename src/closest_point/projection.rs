@@ -37,7 +37,8 @@ pub fn project<const D: usize>(
         let settled = length <= method.tolerance;
         // Round-off may keep the residual above the tolerance for ever: no progress at a tiny step is the end too.
         let stalled = length <= ACCEPTED * fit.radius && length >= 0.5 * last;
-        if settled || stalled {
+        // Coordinates cannot move by less than their own last bit.
+        if settled || stalled || length <= f64::EPSILON * x.amax() {
             return Some(Projected { point: x + step, normal: jet.normal() });
         }
         let most = 0.5 * fit.radius;

@@ -215,10 +215,8 @@ impl<const D: usize> Redistancing<D> {
     /// 3. A foot farther than the sample, or none: the sample itself (counted).
     #[must_use]
     pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
-        let mut tally = Tally::default();
-        let answer = self.solve(x, reach, &mut tally);
-        tally.book(&self.counts);
-        answer
+        // Only the queries of a redistancing are counted.
+        self.solve(x, reach, &mut Tally::default())
     }
 
     fn solve(&self, x: &Vector<D>, reach: f64, tally: &mut Tally) -> Option<ClosestPoint<D>> {
@@ -235,7 +233,9 @@ impl<const D: usize> Redistancing<D> {
             match end {
                 NewtonEnd::Converged(foot) => {
                     let distance = (query - foot.point).norm();
-                    if distance <= sample_distance * (1.0 + 1e-9) + self.method.tolerance {
+                    // Equal up to the tolerance and the last bits of the coordinates counts as not farther.
+                    let slack = self.method.tolerance.max(16.0 * f64::EPSILON * query.amax());
+                    if distance <= sample_distance * (1.0 + 1e-9) + slack {
                         tally.hopped += u64::from(hop > 0);
                         let normal = foot.jet.normal();
                         return Some(ClosestPoint {
@@ -307,7 +307,9 @@ impl<const D: usize> Redistancing<D> {
     /// Mean and maximum of a measure over the sample particles, in their order; (0, 0) without samples.
     pub fn over_samples(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
         let values: Vec<f64> = self.samples.par_iter().map(|(sample, _)| measure(&sample.point)).collect();
-        let most = values.iter().copied().fold(0.0, f64::max);
+        // A NaN must not be lost in the maximum.
+        let is_broken = values.iter().any(|v| v.is_nan());
+        let most = if is_broken { f64::NAN } else { values.iter().copied().fold(0.0, f64::max) };
         (values.iter().sum::<f64>() / values.len().max(1) as f64, most)
     }
 }

@@ -32,6 +32,21 @@ impl SurfaceColumns {
         }
     }
 
+    /// The first value that is no number: its column and particle.
+    #[must_use]
+    pub fn find_broken<const D: usize>(&self, particles: &Particles<D>) -> Option<(&'static str, usize)> {
+        let number = |key| particles.scalar(key).iter().position(|v| !v.is_finite());
+        let arrow = |key| particles.vector(key).iter().position(|v| v.iter().any(|c| !c.is_finite()));
+        [
+            ("phi", number(self.phi)),
+            ("closest_point", arrow(self.closest_point)),
+            ("normal", arrow(self.normal)),
+            ("curvature", number(self.curvature)),
+        ]
+        .into_iter()
+        .find_map(|(name, place)| place.map(|particle| (name, particle)))
+    }
+
     /// Writes answers (one a particle, None outside the band); the sign is that of the level before (PCP eq. 15).
     pub fn store<const D: usize>(
         &self,

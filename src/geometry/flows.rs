@@ -18,8 +18,15 @@ pub trait Flow<const D: usize>: Send + Sync {
     /// The largest speed anywhere in the ball `|x − center| ≤ radius` at any time, for step estimates.
     fn largest_speed(&self, center: &Vector<D>, radius: f64) -> f64;
 
+    /// Where a rigid motion carries `x` during `duration`, by its formula; None where the motion is not rigid.
+    fn rigid_path(&self, _x: &Vector<D>, _duration: f64) -> Option<Vector<D>> {
+        None
+    }
+
     /// Whether the motion keeps all distances.
-    fn is_rigid(&self) -> bool;
+    fn is_rigid(&self) -> bool {
+        self.rigid_path(&Vector::<D>::zeros(), 0.0).is_some()
+    }
 
     /// The time at which the flow has brought every point back to its start, if it does.
     fn return_time(&self) -> Option<f64>;

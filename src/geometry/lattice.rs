@@ -2,6 +2,7 @@
 
 use super::Vector;
 use super::random::CounterRandom;
+use crate::parallel::Interrupt;
 
 /// A lattice `x_m = (m + offset) h + α h μ_m`, `μ_m ~ U[−1, 1]^D` drawn by the counter `m`.
 #[derive(Debug, Clone, Copy)]
@@ -17,13 +18,19 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// All points whose unjittered node lies in the box `[low, high]` and that `keep` accepts, x running fastest.
+    /// All points within `reach` of a surface given by its distance, x running fastest. The box `[low, high]` must
+    /// hold every node that comes into question.
+    ///
+    /// A distance changes by no more than the way, so nodes far from the band are stepped over. An interrupt ends the
+    /// search with what there is.
     #[must_use]
-    pub fn points_in<const D: usize>(
+    pub fn points_near<const D: usize>(
         &self,
         low: &Vector<D>,
         high: &Vector<D>,
-        mut keep: impl FnMut(&Vector<D>) -> bool,
+        reach: f64,
+        distance: impl Fn(&Vector<D>) -> f64,
+        interrupt: &Interrupt,
     ) -> Vec<Vector<D>> {
         let random = CounterRandom::new(self.seed);
         let h = self.spacing;
@@ -33,28 +40,40 @@ impl Lattice {
         if (0..D).any(|d| first[d] > last[d]) {
             return points;
         }
+        // Jitter moves both this node and the next ones.
+        let slack = 2.0 * self.jitter * (D as f64).sqrt() + 1e-6;
         let mut node = first;
         loop {
-            let x = Vector::<D>::from_fn(|d, _| {
-                let regular = (node[d] as f64 + self.offset) * h;
-                if self.jitter > 0.0 { regular + self.jitter * h * self.draw(&random, &node, d) } else { regular }
-            });
-            if keep(&x) {
-                points.push(x);
+            while node[0] <= last[0] {
+                let x = self.point(&random, &node);
+                let beyond = (distance(&x).abs() - reach) / h;
+                if beyond <= 0.0 {
+                    points.push(x);
+                }
+                node[0] += ((beyond - slack).floor() as i64).clamp(1, last[0] - first[0] + 1);
             }
-            let mut d = 0;
+            node[0] = first[0];
+            let mut d = 1;
             loop {
+                if d == D || interrupt.is_raised() {
+                    return points;
+                }
                 node[d] += 1;
                 if node[d] <= last[d] {
                     break;
                 }
                 node[d] = first[d];
                 d += 1;
-                if d == D {
-                    return points;
-                }
             }
         }
+    }
+
+    /// The point of a node.
+    fn point<const D: usize>(&self, random: &CounterRandom, node: &[i64; D]) -> Vector<D> {
+        Vector::<D>::from_fn(|d, _| {
+            let regular = (node[d] as f64 + self.offset) * self.spacing;
+            if self.jitter > 0.0 { regular + self.jitter * self.spacing * self.draw(random, node, d) } else { regular }
+        })
     }
 
     fn draw<const D: usize>(&self, random: &CounterRandom, node: &[i64; D], axis: usize) -> f64 {
@@ -67,12 +86,17 @@ impl Lattice {
 
 #[cfg(test)]
 mod tests {
-    use super::{Lattice, Vector};
+    use super::{Interrupt, Lattice, Vector};
+
+    fn all<const D: usize>(lattice: &Lattice, half: f64) -> Vec<Vector<D>> {
+        let corner = Vector::<D>::repeat(half);
+        lattice.points_near(&-corner, &corner, 1.0, |_| 0.0, &Interrupt::default())
+    }
 
     #[test]
     fn box_of_nodes_is_complete_and_jitter_is_bounded() {
         let lattice = Lattice { spacing: 0.25, offset: 0.0, jitter: 0.3, seed: 7 };
-        let points = lattice.points_in(&Vector::<3>::repeat(-0.5), &Vector::<3>::repeat(0.5), |_| true);
+        let points = all::<3>(&lattice, 0.5);
         assert_eq!(points.len(), 125);
         for p in &points {
             for d in 0..3 {
@@ -85,8 +109,20 @@ mod tests {
     #[test]
     fn a_point_does_not_depend_on_the_box_it_was_made_in() {
         let lattice = Lattice { spacing: 0.1, offset: 0.5, jitter: 0.4, seed: 1 };
-        let small = lattice.points_in(&Vector::<2>::new(0.0, 0.0), &Vector::<2>::new(0.3, 0.3), |_| true);
-        let large = lattice.points_in(&Vector::<2>::new(-1.0, -1.0), &Vector::<2>::new(1.0, 1.0), |_| true);
+        let (small, large) = (all::<2>(&lattice, 0.3), all::<2>(&lattice, 1.0));
         assert!(small.iter().all(|p| large.contains(p)));
+    }
+
+    #[test]
+    fn stepping_over_loses_no_point_of_a_band() {
+        for jitter in [0.0, 0.2, 0.49] {
+            let lattice = Lattice { spacing: 0.03, offset: 0.0, jitter, seed: 3 };
+            let distance = |x: &Vector<3>| x.norm() - 0.6;
+            let corner = Vector::<3>::repeat(1.0);
+            let near = lattice.points_near(&-corner, &corner, 0.07, distance, &Interrupt::default());
+            let kept: Vec<Vector<3>> =
+                all::<3>(&lattice, 1.0).into_iter().filter(|x| distance(x).abs() <= 0.07).collect();
+            assert_eq!(near, kept);
+        }
     }
 }

@@ -153,6 +153,10 @@ impl<const D: usize> Regression<D> {
                 let mut radius = cutoff;
                 let mut enlargements = 0;
                 gather(search, x, radius, &mut scratch.neighbors);
+                if scratch.neighbors.len() < needed {
+                    // Far below what an even distribution needs, small steps would only be slow.
+                    radius = radius.max(0.8 * self.spacing * radius_of_count::<D>(needed as f64));
+                }
                 while scratch.neighbors.len() < needed && enlargements < MOST_ENLARGEMENTS {
                     radius *= GROWTH;
                     enlargements += 1;
@@ -220,6 +224,13 @@ impl<const D: usize> Regression<D> {
     }
 }
 
+/// Radius, in spacings, of a ball that holds so many evenly distributed particles.
+#[must_use]
+pub fn radius_of_count<const D: usize>(count: f64) -> f64 {
+    let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
+    (count / ball).powf(1.0 / D as f64)
+}
+
 fn gather<const D: usize>(
     search: &impl NeighborSearch<D>,
     x: &Vector<D>,
@@ -236,10 +247,11 @@ mod tests {
     use crate::geometry::Domain;
     use crate::geometry::lattice::Lattice;
     use crate::neighbors::CellList;
+    use crate::parallel::Interrupt;
 
     fn cloud(jitter: f64) -> Vec<Vector<2>> {
         let lattice = Lattice { spacing: 0.1, offset: 0.0, jitter, seed: 2 };
-        lattice.points_in(&Vector::<2>::repeat(-1.0), &Vector::<2>::repeat(1.0), |_| true)
+        lattice.points_near(&Vector::<2>::repeat(-1.0), &Vector::<2>::repeat(1.0), 1.0, |_| 0.0, &Interrupt::default())
     }
 
     fn regression(kind: BasisKind, degree: usize, neighborhood: Neighborhood) -> Regression<2> {

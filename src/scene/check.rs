@@ -64,6 +64,10 @@ pub fn laid_under(preset: Map<String, Value>, given: Map<String, Value>) -> Map<
     let mut merged = preset;
     for (name, value) in given {
         let value = match (merged.get(&name), value) {
+            // A bare name is the object of that type.
+            (Some(Value::Object(below)), Value::String(bare)) if below.get("type").is_some_and(|t| *t == bare) => {
+                Value::Object(below.clone())
+            }
             (Some(Value::Object(below)), Value::Object(above))
                 if !above.contains_key("type") || above.get("type") == below.get("type") =>
             {
@@ -87,7 +91,7 @@ pub fn check(
 ) -> Map<String, Value> {
     let names: Vec<&str> = parameters.iter().map(|p| p.name).collect();
     for (name, value) in given {
-        if !names.contains(&name.as_str()) && name != "type" {
+        if !names.contains(&name.as_str()) {
             let place = format!("{pointer}/{}", escaped(name));
             let mut violation = Violation::new(place, "unknown_field", "there is no such field", value, json!(names));
             violation.did_you_mean = closest(name, &names);
@@ -212,7 +216,9 @@ fn check_choice(variants: &[Variant], value: &Value, pointer: &str, violations: 
         return None;
     };
     let before = violations.len();
-    let mut checked = check(variant.parameters, given, pointer, violations);
+    let mut fields = given.clone();
+    fields.shift_remove("type");
+    let mut checked = check(variant.parameters, &fields, pointer, violations);
     if violations.len() > before {
         return None;
     }

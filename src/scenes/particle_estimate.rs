@@ -2,18 +2,43 @@
 
 use crate::geometry::{Surface, Vector};
 use crate::polynomials::multi_index::term_count;
+use crate::scene::Violation;
+use serde_json::json;
 
-/// Sample points of the bounding box at most.
+/// Sample points at most.
 const MOST_SAMPLES: f64 = 2e5;
+/// Nodes of a lattice along one axis at most: far beyond any memory, far below what indices can count.
+const MOST_NODES: f64 = 1e9;
 
-/// Particles of spacing h within `reach` of a surface: the lattice itself where it is small, else a coarser one.
+/// A violation where a band cannot be laid out on a lattice of spacing h at all.
+#[must_use]
+pub fn check_extent<const D: usize>(surface: &dyn Surface<D>, reach: f64, spacing: f64) -> Option<Violation> {
+    let (low, high) = surface.bounding_box();
+    let farthest = low.abs().sup(&high.abs()).max() + reach + spacing;
+    let nodes = farthest / spacing;
+    if nodes.is_finite() && nodes <= MOST_NODES && nodes >= 1.0 {
+        return None;
+    }
+    let detail =
+        "the shape and its band are too large, too far from the origin or too fine for a lattice of this spacing";
+    let allowed = json!(format!("a number ≥ {:e}", farthest / MOST_NODES));
+    Some(Violation::new("/spacing", "range", detail, &json!(spacing), allowed))
+}
+
+/// Particles of spacing h within `reach` of a surface: counted on the lattice itself where that is small, else on a
+/// coarser one. A band thinner than that one is widened for the count, since its measure is linear in its width.
 #[must_use]
 pub fn band_particles<const D: usize>(surface: &dyn Surface<D>, reach: f64, spacing: f64) -> u64 {
     let (low, high) = surface.bounding_box();
-    let low = low.add_scalar(-reach);
-    let size = high.add_scalar(reach) - low;
-    let volume: f64 = size.iter().product();
-    let step = (volume / MOST_SAMPLES).powf(1.0 / D as f64).max(spacing);
+    let samples = |size: &Vector<D>, step: f64| size.iter().map(|s| (s / step).ceil().max(1.0)).product::<f64>();
+    let mut step = spacing;
+    let mut wide = reach;
+    while samples(&(high - low).add_scalar(2.0 * wide), step) > MOST_SAMPLES {
+        step *= 1.1;
+        wide = reach.max(1.5 * step);
+    }
+    let low = low.add_scalar(-wide);
+    let size = high.add_scalar(wide) - low;
     let counts: [usize; D] = std::array::from_fn(|d| (size[d] / step).ceil().max(1.0) as usize);
     let total: usize = counts.iter().product();
     let cell: f64 = (0..D).map(|d| size[d] / counts[d] as f64).product();
@@ -25,10 +50,12 @@ pub fn band_particles<const D: usize>(surface: &dyn Surface<D>, reach: f64, spac
                 rest /= counts[d];
                 low[d] + size[d] * (k as f64 + 0.5) / counts[d] as f64
             });
-            surface.signed_distance(&x).abs() <= reach
+            surface.signed_distance(&x).abs() <= wide
         })
         .count();
-    (inside as f64 * cell / spacing.powi(D as i32)).round() as u64
+    let particles = inside as f64 * cell * (reach / wide) / spacing.powi(D as i32);
+    // What is no number is no number that would fit into any memory.
+    if particles.is_nan() { u64::MAX } else { particles.round() as u64 }
 }
 
 /// Resident memory of a closest-point level set of so many particles: columns, search structures, answers, a frame
@@ -40,5 +67,5 @@ pub fn memory_bytes<const D: usize>(particles: u64, degree: usize) -> u64 {
     let search = 8 * (D + 4);
     let output = 8 * (3 * D + 10);
     let fits = 8 * (terms + 4 * D + 12) / 2;
-    particles * (3 * columns + search + output + fits) as u64
+    particles.saturating_mul((3 * columns + search + output + fits) as u64)
 }

@@ -4,10 +4,13 @@ use crate::closest_point::PcpMethod;
 use crate::closest_point::method::NeighborhoodChoice;
 use crate::polynomials::basis::BasisKind;
 use crate::polynomials::multi_index::term_count;
-use crate::scene::schema::{NOT_NEGATIVE, POSITIVE};
+use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
 use serde::Deserialize;
 use serde_json::{Value, json};
+
+/// Beyond this the outer neighbours weigh nothing and fits starve.
+const WEIGHT: Kind = Kind::Number { above: None, least: Some(0.0), below: None, most: Some(50.0) };
 
 /// Parameters of `pcp`.
 pub static PARAMETERS: &[Parameter] = &[
@@ -30,7 +33,7 @@ pub static PARAMETERS: &[Parameter] = &[
         DefaultValue::Absent,
     ),
     Parameter::new("cutoff_h", "short for neighborhood radius {cutoff_h}", POSITIVE, DefaultValue::Absent),
-    Parameter::new("weight", "k in the weight exp(−k r²/r_c²)", NOT_NEGATIVE, DefaultValue::Json("2")),
+    Parameter::new("weight", "k in the weight exp(−k r²/r_c²)", WEIGHT, DefaultValue::Json("2")),
     Parameter::new(
         "minimum_ratio",
         "neighbours per coefficient up to which the radius grows; 2 when the field is overwritten every step, else 1.5",

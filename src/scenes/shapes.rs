@@ -206,6 +206,14 @@ impl Shape {
                 let half = 0.5 * slot_width;
                 let roof = radius + (radius * radius - half * half).max(0.0).sqrt();
                 less("slot_depth", *slot_depth, roof, errors);
+                // Where the circle meets the slot's sides, above the lowest point.
+                let mouth = radius - (radius * radius - half * half).max(0.0).sqrt();
+                if *slot_depth <= mouth {
+                    let allowed = json!(format!("a number > {mouth}"));
+                    let detail = "the slot would end below its own mouth";
+                    let at = format!("{pointer}/slot_depth");
+                    errors.push(Violation::new(at, "range", detail, &json!(slot_depth), allowed));
+                }
                 let center = place(center, errors);
                 let flat = Vector::<2>::new(center[0], center[1]);
                 flat_surface(ZalesakDisk::new(flat, *radius, *slot_width, *slot_depth))

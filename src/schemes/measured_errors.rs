@@ -19,7 +19,8 @@ impl ErrorNorms {
     pub fn add(&mut self, error: f64) {
         self.squares += error * error;
         // A NaN must not be lost in a maximum.
-        self.largest = if error.is_nan() { f64::NAN } else { self.largest.max(error.abs()) };
+        let is_broken = error.is_nan() || self.largest.is_nan();
+        self.largest = if is_broken { f64::NAN } else { self.largest.max(error.abs()) };
         self.count += 1;
     }
 

@@ -68,19 +68,33 @@ impl Fields {
         self.columns.push(Field { name, values: FieldValues::Id(values) });
     }
 
-    /// Adds what particles know of the surface, NaN outside the narrow band.
-    pub fn surface<const D: usize>(&mut self, particles: &Particles<D>, columns: &SurfaceColumns) {
+    /// Adds what particles know of the surface, NaN outside the narrow band and where nothing is known: everything but
+    /// φ before the first redistancing (`is_redistanced` false), normal and curvature at corners (stored as zero).
+    pub fn surface<const D: usize>(
+        &mut self,
+        particles: &Particles<D>,
+        columns: &SurfaceColumns,
+        is_redistanced: bool,
+    ) {
         let band = particles.flag(columns.in_band);
-        let number = |key: ScalarKey| {
-            particles.scalar(key).iter().zip(band).map(|(v, b)| if *b == 1 { *v } else { f64::NAN }).collect()
+        let bent: Vec<u8> = particles
+            .vector(columns.normal)
+            .iter()
+            .zip(band)
+            .map(|(n, b)| if is_redistanced && n.norm_squared() > 0.0 { *b } else { 0 })
+            .collect();
+        let footed = if is_redistanced { band } else { &bent };
+        let number = |key: ScalarKey, known: &[u8]| {
+            particles.scalar(key).iter().zip(known).map(|(v, k)| if *k == 1 { *v } else { f64::NAN }).collect()
         };
-        let arrow = |key: VectorKey| {
-            particles.vector(key).iter().zip(band).map(|(v, b)| if *b == 1 { *v } else { v.map(|_| f64::NAN) })
+        let arrow = |key: VectorKey, known: &[u8]| -> Vec<Vector<D>> {
+            let values = particles.vector(key).iter().zip(known);
+            values.map(|(v, k)| if *k == 1 { *v } else { v.map(|_| f64::NAN) }).collect()
         };
-        self.scalar("phi", number(columns.phi));
-        self.vector("closest_point", arrow(columns.closest_point));
-        self.vector("normal", arrow(columns.normal));
-        self.scalar("curvature", number(columns.curvature));
+        self.scalar("phi", number(columns.phi, band));
+        self.vector("closest_point", arrow(columns.closest_point, footed).into_iter());
+        self.vector("normal", arrow(columns.normal, &bent).into_iter());
+        self.scalar("curvature", number(columns.curvature, &bent));
     }
 
     /// The scalar field of a name.

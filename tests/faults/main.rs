@@ -222,6 +222,63 @@ fn a_restart_from_a_damaged_checkpoint_fails_with_the_reason() {
     assert_eq!(job["reason"], "checkpoint.none_valid");
 }
 
+/// Contention for the store while workers end: every cancel must come to an end, whatever it meets.
+#[test]
+fn cancels_in_the_last_moment_are_never_forgotten() {
+    let directory = tempfile::tempdir().unwrap();
+    let service = Service::start(directory.path(), &["--slots", "2"]);
+    let seed = seed();
+    let done = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                    let id =
+                        service.submit(&json!({"scene": {"kind": "redistance", "spacing": 0.2}, "priority": -100}));
+                    service.act(&id, "cancel");
+                }
+            });
+        }
+        for round in 0..30 {
+            let id = service.submit(&json!({"scene": {"kind": "redistance", "spacing": 0.05}, "priority": 100}));
+            eventually("the worker is there or has been", Duration::from_secs(20), || {
+                (service.job(&id)["attempt"] == 1).then_some(())
+            });
+            std::thread::sleep(Duration::from_secs_f64(0.12 * chance(seed, round)));
+            service.act(&id, "cancel");
+            service.wait_for(&id, &["canceled", "succeeded"]);
+        }
+        done.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+}
+
+/// The service is killed in the middle of its orderly shutdown, and again: a restart never counts against a job.
+#[test]
+fn shutdowns_that_are_cut_short_do_not_count() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut service = Service::start(directory.path(), &["--slots", "1"]);
+    let id = service.submit(&endless_job());
+    for attempt in 1..=4_u64 {
+        let pid = eventually("the attempt runs", Duration::from_secs(20), || {
+            (service.job(&id)["attempt"] == attempt).then(|| service.worker(&id)).flatten()
+        });
+        // The worker cannot rest: its step takes minutes.
+        signal(service.pid(), Signal::TERM);
+        eventually("the drain has begun", Duration::from_secs(10), || {
+            (service.job(&id)["state"] == "pausing").then_some(())
+        });
+        service.kill();
+        eventually("the worker goes with the service", Duration::from_secs(5), || {
+            let status = std::fs::read_to_string(format!("/proc/{pid}/status"));
+            (!status.is_ok_and(|s| !s.contains("State:\tZ"))).then_some(())
+        });
+        service.restart();
+    }
+    assert!(["queued", "running"].contains(&service.job(&id)["state"].as_str().unwrap()));
+    service.act(&id, "cancel");
+    service.wait_for(&id, &["canceled"]);
+}
+
 #[test]
 fn a_worker_that_dies_three_times_without_a_checkpoint_fails_the_job() {
     let directory = tempfile::tempdir().unwrap();

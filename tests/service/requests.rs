@@ -88,6 +88,8 @@ fn other_requests_get_problems_too() {
         ("GET", "/v1/jobs?stat=running", 422),
         ("GET", "/v1/jobs?state=asleep", 422),
         ("GET", "/v1/jobs?sort=size", 422),
+        ("GET", "/v1/jobs?created_after=yesterday", 422),
+        ("GET", "/v1/jobs/%FF", 400),
         ("POST", "/v1/jobs/job_nothing/cancel", 404),
         ("DELETE", "/v1/jobs/job_nothing", 404),
     ] {

@@ -55,6 +55,41 @@ fn rigid_motions_keep_the_shape() {
 }
 
 #[test]
+fn many_turns_are_measured_against_the_exact_place() {
+    // Three hundred turns of a hundred steps: what the error shows must be the integrator's phase, about
+    // 2π (2π/100)⁴/120 a turn, and no reference that has lost count.
+    let body = json!({
+        "kind": "vortex", "spacing": 0.1, "band_h": 4, "end_time": 300, "steps": 30000,
+        "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": std::f64::consts::TAU}
+    });
+    let rms = error(&run(&body), "phi", "rms", None);
+    assert!(rms < 0.02, "{rms}");
+}
+
+#[test]
+fn errors_half_way_do_not_depend_on_when_the_method_redistances() {
+    let flow = json!({"type": "single_vortex", "period": 2});
+    let body = json!({
+        "kind": "vortex", "spacing": 0.03125, "steps": 40, "end_time": 2, "flow": flow, "field": "overwrite",
+        "redistance": {"type": "every", "steps": 7}
+    });
+    assert!(error(&run(&body), "phi", "rms", Some(1.0)) < 0.02);
+}
+
+#[test]
+fn far_from_the_origin_and_with_a_tiny_cutoff_nothing_is_lost() {
+    let far = json!({"kind": "redistance", "shape": {"type": "circle", "center": [1e6, 0], "radius": 0.5}});
+    let report = run(&far);
+    // Coordinates have ten digits after the point left there.
+    assert!(error(&report, "phi", "max", None) < 1e-7 && report.newton.iterations_mean < 10.0);
+    assert!(report.newton.rescued.is_empty());
+    let tiny = json!({"kind": "redistance", "method": {"type": "pcp", "cutoff_h": 0.05}});
+    let report = run(&tiny);
+    assert!(error(&report, "phi", "max", None) < 1e-7);
+    assert!(!report.rescued_fits.contains_key("fits.lower_degree"));
+}
+
+#[test]
 fn zalesak_disk_turns_once() {
     let body = json!({
         "kind": "vortex", "spacing": 0.01, "band_h": 12, "end_time": std::f64::consts::TAU, "steps": 200,

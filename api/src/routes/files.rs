@@ -14,6 +14,7 @@ use meniscus_jobs::order::attempt_directory;
 use meniscus_jobs::store::FileRow;
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
@@ -27,7 +28,7 @@ pub async fn list(State(application): State<Application>, Path(id): Path<String>
 }
 
 fn location(application: &Application, job: &str, file: &FileRow) -> PathBuf {
-    attempt_directory(&application.store.job_directory(job), file.attempt).join(&file.path)
+    attempt_directory(&application.store.job_directory(job), file.attempt).join(&file.stored)
 }
 
 /// A file, or a part of it. The tag is its SHA-256.
@@ -58,10 +59,12 @@ pub async fn tar(State(application): State<Application>, Path(id): Path<String>)
     let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
     let places: Vec<(String, PathBuf)> =
         files.iter().map(|f| (f.path.clone(), location(&application, &id, f))).collect();
-    // A reader that is slow holds up this thread and nothing else.
+    // A reader that is slow holds up a thread; there are so many for archives and no more.
+    let permit = Arc::clone(&application.archives).try_acquire_owned().map_err(|_| ApiError::Busy)?;
     let (sender, receiver) = mpsc::channel::<Result<Bytes, io::Error>>(8);
     let top = id.clone();
     tokio::task::spawn_blocking(move || {
+        let _permit = permit;
         let mut archive = ::tar::Builder::new(ChannelWriter(sender.clone()));
         archive.mode(::tar::HeaderMode::Deterministic);
         let written = places

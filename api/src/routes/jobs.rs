@@ -13,7 +13,7 @@ use meniscus::scene::Violation;
 use meniscus::scene::check::closest;
 use meniscus_jobs::job::{Reason, State as JobState, Trigger};
 use meniscus_jobs::store::{Change, ChangeError, JobFilter, JobRow};
-use meniscus_jobs::{body, strict_json};
+use meniscus_jobs::{body, clock, strict_json};
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -43,8 +43,19 @@ pub async fn submit(
     let allowance = application.config.allowance();
     let row = with_store(&application, move |store| {
         let spec = strict_json::parse(&bytes).map_err(|error| ApiError::Unparsable(error.to_string()))?;
-        let find = |id: &str| store.restart_source(id).ok().flatten();
-        let body = body::parse(&spec, allowance, find)?;
+        // A failing store is not a missing checkpoint.
+        let mut failure = None;
+        let find = |id: &str| {
+            store.restart_source(id).unwrap_or_else(|error| {
+                failure = Some(error);
+                None
+            })
+        };
+        let body = body::parse(&spec, allowance, find);
+        if let Some(error) = failure {
+            return Err(error.into());
+        }
+        let body = body?;
         Ok(store.submit(&body)?)
     })
     .await?;
@@ -129,8 +140,14 @@ fn filter(query: &[(String, String)]) -> Result<JobFilter, ApiError> {
             }
             "kind" => filter.kind = Some(value.clone()),
             "name" => filter.name = Some(value.clone()),
-            "created_after" => filter.created_after = Some(value.clone()),
-            "created_before" => filter.created_before = Some(value.clone()),
+            "created_after" | "created_before" => match clock::parse(value) {
+                Some(time) if name == "created_after" => filter.created_after = Some(time),
+                Some(time) => filter.created_before = Some(time),
+                None => {
+                    let allowed = json!("a time such as 2026-11-22T01:39:32Z");
+                    errors.push(refuse(name, "type", "an RFC 3339 time is needed", value, allowed).into());
+                }
+            },
             "cursor" => filter.cursor = Some(value.clone()),
             "sort" => match value.as_str() {
                 "created_at" => filter.oldest_first = true,
@@ -230,6 +247,9 @@ async fn request(
     let row = with_store(application, move |store| {
         match store.change(&id, trigger, &change) {
             Err(ChangeError::Illegal(state, _)) if already.contains(&state) => {
+                if trigger == Trigger::Pause {
+                    store.keep_paused(&id)?;
+                }
                 store.job(&id)?.ok_or(ApiError::NotFound("job"))
             }
             // Somebody else changed it in the same moment: once more, on what it is now.

@@ -67,11 +67,12 @@ pub async fn series(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let row = job(&application, &id).await?;
-    let reader = application.clone();
+    let directory = application.store.job_directory(&row.id);
     // The newest attempt that has come so far continues all earlier ones.
+    let mut places = (1..=row.attempt).rev().map(|n| attempt_directory(&directory, n).join(series::FILE_NAME));
+    let newest = places.find(|place| place.is_file());
     let text =
-        with_store(&application, move |_| Ok(of_attempts(&reader, &row, series::FILE_NAME).pop().unwrap_or_default()))
-            .await?;
+        with_store(&application, move |_| Ok(newest.map(std::fs::read).transpose()?.unwrap_or_default())).await?;
     let wants_json = headers
         .get(header::ACCEPT)
         .and_then(|v| v.to_str().ok())
@@ -95,6 +96,6 @@ pub async fn report(
     let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
     let file = files.into_iter().find(|file| file.path == "report.json").ok_or(ApiError::NotFound("report yet"))?;
     let facts = FileFacts { sha256: Some(file.sha256), media_type: file.media_type, name: "report.json".to_owned() };
-    let place = attempt_directory(&application.store.job_directory(&id), file.attempt).join(&file.path);
+    let place = attempt_directory(&application.store.job_directory(&id), file.attempt).join(&file.stored);
     file_response(&place, &facts, &headers).await
 }

@@ -21,7 +21,7 @@ pub struct RestartSource {
 /// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields.
 pub(super) fn parse(
     restart: &Value,
-    find_checkpoint: &impl Fn(&str) -> Option<RestartSource>,
+    find_checkpoint: &mut impl FnMut(&str) -> Option<RestartSource>,
     errors: &mut Vec<Violation>,
 ) -> Option<(RestartSource, Value)> {
     const KNOWN: [&str; 3] = ["checkpoint", "overrides", "allow_other_isa"];

@@ -5,7 +5,7 @@ use super::cgroup::MemoryGroup;
 use super::{Executor, Exit, Worker};
 use std::fs::OpenOptions;
 use std::io::{self, Read, Write};
-use std::os::unix::process::ExitStatusExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -35,6 +35,7 @@ impl Executor for LocalExecutor {
         let errors =
             OpenOptions::new().create(true).append(true).open(attempt_directory.join(crate::worker::LOG_NAME))?;
         let mut child = Command::new(&self.program)
+            .arg0("meniscus")
             .arg("worker")
             .arg("--attempt")
             .arg(attempt_directory)

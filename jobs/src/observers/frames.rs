@@ -71,6 +71,7 @@ impl Frames {
         let (sha256, size_bytes) = digest::of_file(&path)?;
         let frame = FileRecord {
             path: name,
+            stored: None,
             size_bytes,
             sha256,
             media_type: HDF5.to_owned(),
@@ -88,8 +89,15 @@ impl Frames {
     pub fn write_index(&self) -> Result<FileRecord, ObserverError> {
         let files: Vec<_> = self.written.iter().map(|(_, f)| json!({"name": f.path, "time": f.time})).collect();
         let index = json!({"file-series-version": "1.0", "files": files});
-        artifacts::write(&self.directory.join(INDEX), index.to_string().as_bytes())?;
-        Ok(artifacts::record(&self.directory, INDEX, "application/json")?)
+        let text = index.to_string();
+        // What is published never changes under its stored name; the plain name beside it is for people who open the
+        // directory itself.
+        let stored = format!("index/{:06}.series", self.written.len());
+        std::fs::create_dir_all(self.directory.join("index"))?;
+        artifacts::write(&self.directory.join(&stored), text.as_bytes())?;
+        artifacts::write(&self.directory.join(INDEX), text.as_bytes())?;
+        let record = artifacts::record(&self.directory, &stored, "application/json")?;
+        Ok(FileRecord { path: INDEX.to_owned(), stored: Some(stored), ..record })
     }
 }
 

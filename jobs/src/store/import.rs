@@ -61,7 +61,12 @@ impl Store {
                 }
                 match record {
                     Record::Progress(progress) => latest = Some(progress),
-                    Record::Verdict(verdict) => imported.verdict = Some(verdict),
+                    Record::Verdict(verdict) => {
+                        // Kept with the offset, so that no crash can separate the two.
+                        let text = serde_json::to_string(&verdict)?;
+                        transaction.execute("UPDATE jobs SET verdict = ?2 WHERE id = ?1", params![job, text])?;
+                        imported.verdict = Some(verdict);
+                    }
                     Record::Checkpoint(checkpoint) => {
                         imported.has_checkpoint = true;
                         take_checkpoint(transaction, job, epoch, &checkpoint)?;
@@ -92,21 +97,6 @@ impl Store {
                 .prepare_cached("UPDATE jobs SET usage = ?3 WHERE id = ?1 AND attempt = ?2")?
                 .execute(params![job, epoch as i64, text])?;
             Ok(())
-        })
-    }
-
-    /// Counts a worker's death; a checkpoint since the last one starts the count anew. Returns the count.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn count_death(&self, job: &str, epoch: u64) -> Result<u32, StoreError> {
-        self.write(|transaction| {
-            transaction.execute(
-                "UPDATE jobs SET deaths = CASE WHEN checkpoint_since THEN 1 ELSE deaths + 1 END
-                 WHERE id = ?1 AND attempt = ?2",
-                params![job, epoch as i64],
-            )?;
-            Ok(transaction.query_row("SELECT deaths FROM jobs WHERE id = ?1", [job], |row| row.get(0))?)
         })
     }
 
@@ -165,8 +155,8 @@ fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Re
         Record::File(file) => {
             transaction
                 .prepare_cached(
-                    "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
-                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                    "INSERT OR REPLACE INTO files (job, path, stored, attempt, size_bytes, sha256, media_type, time, step)
+                     VALUES (?1, ?2, ?9, ?3, ?4, ?5, ?6, ?7, ?8)",
                 )?
                 .execute(params![
                     job,
@@ -177,6 +167,7 @@ fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Re
                     file.media_type,
                     file.time,
                     file.step.map(|step| step as i64),
+                    file.stored.as_ref().unwrap_or(&file.path),
                 ])?;
             if file.step.is_some() {
                 let data =

@@ -26,6 +26,8 @@ const MIGRATIONS: &[&str] = &["
         records_offset INTEGER NOT NULL DEFAULT 0,
         checkpoint_since INTEGER NOT NULL DEFAULT 0,
         worker_pid INTEGER,
+        verdict TEXT,
+        condemned TEXT,
         lease_until TEXT,
         progress TEXT,
         progress_count INTEGER NOT NULL DEFAULT 0,
@@ -49,6 +51,7 @@ const MIGRATIONS: &[&str] = &["
     CREATE TABLE files (
         job TEXT NOT NULL,
         path TEXT NOT NULL,
+        stored TEXT NOT NULL,
         attempt INTEGER NOT NULL,
         size_bytes INTEGER NOT NULL,
         sha256 TEXT NOT NULL,

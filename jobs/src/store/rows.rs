@@ -2,7 +2,7 @@
 
 use super::StoreError;
 use crate::job::{Reason, State};
-use crate::records::{Progress, Usage};
+use crate::records::{Progress, Usage, Verdict};
 use rusqlite::{Connection, OptionalExtension, Row};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -52,6 +52,10 @@ pub struct JobRow {
     pub has_new_checkpoint: bool,
     /// Process of the latest attempt.
     pub worker_pid: Option<u32>,
+    /// The worker's last word in this attempt, once it has come.
+    pub verdict: Option<Verdict>,
+    /// Why the service ended the worker, written before it did.
+    pub condemned: Option<Reason>,
     /// Progress.
     pub progress: Progress,
     /// Counts changes of progress.
@@ -73,6 +77,8 @@ pub struct JobRow {
 pub struct FileRow {
     /// Path among the job's files.
     pub path: String,
+    /// Path below the attempt's directory.
+    pub stored: String,
     /// Attempt that wrote it.
     pub attempt: u64,
     /// Bytes.
@@ -151,6 +157,8 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         records_offset: row.get::<_, i64>("records_offset")? as u64,
         has_new_checkpoint: row.get::<_, i64>("checkpoint_since")? != 0,
         worker_pid: row.get("worker_pid")?,
+        verdict: json(row, "verdict")?,
+        condemned: row.get::<_, Option<String>>("condemned")?.as_deref().and_then(Reason::from_word),
         progress: json(row, "progress")?,
         progress_count: row.get("progress_count")?,
         warnings: json(row, "warnings")?,
@@ -200,6 +208,7 @@ pub(super) fn files(connection: &Connection, job: &str) -> Result<Vec<FileRow>, 
     let rows = statement.query_map([job], |row| {
         Ok(FileRow {
             path: row.get("path")?,
+            stored: row.get("stored")?,
             attempt: row.get::<_, i64>("attempt")? as u64,
             size_bytes: row.get::<_, i64>("size_bytes")? as u64,
             sha256: row.get("sha256")?,

@@ -1,6 +1,7 @@
 //! Properties of the store on a real file.
 
 use super::import::ProgressPace;
+use super::settle::Loss;
 use super::{Change, ChangeError, JobFilter, JobRow, Store};
 use crate::body::{self, Allowance};
 use crate::job::{Reason, State, Trigger};
@@ -30,6 +31,7 @@ fn records(store: &Store, job: &JobRow, epoch: u64) -> RecordFile {
 fn frame(number: u64) -> Record {
     Record::File(FileRecord {
         path: format!("frames/{number:06}.vtkhdf"),
+        stored: None,
         size_bytes: 1,
         sha256: "0".into(),
         media_type: "x".into(),
@@ -42,7 +44,7 @@ fn frame(number: u64) -> Record {
 fn a_job_survives_reopening_and_its_events_have_no_gaps() {
     let (directory, store) = store();
     let job = submit(&store, &json!({"name": "a"}));
-    let claimed = store.claim(|_| true).unwrap().unwrap();
+    let claimed = store.claim(|_, _| true).unwrap().unwrap();
     assert_eq!((claimed.id.clone(), claimed.attempt, claimed.state), (job.id.clone(), 1, State::Running));
     drop(store);
     let store = Store::open(directory.path()).unwrap();
@@ -69,7 +71,7 @@ fn only_the_table_moves_a_job() {
 fn records_are_taken_once_and_never_from_another_attempt() {
     let (_directory, store) = store();
     let job = submit(&store, &json!({}));
-    store.claim(|_| true).unwrap();
+    store.claim(|_, _| true).unwrap();
     let mut first = records(&store, &job, 1);
     first.put(&frame(0), false).unwrap();
     first.put(&frame(1), false).unwrap();
@@ -79,7 +81,7 @@ fn records_are_taken_once_and_never_from_another_attempt() {
     assert_eq!(store.files(&job.id).unwrap().len(), 2);
     store.change(&job.id, Trigger::Lose, &Change::default()).unwrap();
     store.change(&job.id, Trigger::Requeue, &Change::default()).unwrap();
-    store.claim(|_| true).unwrap();
+    store.claim(|_, _| true).unwrap();
     // The orphan of attempt 1 goes on writing; nobody believes it.
     first.put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
     assert!(store.import(&job.id, 1, &mut pace).unwrap().verdict.is_none());
@@ -94,7 +96,7 @@ fn records_are_taken_once_and_never_from_another_attempt() {
 fn progress_never_falls_and_deaths_count_only_without_checkpoints() {
     let (_directory, store) = store();
     let job = submit(&store, &json!({}));
-    store.claim(|_| true).unwrap();
+    store.claim(|_, _| true).unwrap();
     let mut sink = records(&store, &job, 1);
     let mut pace = ProgressPace::default();
     for fraction in [0.5, 0.2] {
@@ -102,8 +104,17 @@ fn progress_never_falls_and_deaths_count_only_without_checkpoints() {
         store.import(&job.id, 1, &mut pace).unwrap();
         assert!((store.job(&job.id).unwrap().unwrap().progress.fraction - 0.5).abs() < 1e-15);
     }
-    assert_eq!(store.count_death(&job.id, 1).unwrap(), 1);
-    assert_eq!(store.count_death(&job.id, 1).unwrap(), 2);
+    let die = |epoch: u64| {
+        let loss = Loss { reason: Reason::WorkerCrash, is_death: true };
+        store.settle(&job.id, epoch, loss).unwrap();
+        let row = store.job(&job.id).unwrap().unwrap();
+        assert_eq!(row.state, State::Queued);
+        store.claim(|_, _| true).unwrap();
+        row.deaths
+    };
+    assert_eq!(die(1), 1);
+    assert_eq!(die(2), 2);
+    let mut sink = records(&store, &job, 3);
     let checkpoint = CheckpointRecord {
         id: "ckpt_1".into(),
         path: "checkpoints/1.h5".into(),
@@ -115,8 +126,9 @@ fn progress_never_falls_and_deaths_count_only_without_checkpoints() {
         build: String::new(),
     };
     sink.put(&Record::Checkpoint(checkpoint), true).unwrap();
-    store.import(&job.id, 1, &mut pace).unwrap();
-    assert_eq!(store.count_death(&job.id, 1).unwrap(), 1);
+    store.import(&job.id, 3, &mut pace).unwrap();
+    assert_eq!(die(3), 0);
+    assert_eq!(die(4), 1);
 }
 
 #[test]
@@ -126,10 +138,10 @@ fn the_queue_goes_by_priority_then_age_and_skips_what_does_not_fit() {
     let old = submit(&store, &json!({}));
     let new = submit(&store, &json!({}));
     let high = submit(&store, &json!({"priority": 5}));
-    let order: Vec<String> = std::iter::from_fn(|| store.claim(|_| true).unwrap().map(|job| job.id)).collect();
+    let order: Vec<String> = std::iter::from_fn(|| store.claim(|_, _| true).unwrap().map(|job| job.id)).collect();
     assert_eq!(order, [high.id, old.id, new.id, low.id]);
     submit(&store, &json!({}));
-    assert!(store.claim(|_| false).unwrap().is_none());
+    assert!(store.claim(|_, _| false).unwrap().is_none());
 }
 
 #[test]
@@ -158,4 +170,55 @@ fn deletion_takes_terminal_jobs_only_and_leftovers_are_swept() {
     std::fs::create_dir_all(&leftover).unwrap();
     store.sweep().unwrap();
     assert!(!leftover.exists());
+}
+
+#[test]
+fn a_verdict_survives_the_crash_between_import_and_settlement() {
+    let (directory, store) = store();
+    let job = submit(&store, &json!({}));
+    store.claim(|_, _| true).unwrap();
+    records(&store, &job, 1).put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
+    store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
+    drop(store);
+    let store = Store::open(directory.path()).unwrap();
+    store.settle(&job.id, 1, Loss { reason: Reason::ServerRestart, is_death: false }).unwrap();
+    assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Succeeded);
+}
+
+#[test]
+fn requests_that_come_while_a_worker_ends_are_kept() {
+    let (_directory, store) = store();
+    let loss = Loss { reason: Reason::WorkerCrash, is_death: true };
+    // A cancel before the settlement of a success.
+    let job = submit(&store, &json!({}));
+    store.claim(|_, _| true).unwrap();
+    records(&store, &job, 1).put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
+    store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
+    store.change(&job.id, Trigger::Cancel, &Change::because(Reason::UserCancel)).unwrap();
+    store.settle(&job.id, 1, loss).unwrap();
+    assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Canceled);
+    // A pause whose worker had to be ended: it rests, and nobody died.
+    let job = submit(&store, &json!({}));
+    store.claim(|_, _| true).unwrap();
+    store.change(&job.id, Trigger::Pause, &Change::because(Reason::UserPause)).unwrap();
+    store.settle(&job.id, 1, loss).unwrap();
+    let row = store.job(&job.id).unwrap().unwrap();
+    assert_eq!((row.state, row.reason, row.deaths), (State::Paused, Some(Reason::UserPause), 0));
+    // A drain whose service was killed before it heard the verdict.
+    let job = submit(&store, &json!({}));
+    store.claim(|_, _| true).unwrap();
+    store.change(&job.id, Trigger::Pause, &Change::because(Reason::ServerRestart)).unwrap();
+    records(&store, &job, 1).put(&Record::Verdict(Verdict::Paused { reason: None }), true).unwrap();
+    store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
+    store.settle(&job.id, 1, loss).unwrap();
+    assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Queued);
+    // A full disk during a person's pause does not make it go on by itself.
+    let job = submit(&store, &json!({"priority": 9}));
+    store.claim(|_, _| true).unwrap();
+    store.change(&job.id, Trigger::Pause, &Change::because(Reason::UserPause)).unwrap();
+    let verdict = Verdict::Paused { reason: Some(Reason::StorageEnospc) };
+    records(&store, &job, 1).put(&Record::Verdict(verdict), true).unwrap();
+    store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
+    store.settle(&job.id, 1, loss).unwrap();
+    assert_eq!(store.job(&job.id).unwrap().unwrap().reason, Some(Reason::UserPause));
 }

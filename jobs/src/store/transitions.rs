@@ -56,28 +56,31 @@ impl Store {
         self.write(|transaction| apply(transaction, id, trigger, change))
     }
 
-    /// Takes the next job of the queue whose memory fits, as a new attempt. Durable before any worker starts.
+    /// Takes the next job of the queue whose memory and disk (in bytes) fit, as a new attempt. Durable before any worker starts.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn claim(&self, fits: impl Fn(u64) -> bool) -> Result<Option<JobRow>, StoreError> {
-        let next: Option<(String, i64)> = {
+    pub fn claim(&self, fits: impl Fn(u64, u64) -> bool) -> Result<Option<JobRow>, StoreError> {
+        let next: Option<String> = {
             let connection = self.read();
             let mut statement = connection.prepare_cached(
-                "SELECT id, json_extract(estimate, '$.memory_bytes') FROM jobs WHERE state = 'queued'
+                "SELECT id, json_extract(estimate, '$.memory_bytes'), json_extract(estimate, '$.disk_bytes') FROM jobs WHERE state = 'queued'
                  ORDER BY priority DESC, id LIMIT 64",
             )?;
             let mut found = None;
-            for row in statement.query_map([], |row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?)))? {
-                let row = row?;
-                if fits(row.1 as u64) {
-                    found = Some(row);
+            let rows = statement.query_map([], |row| {
+                Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)? as u64, row.get::<_, i64>(2)? as u64))
+            })?;
+            for row in rows {
+                let (id, memory, disk) = row?;
+                if fits(memory, disk) {
+                    found = Some(id);
                     break;
                 }
             }
             found
         };
-        let Some((id, _)) = next else { return Ok(None) };
+        let Some(id) = next else { return Ok(None) };
         match self.change(&id, Trigger::Claim, &Change::default()) {
             Ok(job) => Ok(Some(job)),
             // Canceled or paused in between.
@@ -109,6 +112,35 @@ impl Store {
             connection.prepare_cached("SELECT * FROM jobs WHERE state = 'paused' AND reason = ?1 ORDER BY id")?;
         let rows = statement.query_map([reason.word()], rows::job_of)?;
         Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Writes down why the worker of an attempt is about to be ended.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn condemn(&self, id: &str, epoch: u64, reason: Reason) -> Result<(), StoreError> {
+        self.write(|transaction| {
+            transaction
+                .prepare_cached("UPDATE jobs SET condemned = ?3 WHERE id = ?1 AND attempt = ?2")?
+                .execute(params![id, epoch as i64, reason.word()])?;
+            Ok(())
+        })
+    }
+
+    /// A pause asked for by a person of a job that rests for another reason: it must not go on by itself.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn keep_paused(&self, id: &str) -> Result<(), StoreError> {
+        self.write(|transaction| {
+            let reason = Reason::UserPause;
+            transaction.execute(
+                "UPDATE jobs SET rev = rev + 1, reason = ?2, hint = ?3
+                 WHERE id = ?1 AND state = 'paused' AND reason IS NOT ?2",
+                params![id, reason.word(), reason.hint()],
+            )?;
+            Ok(())
+        })
     }
 
     /// Notes the process of an attempt and its lease.
@@ -150,7 +182,8 @@ pub(super) fn apply(
         .prepare_cached(
             "UPDATE jobs SET rev = rev + 1, state = ?3, reason = ?4, hint = ?5, message = ?6,
                  attempt = attempt + ?7, records_offset = CASE WHEN ?7 = 1 THEN 0 ELSE records_offset END,
-                 checkpoint_since = CASE WHEN ?7 = 1 THEN 0 ELSE checkpoint_since END,
+                 verdict = CASE WHEN ?7 = 1 THEN NULL ELSE verdict END,
+                 condemned = CASE WHEN ?7 = 1 THEN NULL ELSE condemned END,
                  worker_pid = CASE WHEN ?7 = 1 THEN NULL ELSE worker_pid END,
                  started_at = CASE WHEN ?7 = 1 THEN COALESCE(started_at, ?8) ELSE started_at END,
                  finished_at = CASE WHEN ?9 THEN ?8 ELSE NULL END, deaths = ?10, leg_wall_s = ?11

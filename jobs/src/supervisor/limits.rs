@@ -48,10 +48,10 @@ impl Supervisor {
             Some(_) => {}
         }
         if running.worker.silence() >= settings.stall {
-            running.condemned = Some(Reason::WorkerStalled);
+            self.store.condemn(&running.job, running.epoch, Reason::WorkerStalled)?;
             running.worker.kill();
         }
-        self.watch_memory(k);
+        self.watch_memory(k)?;
         self.renew_lease(k)?;
         if state == Some(State::Running) {
             self.watch_time_and_disk(k)?;
@@ -59,13 +59,15 @@ impl Supervisor {
         Ok(())
     }
 
-    fn watch_memory(&mut self, k: usize) {
+    fn watch_memory(&mut self, k: usize) -> Result<(), StoreError> {
         let running = &mut self.running[k];
         let limit = running.wishes.limits.memory_bytes;
         if process::resident_bytes(running.worker.pid()).is_some_and(|bytes| bytes > limit) {
-            running.condemned = Some(Reason::LimitMemory);
+            // Written down first: a crash of the service must not turn a limit into bad luck.
+            self.store.condemn(&running.job, running.epoch, Reason::LimitMemory)?;
             running.worker.kill();
         }
+        Ok(())
     }
 
     fn renew_lease(&mut self, k: usize) -> Result<(), StoreError> {
@@ -114,7 +116,8 @@ impl Supervisor {
         }
         self.space_checked = Instant::now();
         for job in self.store.paused_for(Reason::StorageEnospc)? {
-            let needed = job.estimate["memory_bytes"].as_u64().unwrap_or(0) + self.settings.disk_reserve_bytes;
+            let needed =
+                job.estimate["disk_bytes"].as_u64().unwrap_or(0).saturating_add(self.settings.disk_reserve_bytes);
             if process::free_space(self.store.directory()).is_some_and(|free| free > needed) {
                 self.store_change(&job.id, Trigger::Resume, &Change::default())?;
             }

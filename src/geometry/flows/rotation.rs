@@ -24,8 +24,13 @@ impl<const D: usize> Flow<D> for Rotation<D> {
         self.angular_velocity.abs() * ((center - self.center).norm() + radius)
     }
 
-    fn is_rigid(&self) -> bool {
-        true
+    fn rigid_path(&self, x: &Vector<D>, duration: f64) -> Option<Vector<D>> {
+        let (sin, cos) = (self.angular_velocity * duration).sin_cos();
+        let (dx, dy) = (x[0] - self.center[0], x[1] - self.center[1]);
+        let mut end = *x;
+        end[0] = self.center[0] + cos * dx - sin * dy;
+        end[1] = self.center[1] + sin * dx + cos * dy;
+        Some(end)
     }
 
     fn return_time(&self) -> Option<f64> {

@@ -23,10 +23,6 @@ impl Flow<2> for SingleVortex {
         1.0
     }
 
-    fn is_rigid(&self) -> bool {
-        false
-    }
-
     fn return_time(&self) -> Option<f64> {
         self.period
     }

@@ -18,8 +18,8 @@ impl<const D: usize> Flow<D> for Translation<D> {
         self.velocity.norm()
     }
 
-    fn is_rigid(&self) -> bool {
-        true
+    fn rigid_path(&self, x: &Vector<D>, duration: f64) -> Option<Vector<D>> {
+        Some(x + self.velocity * duration)
     }
 
     fn return_time(&self) -> Option<f64> {

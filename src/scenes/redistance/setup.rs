@@ -2,10 +2,10 @@
 
 use super::parameters::Written;
 use crate::closest_point::PcpMethod;
-use crate::geometry::Vector;
 use crate::geometry::lattice::Lattice;
+use crate::geometry::{Surface, Vector};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
-use crate::scenes::particle_estimate::{band_particles, memory_bytes};
+use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
 use crate::schemes::static_redistancing::{InitialLevel, StaticRedistancing, StaticSystem};
 use crate::simulation::Simulation;
@@ -40,9 +40,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         json!({"type": "ellipsoid", "center": null, "semi_axes": [0.75, 0.5, 0.5]})
     };
     let shape = written.shape.clone().unwrap_or(default_shape);
-    if let Err(found) = shapes::surface::<D>(&shape, "/shape") {
-        violations.extend(found);
-    }
+    let surface = shapes::surface::<D>(&shape, "/shape").map_err(|found| violations.extend(found)).ok();
     // Overwritten every step: distances become the input of the next redistancing.
     let default_ratio = if written.repeat > 1 { 2.0 } else { 1.5 };
     let method = match pcp_parameters::understand(&written.method, "/method", D, default_ratio) {
@@ -80,6 +78,15 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         violations.push(Violation::new("/band", "conflict", detail, &json!(written.band), Value::Null));
     }
     let band = written.band.unwrap_or(written.band_h.unwrap_or(12.0) * written.spacing);
+    if let (Some(surface), Some(method)) = (&surface, &method) {
+        let reach = (0.5 * band).max(method.reach_h::<D>() * written.spacing);
+        violations.extend(check_extent(surface.as_ref(), reach, written.spacing));
+        if initial == InitialLevel::Scaled && !is_scaling_positive(surface.as_ref(), reach) {
+            let detail = "the factor 1 + 0.5 x + 0.3 y must be positive over the whole band";
+            let allowed = json!(["quadric", "distance"]);
+            violations.push(Violation::new("/initial", "conflict", detail, &json!("scaled"), allowed));
+        }
+    }
     let Some(method) = method.filter(|_| violations.is_empty()) else {
         return Err(violations);
     };
@@ -100,6 +107,12 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         half_band: 0.5 * band,
         repeats: written.repeat,
     }))
+}
+
+/// Whether 1 + 0.5 x + 0.3 y is positive wherever particles are made.
+fn is_scaling_positive<const D: usize>(surface: &dyn Surface<D>, reach: f64) -> bool {
+    let (low, _) = surface.bounding_box();
+    1.0 + 0.5 * (low[0] - reach) + 0.3 * (low[1] - reach) > 0.0
 }
 
 /// The quadric of a shape that has one.

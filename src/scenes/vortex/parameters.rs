@@ -6,6 +6,8 @@ use crate::scenes::{pcp_parameters, shapes};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
+/// Below round-off no tolerance can be kept.
+const TOLERANCE: Kind = Kind::Number { above: None, least: Some(1e-15), below: None, most: Some(1.0) };
 const STEPS: Kind = Kind::Integer { least: 1, most: 1_000_000_000 };
 
 pub(super) static PARAMETERS: &[Parameter] = &[
@@ -91,7 +93,7 @@ static INTEGRATORS: &[Variant] = &[
     Variant {
         name: "dopri5",
         doc: "Dormand–Prince 5(4) with error control inside each step",
-        parameters: &[Parameter::new("tolerance", "error of an inner step", POSITIVE, DefaultValue::Json("1e-9"))],
+        parameters: &[Parameter::new("tolerance", "error of an inner step", TOLERANCE, DefaultValue::Json("1e-9"))],
     },
 ];
 

@@ -6,7 +6,7 @@ use crate::geometry::flows::{Rotation, SingleVortex, Translation};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{self, Vector};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
-use crate::scenes::particle_estimate::{band_particles, memory_bytes};
+use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
 use crate::schemes::advected_level_set::{AdvectedLevelSet, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen};
 use crate::simulation::Simulation;
@@ -45,8 +45,12 @@ pub(super) fn understand(parameters: &Value) -> Understood {
 
 fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let mut violations = Vec::new();
-    if let Err(found) = shapes::surface::<D>(&written.shape, "/shape") {
-        violations.extend(found);
+    match shapes::surface::<D>(&written.shape, "/shape") {
+        Ok(surface) => {
+            let half_band = 0.5 * written.band_h * written.spacing;
+            violations.extend(check_extent(surface.as_ref(), half_band, written.spacing));
+        }
+        Err(found) => violations.extend(found),
     }
     if let Err(found) = flow::<D>(&written.flow) {
         violations.push(found);

@@ -95,11 +95,11 @@ impl<const D: usize> ExactFront<'_, D> {
     pub fn signed_distance(&self, x: &Vector<D>) -> f64 {
         let flow = self.motion.flow.as_ref();
         match &self.advected {
-            None if self.motion.flow.is_rigid() => {
-                // A rigid motion keeps distances.
-                self.motion.surface.signed_distance(&TOLERANCE.advance(flow, x, self.time, -self.time))
+            // A rigid motion keeps distances; whatever else has no front of its own is back at its start.
+            None => {
+                let start = flow.rigid_path(x, -self.time).unwrap_or(*x);
+                self.motion.surface.signed_distance(&start)
             }
-            None => self.motion.surface.signed_distance(x),
             Some(front) => {
                 let start = TOLERANCE.advance(flow, x, self.time, -self.time);
                 front.distance(x).copysign(self.motion.surface.signed_distance(&start))

@@ -1,7 +1,9 @@
 //! Transport and redistancing step by step.
 
 use super::system::{AdvectedSystem, FieldChoice, RedistanceWhen};
+use crate::closest_point::Redistancing;
 use crate::closest_point::enclosed_measure::enclosed_measure;
+use crate::particles::Particles;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, entry, rescued};
 use crate::simulation::state::check_length;
 use crate::simulation::{
@@ -119,12 +121,16 @@ impl<const D: usize> AdvectedLevelSet<D> {
         Ok(())
     }
 
-    fn measure_errors(&mut self, time: f64) {
+    /// Errors of particles and surface against the exact motion.
+    fn measure_errors(
+        &self,
+        time: f64,
+        particles: &Particles<D>,
+        surface: &Redistancing<D>,
+        measure: f64,
+    ) -> Option<MeasuredErrors> {
         let system = &self.system;
-        let Some(front) = system.motion.front(time, system.spacing) else {
-            return;
-        };
-        let particles = &system.particles;
+        let front = system.motion.front(time, system.spacing)?;
         let band = particles.flag(system.columns.in_band);
         let phi = particles.scalar(system.columns.phi);
         let differences: Vec<f64> = (0..particles.len())
@@ -136,16 +142,32 @@ impl<const D: usize> AdvectedLevelSet<D> {
         for difference in differences {
             norms.add(difference);
         }
-        let (samples_mean, samples_max) = system.redistancing.over_samples(|x| front.signed_distance(x).abs());
+        let (samples_mean, samples_max) = surface.over_samples(|x| front.signed_distance(x).abs());
         let exact = system.motion.surface().measure();
-        self.errors.push(MeasuredErrors {
+        Some(MeasuredErrors {
             time,
             phi_rms: norms.rms(),
             phi_max: norms.max(),
-            measure_relative: (self.measure - exact).abs() / exact,
+            measure_relative: (measure - exact).abs() / exact,
             samples_mean,
             samples_max,
-        });
+        })
+    }
+
+    /// Takes the errors of this moment: of the particles as they are where they were just redistanced, else of a copy,
+    /// so that asking for an error never becomes part of the physics.
+    fn take_errors(&mut self, now: Clock) -> Result<(), StepError> {
+        let start = (self.phases.clock())();
+        let measured = if self.redistanced == now.step {
+            self.measure_errors(now.time, &self.system.particles, &self.system.redistancing, self.measure)
+        } else {
+            let (particles, surface) = self.system.redistanced_copy();
+            let measure = enclosed_measure(&surface, self.system.spacing, &self.system.interrupt)?;
+            self.measure_errors(now.time, &particles, &surface, measure)
+        };
+        self.errors.extend(measured);
+        self.phases.book("errors", (self.phases.clock())() - start);
+        Ok(())
     }
 }
 
@@ -173,19 +195,21 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             if self.system.redistancing.is_lost() {
                 return Err(StepError::InterfaceLost { step: next.step, time: next.time });
             }
+            let columns = &self.system.columns;
+            if let Some((field, particle)) = columns.find_broken(&self.system.particles) {
+                return Err(StepError::NonFinite { field, particle, step: next.step, time: next.time });
+            }
             self.redistanced = next.step;
-            let error_due = self.is_error_due(next.step);
-            if error_due || self.plan.is_series_due(&self.fixed, next.step) {
+            if self.is_error_due(next.step) || self.plan.is_series_due(&self.fixed, next.step) {
                 let system = &self.system;
-                self.measure =
-                    self.phases.measure("measure", || enclosed_measure(&system.redistancing, system.spacing));
+                self.measure = self
+                    .phases
+                    .measure("measure", || enclosed_measure(&system.redistancing, system.spacing, &system.interrupt))?;
                 self.measured = next.step;
             }
-            if error_due {
-                let start = (self.phases.clock())();
-                self.measure_errors(next.time);
-                self.phases.book("errors", (self.phases.clock())() - start);
-            }
+        }
+        if self.is_error_due(next.step) {
+            self.take_errors(next)?;
         }
         self.step = next.step;
         Ok(())
@@ -214,11 +238,11 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let particles = if self.redistanced == self.step {
             &self.system.particles
         } else {
-            fresh = self.system.redistanced_copy();
+            fresh = self.system.redistanced_copy().0;
             &fresh
         };
         let mut fields = Fields::at(particles.positions());
-        fields.surface(particles, &self.system.columns);
+        fields.surface(particles, &self.system.columns, true);
         if self.system.field == FieldChoice::Dual {
             fields.scalar("psi", particles.scalar(self.system.psi).to_vec());
         }

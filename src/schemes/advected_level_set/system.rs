@@ -70,9 +70,8 @@ impl<const D: usize> AdvectedSystem<D> {
         let surface = motion.surface();
         let (low, high) = surface.bounding_box();
         let margin = half_band + spacing;
-        let positions = lattice.points_in(&low.add_scalar(-margin), &high.add_scalar(margin), |x| {
-            surface.signed_distance(x).abs() <= half_band
-        });
+        let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
+        let positions = lattice.points_near(&low, &high, half_band, |x| surface.signed_distance(x), &interrupt);
         let mut particles = Particles::new(positions);
         let psi = particles.add_scalar("psi", 0.0);
         let columns = SurfaceColumns::add(&mut particles);
@@ -151,8 +150,9 @@ impl<const D: usize> AdvectedSystem<D> {
         Ok(())
     }
 
-    /// A copy of the particles with the surface columns of the present moment, for a frame between redistancings.
-    pub(super) fn redistanced_copy(&self) -> Particles<D> {
+    /// A copy of the particles with the surface columns of the present moment, and its surface, for what is asked
+    /// between redistancings.
+    pub(super) fn redistanced_copy(&self) -> (Particles<D>, Redistancing<D>) {
         let mut particles = self.particles.clone();
         let mut surface = Redistancing::new(self.method.clone(), Domain::unbounded(), self.spacing);
         let never = Interrupt::default();
@@ -165,6 +165,6 @@ impl<const D: usize> AdvectedSystem<D> {
         if found.is_ok() {
             self.columns.store(&mut particles, self.psi, &answers, self.half_band);
         }
-        particles
+        (particles, surface)
     }
 }

@@ -29,9 +29,8 @@ impl<const D: usize> StaticRedistancing<D> {
     /// The numbers of a step must be numbers.
     fn check_finite(&self) -> Result<(), StepError> {
         let Clock { step, time } = self.fixed.clock(self.step + 1);
-        let phi = self.system.particles.scalar(self.system.columns.phi);
-        match phi.iter().position(|v| !v.is_finite()) {
-            Some(particle) => Err(StepError::NonFinite { field: "phi", particle, step, time }),
+        match self.system.columns.find_broken(&self.system.particles) {
+            Some((field, particle)) => Err(StepError::NonFinite { field, particle, step, time }),
             None => Ok(()),
         }
     }
@@ -129,7 +128,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
     fn fields(&self) -> Fields {
         let particles = &self.system.particles;
         let mut fields = Fields::at(particles.positions());
-        fields.surface(particles, &self.system.columns);
+        fields.surface(particles, &self.system.columns, self.step > 0);
         fields.id("particle_id", (0..particles.len() as u64).collect());
         fields
     }

@@ -56,9 +56,8 @@ impl<const D: usize> StaticSystem<D> {
         let reach = half_band.max(method.reach_h::<D>() * spacing);
         let (low, high) = surface.bounding_box();
         let margin = reach + spacing;
-        let positions = lattice.points_in(&low.add_scalar(-margin), &high.add_scalar(margin), |x| {
-            surface.signed_distance(x).abs() <= reach
-        });
+        let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
+        let positions = lattice.points_near(&low, &high, reach, |x| surface.signed_distance(x), &interrupt);
         let mut particles = Particles::new(positions);
         let level = particles.add_scalar("level", 0.0);
         let columns = SurfaceColumns::add(&mut particles);

@@ -14,7 +14,7 @@ const C: [f64; 6] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
 /// Fifth-order less fourth-order weights.
 const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
-/// Inner steps after which the rest is taken in one, so that a wild field cannot hang a run.
+/// Inner steps after which the path counts as lost (not a number), so that a wild field cannot hang a run.
 const MOST_STEPS: u32 = 100_000;
 
 pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64, dt: f64, tolerance: f64) -> Vector<D> {
@@ -47,7 +47,8 @@ pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64,
             error += k[j] * *e;
         }
         let error = (error * step).norm();
-        if error <= tolerance {
+        // Below round-off no tolerance can be kept.
+        if error <= tolerance.max(4.0 * f64::EPSILON * x.amax()) {
             x = next;
             if last {
                 return x;
@@ -57,5 +58,5 @@ pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64,
         }
         h = step.abs() * (0.9 * (tolerance / error.max(1e-300)).powf(0.2)).clamp(0.2, 5.0);
     }
-    x
+    Vector::<D>::repeat(f64::NAN)
 }
