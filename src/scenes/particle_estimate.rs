@@ -16,7 +16,7 @@ pub fn check_extent<const D: usize>(surface: &dyn Surface<D>, reach: f64, spacin
     let (low, high) = surface.bounding_box();
     let farthest = low.abs().sup(&high.abs()).max() + reach + spacing;
     let nodes = farthest / spacing;
-    if nodes.is_finite() && nodes <= MOST_NODES && nodes >= 1.0 {
+    if (1.0..=MOST_NODES).contains(&nodes) {
         return None;
     }
     let detail =
