@@ -186,7 +186,7 @@ fn restore(
                 return Err(Failure::Known(Reason::CheckpointIncompatible, message));
             }
             Err(Refusal::Incompatible(message) | Refusal::Damaged(message)) => {
-                refuse(order, candidate, &message, sink, log)?
+                refuse(order, candidate, &message, sink, log)?;
             }
         }
     }
