@@ -64,6 +64,13 @@ pub enum ApiError {
     NotFound(&'static str),
     /// The path or the query is not text as it must be.
     BadRequest,
+    /// The files of a job would not fit.
+    NoSpace {
+        /// Bytes that it will write.
+        needed: u64,
+        /// Bytes that are free beyond the reserve.
+        room: u64,
+    },
     /// Too many of the same are under way.
     Busy,
     /// The path exists, the method does not.
@@ -94,6 +101,12 @@ impl ApiError {
                 (StatusCode::NOT_FOUND, "not-found", "not found", Some(format!("there is no such {what}")))
             }
             Self::BadRequest => (StatusCode::BAD_REQUEST, "bad-request", "the path or the query cannot be read", None),
+            Self::NoSpace { needed, room } => {
+                let detail = format!(
+                    "the job will write about {needed} bytes, {room} are free: fewer frames (/output/every_time), fewer checkpoints (/checkpoint/keep) or a larger spacing need less"
+                );
+                (StatusCode::INSUFFICIENT_STORAGE, "no-space", "the files of this job would not fit", Some(detail))
+            }
             Self::Busy => (StatusCode::SERVICE_UNAVAILABLE, "busy", "too many of these are under way", None),
             Self::MethodNotAllowed => {
                 (StatusCode::METHOD_NOT_ALLOWED, "method-not-allowed", "this resource does not do that", None)

@@ -9,12 +9,15 @@ use crate::job::{Reason, State, Trigger};
 use crate::order::{self, Order, StartCheckpoint, attempt_directory};
 use crate::process;
 use crate::records::Usage;
-use crate::store::import::ProgressPace;
+use crate::store::import::{Imported, ProgressPace};
 use crate::store::settle::Loss;
 use crate::store::{Change, ChangeError, JobRow, START_CHECKPOINT, Store, StoreError};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
+
+/// Free space that no job may use up.
+pub const DISK_RESERVE_BYTES: u64 = 64 << 20;
 
 /// How the supervisor behaves.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +43,7 @@ impl Settings {
             stall: Duration::from_secs(30),
             cancel_grace: Duration::from_millis(1200),
             pause_grace: Duration::from_secs(10),
-            disk_reserve_bytes: 64 << 20,
+            disk_reserve_bytes: DISK_RESERVE_BYTES,
         }
     }
 }
@@ -231,7 +234,11 @@ impl Supervisor {
         let running = &mut self.running[k];
         // The exit is noted before the last import, so that nothing written before it is missed.
         let exit = running.worker.poll()?;
-        let imported = self.store.import(&running.job, running.epoch, &mut running.pace)?;
+        // Records that cannot be read are as good as none; limits and the end are looked after all the same.
+        let imported = self.store.import(&running.job, running.epoch, &mut running.pace).unwrap_or_else(|error| {
+            tracing::error!(job = running.job, %error, "records could not be imported");
+            Imported::default()
+        });
         if imported.has_checkpoint {
             self.prune_checkpoints(k)?;
         }

@@ -57,7 +57,7 @@ pub fn enclosed_measure<const D: usize>(
             (0..counts[0])
                 .map(|k| {
                     corner[0] = low[0] + k as f64 * edge;
-                    if interrupt.is_raised() { 0.0 } else { inside_of_cell(surface, &corner, edge, halvings) }
+                    if interrupt.is_raised() { 0.0 } else { inside_of_cell(surface, &corner, edge, halvings, spacing) }
                 })
                 .sum()
         })
@@ -66,16 +66,26 @@ pub fn enclosed_measure<const D: usize>(
     Ok(sums.iter().sum())
 }
 
+/// Distance from the surface, in spacings, beyond which the nearest particle tells the side and not the nearest foot:
+/// of a surface with gaps, a foot at the rim of a gap faces nowhere in particular.
+const FAR: f64 = 2.0;
+
 /// The inside part of one cubic cell.
-fn inside_of_cell<const D: usize>(surface: &Redistancing<D>, corner: &Vector<D>, edge: f64, halvings: u32) -> f64 {
+fn inside_of_cell<const D: usize>(
+    surface: &Redistancing<D>,
+    corner: &Vector<D>,
+    edge: f64,
+    halvings: u32,
+    spacing: f64,
+) -> f64 {
     let whole = edge.powi(D as i32);
     let centre = corner.add_scalar(0.5 * edge);
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();
-    let Some(foot) = surface.query(&centre, f64::INFINITY) else {
-        return 0.0;
-    };
+    let Some(foot) = surface.query(&centre, f64::INFINITY) else { return 0.0 };
     if foot.distance >= half_diagonal {
-        return if foot.is_outside { 0.0 } else { whole };
+        let far = foot.distance > FAR * spacing;
+        let is_inside = if far { surface.is_nearest_particle_inside(&centre) } else { !foot.is_outside };
+        return if is_inside { whole } else { 0.0 };
     }
     if halvings == 0 {
         let signed = if foot.is_outside { foot.distance } else { -foot.distance };
@@ -85,7 +95,7 @@ fn inside_of_cell<const D: usize>(surface: &Redistancing<D>, corner: &Vector<D>,
     (0..1_usize << D)
         .map(|octant| {
             let child = Vector::<D>::from_fn(|d, _| corner[d] + half * (octant >> d & 1) as f64);
-            inside_of_cell(surface, &child, half, halvings - 1)
+            inside_of_cell(surface, &child, half, halvings - 1, spacing)
         })
         .sum()
 }

@@ -41,6 +41,7 @@ pub struct Redistancing<const D: usize> {
     regression: Regression<D>,
     cells: CellList<D>,
     is_near: Vec<bool>,
+    is_inside: Vec<bool>,
     near: Vec<usize>,
     fitted: Vec<Option<Sample<D>>>,
     coefficients: Vec<f64>,
@@ -74,6 +75,7 @@ impl<const D: usize> Redistancing<D> {
             domain,
             spacing,
             is_near: Vec::new(),
+            is_inside: Vec::new(),
             near: Vec::new(),
             fitted: Vec::new(),
             coefficients: Vec::new(),
@@ -122,6 +124,8 @@ impl<const D: usize> Redistancing<D> {
         let threshold = self.method.sample_threshold_h * self.spacing;
         self.cells.rebuild(positions.iter().copied(), threshold);
         self.is_near.resize(positions.len(), false);
+        self.is_inside.clear();
+        self.is_inside.extend(level.iter().map(|l| *l < 0.0));
         let cells = &self.cells;
         self.is_near.par_chunks_mut(BLOCK).enumerate().for_each(|(block, flags)| {
             if interrupt.is_raised() {
@@ -296,6 +300,13 @@ impl<const D: usize> Redistancing<D> {
             tally.book(&self.counts);
         });
         interrupt.check()
+    }
+
+    /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
+    /// the surface has gaps.
+    #[must_use]
+    pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
+        self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.is_inside[i])
     }
 
     /// Whether the surface has no sample at all.

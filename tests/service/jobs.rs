@@ -215,6 +215,16 @@ fn event_streams_have_no_gaps_and_end_with_the_job() {
     let middle = ids.len() as u64 / 2;
     assert_eq!(stream(Some(middle)).1, (middle + 1..=ids.len() as u64).collect::<Vec<_>>());
     assert!(stream(Some(ids.len() as u64)).0.contains("204"));
+    assert!(stream(Some(u64::MAX)).0.contains("204"));
+    let last = service.events(&id).into_iter().rfind(|e| e["type"] == "progress").unwrap();
+    assert_eq!(last["data"]["fraction"], 1.0);
+    // A stream beyond the end of a running job ends with it.
+    let running = service.submit(&steady_job());
+    let mut socket = TcpStream::connect(service.url.trim_start_matches("http://")).unwrap();
+    write!(socket, "GET /v1/jobs/{running}/events HTTP/1.1\r\nHost: localhost\r\nAccept: text/event-stream\r\nLast-Event-ID: 100000\r\nConnection: close\r\n\r\n").unwrap();
+    socket.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    assert!(BufReader::new(socket).lines().all(|line| line.is_ok()));
+    assert_eq!(service.job(&running)["state"], "succeeded");
 }
 
 #[test]

@@ -68,6 +68,10 @@ fn bad_bodies_name_every_error_and_start_nothing() {
             assert!(error["detail"].is_string() && error.get("got").is_some() && error.get("allowed").is_some());
         }
     }
+    let many_frames = json!({"scene": {"kind": "redistance", "spacing": 0.002, "repeat": 1_000_000}, "output": {"every_time": 0.001}});
+    let answer = service.post("/v1/jobs", &many_frames);
+    assert_eq!(answer.status, 507, "{}", answer.text());
+    assert!(answer.json()["detail"].as_str().unwrap().contains("every_time"));
     let typo = service.post("/v1/jobs", &json!({"scene": {"kind": "vortx"}})).json();
     assert_eq!(typo["errors"][0]["did_you_mean"], "vortex");
     assert_eq!(service.get("/v1/jobs").json()["items"], json!([]));

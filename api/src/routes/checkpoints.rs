@@ -74,8 +74,11 @@ pub async fn delete(State(application): State<Application>, Path(id): Path<Strin
             owner.state.word()
         )));
     }
-    with_store(&application, move |store| Ok(store.delete_checkpoint(&row)?)).await?;
-    Ok(StatusCode::NO_CONTENT)
+    // A download that is under way keeps its file open and comes to its end.
+    if with_store(&application, move |store| Ok(store.delete_checkpoint(&row)?)).await? {
+        return Ok(StatusCode::NO_CONTENT);
+    }
+    Err(ApiError::Conflict("a restart from it has not ended".to_owned()))
 }
 
 /// The file of a checkpoint, or a part of it.

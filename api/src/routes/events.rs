@@ -93,6 +93,14 @@ async fn feed(
             return;
         };
         let is_empty = events.is_empty();
+        if is_empty {
+            // Beyond the last event of a job that has ended, or is gone, nothing will come.
+            let ended = job(&application, &id).await.map_or(true, |row| row.state.is_terminal());
+            let more = page(&application, &id, after, 1).await.is_ok_and(|events| !events.is_empty());
+            if ended && !more {
+                return;
+            }
+        }
         for event in events {
             after = event.id;
             let ends = event.kind == "state"

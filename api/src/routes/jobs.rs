@@ -13,7 +13,8 @@ use meniscus::scene::Violation;
 use meniscus::scene::check::closest;
 use meniscus_jobs::job::{Reason, State as JobState, Trigger};
 use meniscus_jobs::store::{Change, ChangeError, JobFilter, JobRow};
-use meniscus_jobs::{body, clock, strict_json};
+use meniscus_jobs::supervisor::DISK_RESERVE_BYTES;
+use meniscus_jobs::{body, clock, process, strict_json};
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -28,7 +29,7 @@ const PAGE: (u64, u64) = (50, 500);
 #[utoipa::path(post, path = "/v1/jobs", tag = "jobs",
     request_body(content = Object, description = "a job body: {\"scene\": {\"kind\": …}} at least; see /v1/scenes"),
     responses((status = 201, body = JobView, headers(("Location" = String))), (status = 400, body = Problem),
-        (status = 413, body = Problem), (status = 422, body = Problem), (status = 503, body = Problem)))]
+        (status = 413, body = Problem), (status = 422, body = Problem), (status = 503, body = Problem), (status = 507, body = Problem)))]
 pub async fn submit(
     State(application): State<Application>,
     headers: HeaderMap,
@@ -39,7 +40,10 @@ pub async fn submit(
     if announced.is_some_and(|length| length > BODY_LIMIT) {
         return Err(ApiError::TooLarge(BODY_LIMIT));
     }
-    let bytes = axum::body::to_bytes(content, BODY_LIMIT).await.map_err(|_| ApiError::TooLarge(BODY_LIMIT))?;
+    let bytes = axum::body::to_bytes(content, BODY_LIMIT).await.map_err(|error| {
+        let text = std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string);
+        if text.contains("length limit") { ApiError::TooLarge(BODY_LIMIT) } else { ApiError::Unparsable(text) }
+    })?;
     let allowance = application.config.allowance();
     let row = with_store(&application, move |store| {
         let spec = strict_json::parse(&bytes).map_err(|error| ApiError::Unparsable(error.to_string()))?;
@@ -56,6 +60,10 @@ pub async fn submit(
             return Err(error.into());
         }
         let body = body?;
+        let room = process::free_space(store.directory()).unwrap_or(u64::MAX).saturating_sub(DISK_RESERVE_BYTES);
+        if body.disk_bytes > room {
+            return Err(ApiError::NoSpace { needed: body.disk_bytes, room });
+        }
         Ok(store.submit(&body)?)
     })
     .await?;
@@ -215,7 +223,7 @@ pub async fn get(
         }
         row = job(&application, &id).await?;
     } else if known.as_deref() == Some(tag(&row).as_str()) {
-        return Ok(StatusCode::NOT_MODIFIED.into_response());
+        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag(&row))]).into_response());
     }
     let tag = HeaderValue::from_str(&tag(&row)).map_err(|e| ApiError::Internal(e.to_string()))?;
     let mut response = Json(JobView::from(row)).into_response();

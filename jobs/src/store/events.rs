@@ -44,19 +44,20 @@ impl Store {
         let connection = self.read();
         let mut statement =
             connection.prepare_cached("SELECT * FROM events WHERE job = ?1 AND id > ?2 ORDER BY id LIMIT ?3")?;
-        let rows = statement.query_map(params![job, after as i64, limit as i64], |row| {
-            let data: String = row.get("data")?;
-            Ok((
-                Event {
-                    id: row.get::<_, i64>("id")? as u64,
-                    kind: row.get("type")?,
-                    at: row.get("at")?,
-                    attempt: row.get::<_, i64>("attempt")? as u64,
-                    data: Value::Null,
-                },
-                data,
-            ))
-        })?;
+        let rows =
+            statement.query_map(params![job, i64::try_from(after).unwrap_or(i64::MAX), limit as i64], |row| {
+                let data: String = row.get("data")?;
+                Ok((
+                    Event {
+                        id: row.get::<_, i64>("id")? as u64,
+                        kind: row.get("type")?,
+                        at: row.get("at")?,
+                        attempt: row.get::<_, i64>("attempt")? as u64,
+                        data: Value::Null,
+                    },
+                    data,
+                ))
+            })?;
         rows.map(|row| {
             let (event, data) = row?;
             Ok(Event { data: serde_json::from_str(&data)?, ..event })

@@ -3,7 +3,7 @@
 
 use super::{Store, StoreError, events, rows};
 use crate::records::{self, CheckpointRecord, Line, Progress, Record, Usage, Verdict};
-use rusqlite::{Transaction, params};
+use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
@@ -80,6 +80,8 @@ impl Store {
                 if due {
                     pace.last = Some(Instant::now());
                 }
+            } else if imported.verdict.is_some() {
+                flush_progress(transaction, job, epoch)?;
             }
             Ok(())
         })?;
@@ -100,19 +102,30 @@ impl Store {
         })
     }
 
-    /// Takes one checkpoint out of the store and removes its file.
+    /// Takes one checkpoint out of the store and removes its file; false while a restart from it has not ended.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn delete_checkpoint(&self, row: &super::CheckpointRow) -> Result<(), StoreError> {
-        self.write(|transaction| -> Result<(), StoreError> {
+    pub fn delete_checkpoint(&self, row: &super::CheckpointRow) -> Result<bool, StoreError> {
+        let deleted = self.write(|transaction| -> Result<bool, StoreError> {
+            let users: i64 = transaction.query_row(
+                "SELECT COUNT(*) FROM jobs WHERE restarted_from = ?1 AND state NOT IN ('succeeded', 'failed', 'canceled')",
+                [&row.id],
+                |row| row.get(0),
+            )?;
+            if users > 0 {
+                return Ok(false);
+            }
             transaction.execute("DELETE FROM checkpoints WHERE id = ?1", [&row.id])?;
-            Ok(())
+            Ok(true)
         })?;
+        if !deleted {
+            return Ok(false);
+        }
         let directory = crate::order::attempt_directory(&self.job_directory(&row.job), row.attempt);
         match std::fs::remove_file(directory.join(&row.path)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
-            _ => Ok(()),
+            _ => Ok(true),
         }
     }
 
@@ -224,6 +237,32 @@ fn take_checkpoint(
     Ok(events::append(transaction, job, epoch, "checkpoint", &data)?)
 }
 
+/// The last progress as an event, if the coalescing held it back: the end of a run is never missing.
+fn flush_progress(transaction: &Transaction, job: &str, epoch: u64) -> Result<(), StoreError> {
+    let Some(row) = rows::job(transaction, job)? else { return Ok(()) };
+    let told: Option<u64> = transaction
+        .query_row(
+            "SELECT json_extract(data, '$.step') FROM events WHERE job = ?1 AND type = 'progress' ORDER BY id DESC LIMIT 1",
+            [job],
+            |row| row.get::<_, Option<i64>>(0),
+        )
+        .optional()?
+        .flatten()
+        .map(|step| step as u64);
+    if row.progress_count > 0 && told != Some(row.progress.step) {
+        append_progress(transaction, job, epoch, &row.progress)?;
+    }
+    Ok(())
+}
+
+fn append_progress(transaction: &Transaction, job: &str, epoch: u64, progress: &Progress) -> Result<(), StoreError> {
+    let data = json!({
+        "fraction": progress.fraction, "time": progress.time, "step": progress.step,
+        "steps_per_s": progress.steps_per_s, "eta_s": progress.eta_s,
+    });
+    Ok(events::append(transaction, job, epoch, "progress", &data)?)
+}
+
 fn take_progress(
     transaction: &Transaction,
     job: &str,
@@ -239,11 +278,7 @@ fn take_progress(
         .prepare_cached("UPDATE jobs SET progress = ?2, usage = ?3, progress_count = progress_count + 1 WHERE id = ?1")?
         .execute(params![job, serde_json::to_string(&shown)?, serde_json::to_string(&progress.usage)?])?;
     if is_event {
-        let data = json!({
-            "fraction": shown.fraction, "time": shown.time, "step": shown.step,
-            "steps_per_s": shown.steps_per_s, "eta_s": shown.eta_s,
-        });
-        events::append(transaction, job, epoch, "progress", &data)?;
+        append_progress(transaction, job, epoch, &shown)?;
     }
     Ok(())
 }

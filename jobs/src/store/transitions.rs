@@ -65,7 +65,7 @@ impl Store {
             let connection = self.read();
             let mut statement = connection.prepare_cached(
                 "SELECT id, json_extract(estimate, '$.memory_bytes'), json_extract(estimate, '$.disk_bytes') FROM jobs WHERE state = 'queued'
-                 ORDER BY priority DESC, id LIMIT 64",
+                 ORDER BY priority DESC, id",
             )?;
             let mut found = None;
             let rows = statement.query_map([], |row| {
