@@ -1,0 +1,62 @@
+//! A step allocates nothing once its storage has grown to what it needs.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(unsafe_code, reason = "a global allocator that counts cannot be written without")]
+
+#[path = "support/mod.rs"]
+#[expect(dead_code, reason = "each test target uses a part")]
+mod support;
+
+use serde_json::json;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+use support::{build, pool};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is passed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: as the caller promised.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promised.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn steps_allocate_nothing_after_warm_up() {
+    let bodies = [
+        json!({"kind": "redistance", "spacing": 0.03125, "repeat": 12}),
+        json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 12}),
+        json!({"kind": "vortex", "spacing": 0.03125, "steps": 12, "end_time": 0.5}),
+        json!({
+            "kind": "vortex", "spacing": 0.03125, "steps": 12, "end_time": 0.1, "field": "overwrite",
+            "flow": {"type": "translation", "velocity": [1, 1]}
+        }),
+    ];
+    let plan = meniscus::simulation::OutputPlan { every_time: None, series_every_steps: 1000 };
+    for body in bodies {
+        // One thread: another one's scratch may first be used late.
+        pool(1).install(|| {
+            let mut simulation = build(&body, plan);
+            for _ in 0..6 {
+                simulation.step().unwrap();
+            }
+            for step in 7..12 {
+                let before = ALLOCATIONS.load(Ordering::Relaxed);
+                simulation.step().unwrap();
+                let made = ALLOCATIONS.load(Ordering::Relaxed) - before;
+                assert_eq!(made, 0, "step {step} of {body}");
+            }
+        });
+    }
+}
