@@ -9,7 +9,7 @@ use rustix::process::Signal;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use support::{Service, chance, endless_job, eventually, signal, steady_job};
+use support::{Service, chance, endless_job, eventually, long_job, signal, steady_job};
 
 /// The results that every disturbed run must reach, from an undisturbed one.
 struct Expected {
@@ -131,7 +131,7 @@ fn twenty_kills_of_the_service_lose_no_job() {
 fn an_orderly_shutdown_checkpoints_and_requeues() {
     let directory = tempfile::tempdir().unwrap();
     let mut service = Service::start(directory.path(), &["--slots", "1"]);
-    let mut body = steady_job();
+    let mut body = long_job();
     body["checkpoint"] = json!({"every_wall_s": 3600});
     let expected = Expected::of(&service, &body);
     let id = service.submit(&body);
@@ -182,7 +182,7 @@ fn flip_a_bit(path: &Path) {
 fn damaged_checkpoints_fall_back_to_the_one_before_and_at_last_to_the_start() {
     let directory = tempfile::tempdir().unwrap();
     let service = Service::start(directory.path(), &["--slots", "1"]);
-    let body = steady_job();
+    let body = long_job();
     let expected = Expected::of(&service, &body);
     let damages: [(Damage, usize); 3] = [(truncate, 1), (flip_a_bit, 1), (truncate, 2)];
     for (damage, how_many) in damages {

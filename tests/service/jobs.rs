@@ -1,7 +1,7 @@
 //! A job's life: submit, run, pause, resume, cancel, restart, delete.
 
 use crate::service;
-use crate::support::{endless_job, eventually, steady_job};
+use crate::support::{endless_job, eventually, long_job, steady_job};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Write};
@@ -44,8 +44,8 @@ fn a_job_runs_to_its_end_and_shows_everything() {
 #[test]
 fn pause_and_resume_leave_no_trace_in_the_results() {
     let (_directory, service) = service(&["--slots", "2", "--threads", "2"]);
-    let undisturbed = service.submit(&steady_job());
-    let disturbed = service.submit(&steady_job());
+    let undisturbed = service.submit(&long_job());
+    let disturbed = service.submit(&long_job());
     for _ in 0..3 {
         eventually("it makes progress", Duration::from_secs(20), || {
             let job = service.job(&disturbed);
@@ -130,7 +130,7 @@ fn a_finished_job_goes_on_to_a_later_end_bit_for_bit() {
 #[test]
 fn limits_pause_or_fail_with_their_reason() {
     let (_directory, service) = service(&["--slots", "2"]);
-    let mut body = steady_job();
+    let mut body = long_job();
     body["limits"] = json!({"wall_s": 0.4});
     let id = service.submit(&body);
     let mut legs = 0;

@@ -248,6 +248,14 @@ pub fn steady_job() -> Value {
     })
 }
 
+/// The same three times as long, for tests that must act before it ends on a machine much faster than this one.
+pub fn long_job() -> Value {
+    let mut body = steady_job();
+    body["scene"]["repeat"] = json!(720);
+    body["output"]["every_time"] = json!(180);
+    body
+}
+
 /// A job whose only step takes minutes: fits of 165 coefficients about tens of thousands of particles.
 pub fn endless_job() -> Value {
     json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.015625, "method": {"type": "pcp", "degree": 8}}})
