@@ -24,7 +24,7 @@ setup:
 	@deploy/setup.sh $(PACKAGES)
 
 build: setup
-	cargo build --release --locked -p meniscus-api
+	MENISCUS_COMMIT="$$(git rev-parse --short=12 HEAD 2> /dev/null || true)" cargo build --release --locked -p meniscus-api
 
 demo: build
 	deploy/demo.sh $(TARGET)/release/meniscus

@@ -1,6 +1,7 @@
 //! The kinds of scenes, one folder each. Schemas, validation, documentation and the tests that every scene must pass
 //! come from [`SCENES`].
 
+mod dimension;
 pub mod particle_estimate;
 pub mod pcp_parameters;
 pub mod redistance;

@@ -3,4 +3,5 @@
 
 pub mod advected_level_set;
 pub mod measured_errors;
+pub mod measured_redistancing;
 pub mod static_redistancing;

@@ -54,8 +54,11 @@ pub trait Simulation: Send {
     /// [`RestoreError`] when the state is of another scene; nothing is changed then.
     fn restore(&mut self, state: &State) -> Result<(), RestoreError>;
 
-    /// Errors against the exact answer, stability, cost, and what automatic choices came to.
+    /// Errors against the exact answer, stability, and what automatic choices came to.
     fn report(&self) -> Report;
+
+    /// CPU seconds by phase so far; asked for at every checkpoint, so it computes nothing.
+    fn phases(&self) -> &Phases;
 
     /// A short look at soundness.
     fn health(&self) -> Health;

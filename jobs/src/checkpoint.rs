@@ -9,7 +9,7 @@ use crate::build;
 use crate::digest;
 use crate::formats::hdf5_file::{count_bytes, real_bytes, write};
 use crate::process::free_space;
-use crate::records::{FileRecord, Usage};
+use crate::records::FileRecord;
 use meniscus::simulation::State;
 use meniscus::simulation::state::{CountArray, RealArray};
 use serde::{Deserialize, Serialize};
@@ -54,8 +54,6 @@ pub struct Counters {
     pub series_epoch: u64,
     /// Bytes of the series file.
     pub series_bytes: u64,
-    /// Cost so far.
-    pub usage: Usage,
     /// CPU seconds by phase so far.
     pub phases: BTreeMap<String, f64>,
 }

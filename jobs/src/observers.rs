@@ -47,7 +47,6 @@ impl Observers<'_> {
             frames_before: self.frames.before(),
             series_epoch: self.series.epoch(),
             series_bytes: self.series.bytes(),
-            usage: self.progress.usage(),
             phases: self.progress.phases(simulation),
         }
     }

@@ -283,15 +283,6 @@ impl Store {
         }
         Ok(())
     }
-
-    /// A consistent copy of the whole store into a new file.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn copy_to(&self, path: &Path) -> Result<(), StoreError> {
-        self.read().execute("VACUUM INTO ?1", [path.to_string_lossy()])?;
-        Ok(())
-    }
 }
 
 /// Name of a restart's checkpoint in the new job's directory.

@@ -24,8 +24,8 @@ pub const DISK_RESERVE_BYTES: u64 = 64 << 20;
 pub struct Settings {
     /// Jobs that run at once.
     pub slots: usize,
-    /// A worker without a sign of life for so long is ended.
-    pub stall: Duration,
+    /// Term of a lease: a worker without a sign of life for so long is ended.
+    pub lease: Duration,
     /// A canceled worker that has not gone after so long is ended.
     pub cancel_grace: Duration,
     /// A pausing worker that has not gone after so long is ended.
@@ -40,7 +40,7 @@ impl Settings {
     pub fn with_slots(slots: usize) -> Self {
         Self {
             slots,
-            stall: Duration::from_secs(30),
+            lease: Duration::from_secs(30),
             cancel_grace: Duration::from_millis(1200),
             pause_grace: Duration::from_secs(10),
             disk_reserve_bytes: DISK_RESERVE_BYTES,
@@ -120,8 +120,6 @@ const DRAIN: Duration = Duration::from_secs(15);
 const LAST_WORDS: Duration = Duration::from_secs(5);
 /// Time without starts after one that failed.
 const START_PAUSE: Duration = Duration::from_secs(1);
-/// Term of a lease.
-const LEASE: Duration = Duration::from_secs(30);
 
 impl Supervisor {
     /// A supervisor that has done nothing yet.
@@ -324,7 +322,7 @@ impl Supervisor {
         let worker = self.executor.start(&directory, wishes.limits.memory_bytes, news)?;
         tracing::info!(job = job.id, attempt = job.attempt, pid = worker.pid(), "worker started");
         let now = Instant::now();
-        let until = limits::lease_end();
+        let until = limits::lease_end(self.settings.lease);
         self.store.lease(&job.id, job.attempt, worker.pid(), &until).map_err(std::io::Error::other)?;
         self.running.push(Running {
             job: job.id.clone(),

@@ -106,12 +106,13 @@ fn attempt(
     sink: &mut dyn RecordSink,
     log: &Log,
 ) -> Result<Verdict, Failure> {
-    let wishes = Wishes::of(&order.body)?;
+    let internal = |error: &dyn std::error::Error| Failure::Known(Reason::Internal, error.to_string());
+    let wishes = Wishes::of(&order.body).map_err(|error| internal(&error))?;
     let scene = understand(&order.body["scene"], SCENES).map_err(|violations| {
         Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
     })?;
     let threads = wishes.limits.threads.max(1) as usize;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
     log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
     pool.install(|| {
         let context = BuildContext {

@@ -24,14 +24,11 @@ const COARSE_CELLS: f64 = 16.0;
 ///
 /// # Errors
 /// [`Interrupted`] when somebody asked to stop.
-pub fn enclosed_measure<const D: usize>(
-    surface: &Redistancing<D>,
-    spacing: f64,
-    interrupt: &Interrupt,
-) -> Result<f64, Interrupted> {
+pub fn enclosed_measure<const D: usize>(surface: &Redistancing<D>, interrupt: &Interrupt) -> Result<f64, Interrupted> {
     if surface.is_lost() {
         return Ok(0.0);
     }
+    let spacing = surface.spacing();
     let mut low = Vector::<D>::repeat(f64::INFINITY);
     let mut high = Vector::<D>::repeat(f64::NEG_INFINITY);
     for x in surface.sample_points() {
@@ -57,7 +54,7 @@ pub fn enclosed_measure<const D: usize>(
             (0..counts[0])
                 .map(|k| {
                     corner[0] = low[0] + k as f64 * edge;
-                    if interrupt.is_raised() { 0.0 } else { inside_of_cell(surface, &corner, edge, halvings, spacing) }
+                    if interrupt.is_raised() { 0.0 } else { inside_of_cell(surface, &corner, edge, halvings) }
                 })
                 .sum()
         })
@@ -71,19 +68,13 @@ pub fn enclosed_measure<const D: usize>(
 const FAR: f64 = 2.0;
 
 /// The inside part of one cubic cell.
-fn inside_of_cell<const D: usize>(
-    surface: &Redistancing<D>,
-    corner: &Vector<D>,
-    edge: f64,
-    halvings: u32,
-    spacing: f64,
-) -> f64 {
+fn inside_of_cell<const D: usize>(surface: &Redistancing<D>, corner: &Vector<D>, edge: f64, halvings: u32) -> f64 {
     let whole = edge.powi(D as i32);
     let centre = corner.add_scalar(0.5 * edge);
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();
     let Some(foot) = surface.query(&centre, f64::INFINITY) else { return 0.0 };
     if foot.distance >= half_diagonal {
-        let far = foot.distance > FAR * spacing;
+        let far = foot.distance > FAR * surface.spacing();
         let is_inside = if far { surface.is_nearest_particle_inside(&centre) } else { !foot.is_outside };
         return if is_inside { whole } else { 0.0 };
     }
@@ -95,7 +86,7 @@ fn inside_of_cell<const D: usize>(
     (0..1_usize << D)
         .map(|octant| {
             let child = Vector::<D>::from_fn(|d, _| corner[d] + half * (octant >> d & 1) as f64);
-            inside_of_cell(surface, &child, half, halvings - 1, spacing)
+            inside_of_cell(surface, &child, half, halvings - 1)
         })
         .sum()
 }

@@ -1,6 +1,7 @@
 //! The parameters of a closest-point level set, as understood.
 
 use crate::geometry::Vector;
+use crate::polynomials::multi_index::term_count;
 use crate::polynomials::regression::radius_of_count;
 use crate::polynomials::{BasisKind, Neighborhood, PolynomialBasis, Regression};
 
@@ -59,7 +60,7 @@ impl PcpMethod {
     /// How far from the surface particles take part in fits, in multiples of h, growth of the radius included.
     #[must_use]
     pub fn reach_h<const D: usize>(&self) -> f64 {
-        let terms = PolynomialBasis::<D>::terms(self.degree) as f64;
+        let terms = term_count::<D>(self.degree) as f64;
         let by_count = radius_of_count::<D>;
         let cutoff = match self.neighborhood {
             NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,

@@ -86,10 +86,10 @@ impl<const D: usize> Redistancing<D> {
         }
     }
 
-    /// How many sample particles the surface has.
+    /// h.
     #[must_use]
-    pub fn sample_count(&self) -> usize {
-        self.samples.len()
+    pub fn spacing(&self) -> f64 {
+        self.spacing
     }
 
     /// Positions of the sample particles.
@@ -198,18 +198,6 @@ impl<const D: usize> Redistancing<D> {
         let terms = self.regression.terms();
         let coefficients = &self.coefficients[place * terms..(place + 1) * terms];
         (sample, sample.fit.polynomial(&self.regression.basis, coefficients))
-    }
-
-    /// The value of the nearest sample's polynomial at `x`; None without samples.
-    #[must_use]
-    pub fn level(&self, x: &Vector<D>) -> Option<f64> {
-        let (nearest, _) = self.sample_cells.nearest(x, f64::INFINITY)?;
-        let (sample, polynomial) = self.polynomial(nearest);
-        let x = sample.point + self.domain.displacement(&sample.point, x);
-        if (x - sample.fit.middle).norm() <= sample.fit.radius {
-            return Some(polynomial.value(&(x - sample.fit.centre)));
-        }
-        Some((x - sample.point).dot(&sample.normal))
     }
 
     /// The closest point of the surface for any point whose nearest sample lies within `reach`; None if none does.

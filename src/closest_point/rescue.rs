@@ -47,8 +47,6 @@ counters! {
     hopped => "queries.other_sample",
     /// Queries answered by the nearest sample itself.
     sample_distance => "queries.sample_distance",
-    /// Band particles left as they were because the surface has no samples at all.
-    no_surface => "queries.no_surface",
 }
 
 /// Adds to a counter.

@@ -47,7 +47,22 @@ impl SurfaceColumns {
         .find_map(|(name, place)| place.map(|particle| (name, particle)))
     }
 
-    /// Writes answers (one a particle, None outside the band); the sign is that of the level before (PCP eq. 15).
+    /// Writes the answer for one particle; the sign is that of the level before (PCP eq. 15).
+    pub fn write<const D: usize>(
+        &self,
+        particles: &mut Particles<D>,
+        level: ScalarKey,
+        i: usize,
+        answer: &ClosestPoint<D>,
+    ) {
+        let inside = particles.scalar(level)[i] < 0.0;
+        particles.scalar_mut(self.phi)[i] = if inside { -answer.distance } else { answer.distance };
+        particles.vector_mut(self.closest_point)[i] = answer.point;
+        particles.vector_mut(self.normal)[i] = answer.normal;
+        particles.scalar_mut(self.curvature)[i] = answer.curvature;
+    }
+
+    /// Writes answers (one a particle, None beyond reach) and who is in the band by them.
     pub fn store<const D: usize>(
         &self,
         particles: &mut Particles<D>,
@@ -59,11 +74,7 @@ impl SurfaceColumns {
             let answer = answer.filter(|a| a.distance <= half_band);
             particles.flag_mut(self.in_band)[i] = u8::from(answer.is_some());
             if let Some(answer) = answer {
-                let inside = particles.scalar(level)[i] < 0.0;
-                particles.scalar_mut(self.phi)[i] = if inside { -answer.distance } else { answer.distance };
-                particles.vector_mut(self.closest_point)[i] = answer.point;
-                particles.vector_mut(self.normal)[i] = answer.normal;
-                particles.scalar_mut(self.curvature)[i] = answer.curvature;
+                self.write(particles, level, i, &answer);
             }
         }
     }

@@ -15,9 +15,6 @@ pub trait Flow<const D: usize>: Send + Sync {
     /// u(x, t).
     fn velocity(&self, x: &Vector<D>, time: f64) -> Vector<D>;
 
-    /// The largest speed anywhere in the ball `|x − center| ≤ radius` at any time, for step estimates.
-    fn largest_speed(&self, center: &Vector<D>, radius: f64) -> f64;
-
     /// Where a rigid motion carries `x` during `duration`, by its formula; None where the motion is not rigid.
     fn rigid_path(&self, _x: &Vector<D>, _duration: f64) -> Option<Vector<D>> {
         None

@@ -38,11 +38,6 @@ impl LeastSquares {
         self.solution.resize(columns, 0.0);
     }
 
-    /// Reserves storage for problems up to the given shape.
-    pub fn reserve(&mut self, rows: usize, columns: usize) {
-        self.reset(rows, columns);
-    }
-
     /// Writes one row of the matrix and the right-hand side.
     #[inline]
     pub fn set_row(&mut self, row: usize, values: &[f64], rhs: f64) {

@@ -117,12 +117,6 @@ impl<const D: usize> CellList<D> {
         self.starts[0] = 0;
     }
 
-    /// Point indices in cell order.
-    #[must_use]
-    pub fn order(&self) -> &[usize] {
-        &self.order
-    }
-
     /// How many points are in the list.
     #[must_use]
     pub fn len(&self) -> usize {

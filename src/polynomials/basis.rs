@@ -5,7 +5,7 @@
 //! Newton form. So one evaluator serves all bases, and because indices are graded, dropping the trailing terms gives
 //! the basis of lower degree.
 
-use super::multi_index::{MultiIndexSet, term_count};
+use super::multi_index::MultiIndexSet;
 use super::unisolvent_nodes::{lagrange_in_newton_form, leja_ordered_chebyshev_lobatto};
 use super::{MAX_DEGREE, MAX_TERMS};
 use crate::geometry::Vector;
@@ -63,12 +63,6 @@ impl<const D: usize> PolynomialBasis<D> {
         self.degree
     }
 
-    /// Number of terms of total degree `degree`, a beginning of the basis.
-    #[must_use]
-    pub fn terms(degree: usize) -> usize {
-        term_count::<D>(degree)
-    }
-
     pub(super) fn indices(&self) -> &[[u8; D]] {
         self.set.indices()
     }
@@ -97,7 +91,7 @@ impl<const D: usize> PolynomialBasis<D> {
         (u, first, second)
     }
 
-    /// Values of the first `terms(degree)` basis functions at `x` (local coordinates), as a regression row needs them.
+    /// Values of the first `row.len()` basis functions at `x` (local coordinates), as a regression row needs them.
     pub fn row(&self, x: &Vector<D>, degree: usize, row: &mut [f64]) {
         let terms = row.len();
         let mut newton = [0.0; MAX_TERMS];
@@ -139,7 +133,7 @@ mod tests {
     fn lower_degrees_of_the_minter_basis_are_lagrange_bases_of_their_own() {
         let basis = PolynomialBasis::<2>::new(BasisKind::Minter, 5);
         for degree in 1..=5 {
-            let terms = PolynomialBasis::<2>::terms(degree);
+            let terms = crate::polynomials::multi_index::term_count::<2>(degree);
             for (a, alpha) in basis.indices()[..terms].iter().enumerate() {
                 let generating = super::leja_ordered_chebyshev_lobatto(5);
                 let x = Vector::<2>::new(generating[alpha[0] as usize], generating[alpha[1] as usize]);

@@ -1,6 +1,7 @@
 //! A polynomial of local coordinates t = (x − centre)/scale, with exact derivatives.
 
 use super::basis::PolynomialBasis;
+use super::multi_index::term_count;
 use crate::geometry::Vector;
 use nalgebra::SMatrix;
 
@@ -50,7 +51,7 @@ impl<const D: usize> LocalPolynomial<'_, D> {
     #[must_use]
     pub fn value(&self, dx: &Vector<D>) -> f64 {
         let factors: [_; D] = std::array::from_fn(|d| self.basis.factors(dx[d] / self.scale, self.degree));
-        let terms = PolynomialBasis::<D>::terms(self.degree);
+        let terms = term_count::<D>(self.degree);
         self.coefficients[..terms]
             .iter()
             .zip(self.basis.indices())
@@ -62,7 +63,7 @@ impl<const D: usize> LocalPolynomial<'_, D> {
     #[must_use]
     pub fn jet(&self, dx: &Vector<D>) -> Jet<D> {
         let jets: [_; D] = std::array::from_fn(|d| self.basis.factor_jets(dx[d] / self.scale, self.degree));
-        let terms = PolynomialBasis::<D>::terms(self.degree);
+        let terms = term_count::<D>(self.degree);
         let mut value = 0.0;
         let mut gradient = Vector::<D>::zeros();
         let mut hessian = SMatrix::<f64, D, D>::zeros();

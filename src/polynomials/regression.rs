@@ -3,6 +3,7 @@
 
 use super::basis::{BasisKind, PolynomialBasis};
 use super::local_polynomial::LocalPolynomial;
+use super::multi_index::term_count;
 use crate::geometry::Vector;
 use crate::linear_algebra::least_squares::LeastSquares;
 use crate::neighbors::NeighborSearch;
@@ -85,7 +86,7 @@ impl<const D: usize> Regression<D> {
     /// Number of coefficients of the full degree.
     #[must_use]
     pub fn terms(&self) -> usize {
-        PolynomialBasis::<D>::terms(self.basis.degree())
+        term_count::<D>(self.basis.degree())
     }
 
     /// Fits the values around `x` and writes the coefficients in Newton form (terms beyond a lowered degree are 0).
@@ -107,7 +108,7 @@ impl<const D: usize> Regression<D> {
         let (mut radius, mut enlargements) = self.collect(search, x, degree, scratch);
         let mut rank_enlargements = 0;
         loop {
-            let terms = PolynomialBasis::<D>::terms(degree);
+            let terms = term_count::<D>(degree);
             let enough = scratch.neighbors.len() >= terms;
             if enough
                 && let Some(condition) = self.solve(x, values, radius, degree, scratch, &mut coefficients[..terms])
@@ -146,7 +147,7 @@ impl<const D: usize> Regression<D> {
         degree: usize,
         scratch: &mut RegressionScratch<D>,
     ) -> (f64, u32) {
-        let terms = PolynomialBasis::<D>::terms(degree);
+        let terms = term_count::<D>(degree);
         let needed = (self.minimum_ratio * terms as f64).ceil() as usize;
         match self.neighborhood {
             Neighborhood::Radius { cutoff } => {

@@ -62,7 +62,7 @@ pub fn band_particles<const D: usize>(surface: &dyn Surface<D>, reach: f64, spac
 /// and a checkpoint in the making, and the fits of up to half of the particles.
 #[must_use]
 pub fn memory_bytes<const D: usize>(particles: u64, degree: usize) -> u64 {
-    let terms = if D == 2 { term_count::<2>(degree) } else { term_count::<3>(degree) };
+    let terms = term_count::<D>(degree);
     let columns = 8 * (3 * D + 4);
     let search = 8 * (D + 4);
     let output = 8 * (3 * D + 10);

@@ -4,6 +4,7 @@ use crate::geometry::Vector;
 use crate::geometry::surfaces::{Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, ZalesakDisk};
 use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
+use crate::scenes::dimension::in_dimension;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -216,14 +217,17 @@ impl Shape {
                 }
                 let center = place(center, errors);
                 let flat = Vector::<2>::new(center[0], center[1]);
-                flat_surface(ZalesakDisk::new(flat, *radius, *slot_width, *slot_depth))
+                let disk: Box<dyn Surface<2>> = Box::new(ZalesakDisk::new(flat, *radius, *slot_width, *slot_depth));
+                in_dimension(disk)
             }
             Self::Torus { center, major_radius, minor_radius } => {
                 only(3, errors);
                 less("minor_radius", *minor_radius, *major_radius, errors);
                 let center = place(center, errors);
                 let center = Vector::<3>::from_fn(|d, _| if d < D { center[d] } else { 0.0 });
-                solid_surface(Torus { center, major_radius: *major_radius, minor_radius: *minor_radius })
+                let torus: Box<dyn Surface<3>> =
+                    Box::new(Torus { center, major_radius: *major_radius, minor_radius: *minor_radius });
+                in_dimension(torus)
             }
             Self::Dumbbell { center, separation, radius, neck_radius } => {
                 less("neck_radius", *neck_radius, *radius, errors);
@@ -274,16 +278,4 @@ impl Shape {
             _ => Err(violations),
         }
     }
-}
-
-/// A shape of the plane as a surface of `D` dimensions; None where `D` is not 2.
-fn flat_surface<const D: usize>(shape: ZalesakDisk) -> Option<Box<dyn Surface<D>>> {
-    let any: Box<dyn std::any::Any> = Box::new(Box::new(shape) as Box<dyn Surface<2>>);
-    any.downcast::<Box<dyn Surface<D>>>().ok().map(|surface| *surface)
-}
-
-/// A shape of space as a surface of `D` dimensions; None where `D` is not 3.
-fn solid_surface<const D: usize>(shape: Torus) -> Option<Box<dyn Surface<D>>> {
-    let any: Box<dyn std::any::Any> = Box::new(Box::new(shape) as Box<dyn Surface<3>>);
-    any.downcast::<Box<dyn Surface<D>>>().ok().map(|surface| *surface)
 }

@@ -3,7 +3,7 @@
 use crate::closest_point::rescue::get;
 use crate::closest_point::{Redistancing, RescueCounts};
 use crate::simulation::report::Newton;
-use crate::simulation::{ErrorEntry, Health, Phases, Report};
+use crate::simulation::{ErrorEntry, Health, Report};
 use std::collections::BTreeMap;
 
 /// Sums of errors in the order of adding.
@@ -68,7 +68,6 @@ pub fn rescued(counts: &RescueCounts) -> u64 {
 pub fn closest_point_report<const D: usize>(
     surface: &Redistancing<D>,
     errors: Vec<ErrorEntry>,
-    phases: &Phases,
     health: Health,
     method: BTreeMap<&'static str, String>,
 ) -> Report {
@@ -80,14 +79,13 @@ pub fn closest_point_report<const D: usize>(
     let solves = get(&counts.queries);
     Report {
         errors,
-        phases: phases.seconds().clone(),
         health,
         worst_condition: surface.worst_condition(),
         rescued_fits: some(&["fits.larger_radius", "fits.lower_degree", "fits.none", "samples.not_projected"]),
         newton: Newton {
             solves,
             iterations_mean: get(&counts.iterations) as f64 / solves.max(1) as f64,
-            rescued: some(&["queries.other_sample", "queries.sample_distance", "queries.no_surface"]),
+            rescued: some(&["queries.other_sample", "queries.sample_distance"]),
         },
         method,
     }

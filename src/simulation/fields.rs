@@ -29,8 +29,6 @@ pub enum FieldValues {
     Scalar(Vec<f64>),
     /// Vectors, z = 0 in 2D.
     Vector(Vec<[f64; 3]>),
-    /// Small whole numbers.
-    Flag(Vec<u8>),
     /// Large whole numbers.
     Id(Vec<u64>),
 }
@@ -56,11 +54,6 @@ impl Fields {
     /// Adds vectors.
     pub fn vector<const D: usize>(&mut self, name: &'static str, values: impl Iterator<Item = Vector<D>>) {
         self.columns.push(Field { name, values: FieldValues::Vector(values.map(|v| in_space(&v)).collect()) });
-    }
-
-    /// Adds small whole numbers.
-    pub fn flag(&mut self, name: &'static str, values: Vec<u8>) {
-        self.columns.push(Field { name, values: FieldValues::Flag(values) });
     }
 
     /// Adds particle numbers.
@@ -95,14 +88,5 @@ impl Fields {
         self.vector("closest_point", arrow(columns.closest_point, footed).into_iter());
         self.vector("normal", arrow(columns.normal, &bent).into_iter());
         self.scalar("curvature", number(columns.curvature, &bent));
-    }
-
-    /// The scalar field of a name.
-    #[must_use]
-    pub fn scalar_named(&self, name: &str) -> Option<&[f64]> {
-        self.columns.iter().find(|c| c.name == name).and_then(|c| match &c.values {
-            FieldValues::Scalar(values) => Some(values.as_slice()),
-            _ => None,
-        })
     }
 }

@@ -36,8 +36,6 @@ pub struct Health {
 pub struct Report {
     /// Errors against exact answers.
     pub errors: Vec<ErrorEntry>,
-    /// CPU seconds by phase.
-    pub phases: BTreeMap<&'static str, f64>,
     /// Soundness at the end.
     pub health: Health,
     /// Worst condition of a scaled regression matrix.

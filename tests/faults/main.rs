@@ -250,6 +250,13 @@ fn cancels_in_the_last_moment_are_never_forgotten() {
         }
         done.store(true, std::sync::atomic::Ordering::Relaxed);
     });
+    // Nothing is left between two states, of the background's jobs neither.
+    eventually("every job has ended", Duration::from_secs(30), || {
+        let page = service.get("/v1/jobs?state=queued,running,pausing,canceling,interrupted&limit=500").json();
+        page["items"].as_array().unwrap().is_empty().then_some(())
+    });
+    let canceled = service.get("/v1/jobs?state=canceled&limit=500").json();
+    assert!(!canceled["items"].as_array().unwrap().is_empty());
 }
 
 /// The service is killed in the middle of its orderly shutdown, and again: a restart never counts against a job.

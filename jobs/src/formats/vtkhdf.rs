@@ -31,7 +31,6 @@ pub fn write_frame(path: &Path, fields: &Fields, chosen: &[String], time: f64, s
         match &field.values {
             FieldValues::Scalar(values) => write(&data, field.name, 1, values)?,
             FieldValues::Vector(values) => write(&data, field.name, 3, values.as_flattened())?,
-            FieldValues::Flag(values) => write(&data, field.name, 1, values)?,
             FieldValues::Id(values) => write(&data, field.name, 1, values)?,
         };
     }

@@ -62,8 +62,7 @@ impl ProgressMeter {
     #[must_use]
     pub fn phases(&self, simulation: &dyn Simulation) -> BTreeMap<String, f64> {
         let mut total = self.baseline_phases.clone();
-        let report = simulation.report();
-        for (name, seconds) in report.phases.iter().chain(&self.own_phases) {
+        for (name, seconds) in simulation.phases().seconds().iter().chain(&self.own_phases) {
             *total.entry((*name).to_owned()).or_insert(0.0) += seconds;
         }
         total

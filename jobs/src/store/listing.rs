@@ -72,16 +72,4 @@ impl Store {
         let rows = statement.query_map(params_from_iter(values), rows::job_of)?;
         Ok(rows.collect::<Result<_, _>>()?)
     }
-
-    /// How many jobs are in each state.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn counts(&self) -> Result<Vec<(String, u64)>, StoreError> {
-        let connection = self.read();
-        let mut statement =
-            connection.prepare_cached("SELECT state, COUNT(*) FROM jobs GROUP BY state ORDER BY state")?;
-        let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)? as u64)))?;
-        Ok(rows.collect::<Result<_, _>>()?)
-    }
 }

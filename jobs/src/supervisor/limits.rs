@@ -1,6 +1,6 @@
 //! Holding workers to requests and limits.
 
-use super::{LEASE, Supervisor};
+use super::Supervisor;
 use crate::job::{Reason, State, Trigger};
 use crate::process;
 use crate::store::{Change, StoreError};
@@ -12,8 +12,8 @@ const DISK_INTERVAL: Duration = Duration::from_secs(2);
 const SPACE_INTERVAL: Duration = Duration::from_secs(2);
 
 /// End of a lease that begins now.
-pub(super) fn lease_end() -> String {
-    let end = jiff::Timestamp::now() + LEASE;
+pub(super) fn lease_end(term: Duration) -> String {
+    let end = jiff::Timestamp::now() + term;
     format!("{end:.3}")
 }
 
@@ -47,7 +47,7 @@ impl Supervisor {
             None => running.worker.kill(),
             Some(_) => {}
         }
-        if running.worker.silence() >= settings.stall {
+        if running.worker.silence() >= settings.lease {
             self.store.condemn(&running.job, running.epoch, Reason::WorkerStalled)?;
             running.worker.kill();
         }
@@ -71,10 +71,11 @@ impl Supervisor {
     }
 
     fn renew_lease(&mut self, k: usize) -> Result<(), StoreError> {
+        let term = self.settings.lease;
         let running = &mut self.running[k];
-        if running.lease_renewed.elapsed() >= LEASE / 3 && running.worker.silence() < LEASE / 3 {
+        if running.lease_renewed.elapsed() >= term / 3 && running.worker.silence() < term / 3 {
             running.lease_renewed = Instant::now();
-            self.store.lease(&running.job, running.epoch, running.worker.pid(), &lease_end())?;
+            self.store.lease(&running.job, running.epoch, running.worker.pid(), &lease_end(term))?;
         }
         Ok(())
     }

@@ -20,10 +20,6 @@ impl<const D: usize> Flow<D> for Rotation<D> {
         u
     }
 
-    fn largest_speed(&self, center: &Vector<D>, radius: f64) -> f64 {
-        self.angular_velocity.abs() * ((center - self.center).norm() + radius)
-    }
-
     fn rigid_path(&self, x: &Vector<D>, duration: f64) -> Option<Vector<D>> {
         let (sin, cos) = (self.angular_velocity * duration).sin_cos();
         let (dx, dy) = (x[0] - self.center[0], x[1] - self.center[1]);

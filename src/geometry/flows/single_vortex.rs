@@ -19,10 +19,6 @@ impl Flow<2> for SingleVortex {
         Vector::<2>::new(-0.5 * strength * (1.0 - cos_x) * sin_y, 0.5 * strength * (1.0 - cos_y) * sin_x)
     }
 
-    fn largest_speed(&self, _center: &Vector<2>, _radius: f64) -> f64 {
-        1.0
-    }
-
     fn return_time(&self) -> Option<f64> {
         self.period
     }

@@ -14,10 +14,6 @@ impl<const D: usize> Flow<D> for Translation<D> {
         self.velocity
     }
 
-    fn largest_speed(&self, _center: &Vector<D>, _radius: f64) -> f64 {
-        self.velocity.norm()
-    }
-
     fn rigid_path(&self, x: &Vector<D>, duration: f64) -> Option<Vector<D>> {
         Some(x + self.velocity * duration)
     }

@@ -5,13 +5,15 @@ use crate::closest_point::PcpMethod;
 use crate::geometry::flows::{Rotation, SingleVortex, Translation};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{self, Vector};
+use crate::scene::check;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
+use crate::scenes::dimension::in_dimension;
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
 use crate::schemes::advected_level_set::{AdvectedLevelSet, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen};
 use crate::simulation::Simulation;
 use crate::time::{FixedStep, PathIntegrator};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
 struct VortexScene<const D: usize> {
@@ -66,11 +68,14 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         };
         // In space a fit of the same degree needs proportionally more neighbours.
         let count = if D == 2 { count } else { 2 * count };
-        method_json = json!({
-            "type": "pcp", "degree": degree, "basis": "minter", "neighborhood": {"type": "nearest", "count": count},
-            "cutoff_h": null, "weight": 2.0, "minimum_ratio": null, "sample_threshold_h": 1.5, "tolerance": 1e-12,
+        let choice = json!({
+            "degree": degree, "neighborhood": {"type": "nearest", "count": count}, "tolerance": 1e-12,
             "max_iterations": 100
         });
+        let mut method =
+            check(pcp_parameters::PARAMETERS, choice.as_object().unwrap_or(&Map::new()), "/method", &mut violations);
+        method.shift_insert(0, "type".into(), json!("pcp"));
+        method_json = Value::Object(method);
         chosen.insert("method", format!("pcp, degree {degree}, nearest {count}: {why}"));
     } else {
         chosen.insert("method", "pcp, as given".to_owned());
@@ -160,9 +165,8 @@ fn flow<const D: usize>(flow: &Flow) -> Result<Box<dyn geometry::Flow<D>>, Viola
     };
     match flow {
         Flow::SingleVortex { period } => {
-            let any: Box<dyn std::any::Any> =
-                Box::new(Box::new(SingleVortex { period: *period }) as Box<dyn geometry::Flow<2>>);
-            any.downcast::<Box<dyn geometry::Flow<D>>>().map(|flow| *flow).map_err(|_| {
+            let vortex: Box<dyn geometry::Flow<2>> = Box::new(SingleVortex { period: *period });
+            in_dimension(vortex).ok_or_else(|| {
                 let detail = format!("the single vortex lives in the plane, the scene has {D} dimensions");
                 Violation::new(
                     "/flow/type",

@@ -53,12 +53,6 @@ impl<const D: usize> ExactMotion<D> {
         self.flow.as_ref()
     }
 
-    /// Whether the exact surface is known at every time: by formula, or in 2D by its outline.
-    #[must_use]
-    pub fn is_known(&self) -> bool {
-        D == 2 || self.flow.is_rigid()
-    }
-
     /// The surface at a time, resolved for particles of a spacing; None where it is not known.
     #[must_use]
     pub fn front(&self, time: f64, spacing: f64) -> Option<ExactFront<'_, D>> {

@@ -162,7 +162,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
             self.measure_errors(now.time, &self.system.particles, &self.system.redistancing, self.measure)
         } else {
             let (particles, surface) = self.system.redistanced_copy();
-            let measure = enclosed_measure(&surface, self.system.spacing, &self.system.interrupt)?;
+            let measure = enclosed_measure(&surface, &self.system.interrupt)?;
             self.measure_errors(now.time, &particles, &surface, measure)
         };
         self.errors.extend(measured);
@@ -202,9 +202,8 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             self.redistanced = next.step;
             if self.is_error_due(next.step) || self.plan.is_series_due(&self.fixed, next.step) {
                 let system = &self.system;
-                self.measure = self
-                    .phases
-                    .measure("measure", || enclosed_measure(&system.redistancing, system.spacing, &system.interrupt))?;
+                self.measure =
+                    self.phases.measure("measure", || enclosed_measure(&system.redistancing, &system.interrupt))?;
                 self.measured = next.step;
             }
         }
@@ -290,7 +289,11 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
 
     fn report(&self) -> Report {
         let errors = self.errors.iter().flat_map(|e| e.entries(D)).collect();
-        closest_point_report(&self.system.redistancing, errors, &self.phases, self.health(), self.method.clone())
+        closest_point_report(&self.system.redistancing, errors, self.health(), self.method.clone())
+    }
+
+    fn phases(&self) -> &Phases {
+        &self.phases
     }
 
     fn health(&self) -> Health {

@@ -6,7 +6,8 @@ use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
 use crate::particles::{Particles, ScalarKey};
-use crate::simulation::Phases;
+use crate::schemes::measured_redistancing::redistance;
+use crate::simulation::{CpuClock, Phases};
 use crate::time::PathIntegrator;
 use rayon::prelude::{ParallelIterator, ParallelSliceMut};
 
@@ -131,13 +132,9 @@ impl<const D: usize> AdvectedSystem<D> {
     /// Rebuilds the surface from ψ and writes distance, closest point, normal and curvature of the band.
     pub(super) fn redistance(&mut self, phases: &mut Phases) -> Result<(), Interrupted> {
         let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
-        let (surface, interrupt) = (&mut self.redistancing, &self.interrupt);
-        phases.measure("redistancing/detection", || surface.detect(positions, psi, interrupt))?;
-        phases.measure("redistancing/regression", || surface.fit_samples(positions, psi, interrupt))?;
-        let answers = &mut self.answers;
         // Whoever is nearer than w/2 to a sample is asked for the exact distance (PCP 3.4).
-        phases
-            .measure("redistancing/query", || surface.closest_points(positions, self.half_band, answers, interrupt))?;
+        let (surface, answers) = (&mut self.redistancing, &mut self.answers);
+        redistance(surface, positions, psi, self.half_band, answers, &self.interrupt, phases)?;
         self.columns.store(&mut self.particles, self.psi, &self.answers, self.half_band);
         if self.field == FieldChoice::Overwrite {
             for i in 0..self.particles.len() {
@@ -155,13 +152,10 @@ impl<const D: usize> AdvectedSystem<D> {
     pub(super) fn redistanced_copy(&self) -> (Particles<D>, Redistancing<D>) {
         let mut particles = self.particles.clone();
         let mut surface = Redistancing::new(self.method.clone(), Domain::unbounded(), self.spacing);
-        let never = Interrupt::default();
         let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
         let mut answers = vec![None; positions.len()];
-        let found = surface
-            .detect(positions, psi, &never)
-            .and_then(|()| surface.fit_samples(positions, psi, &never))
-            .and_then(|()| surface.closest_points(positions, self.half_band, &mut answers, &never));
+        let (never, mut phases) = (Interrupt::default(), Phases::new(CpuClock::still()));
+        let found = redistance(&mut surface, positions, psi, self.half_band, &mut answers, &never, &mut phases);
         if found.is_ok() {
             self.columns.store(&mut particles, self.psi, &answers, self.half_band);
         }

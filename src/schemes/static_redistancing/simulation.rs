@@ -2,6 +2,7 @@
 
 use super::system::StaticSystem;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, rescued};
+use crate::schemes::measured_redistancing::redistance;
 use crate::simulation::{
     CpuClock, ErrorEntry, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State,
     StepError,
@@ -85,26 +86,18 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
     fn step(&mut self) -> Result<(), StepError> {
         let system = &mut self.system;
         let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
-        let surface = &mut system.redistancing;
-        self.phases.measure("redistancing/detection", || surface.detect(positions, level, &system.interrupt))?;
-        self.phases.measure("redistancing/regression", || surface.fit_samples(positions, level, &system.interrupt))?;
+        let (surface, answers) = (&mut system.redistancing, &mut system.answers);
+        redistance(surface, positions, level, f64::INFINITY, answers, &system.interrupt, &mut self.phases)?;
         if surface.is_lost() {
             let Clock { step, time } = self.fixed.clock(self.step + 1);
             return Err(StepError::InterfaceLost { step, time });
         }
-        let (answers, interrupt) = (&mut system.answers, &system.interrupt);
-        self.phases
-            .measure("redistancing/query", || surface.closest_points(positions, f64::INFINITY, answers, interrupt))?;
         // Particles beyond the band serve the fits and are redistanced like the others; the band's flags stay.
         for (i, answer) in system.answers.iter().enumerate() {
             if let Some(answer) = answer {
-                let inside = system.particles.scalar(system.level)[i] < 0.0;
-                let phi = if inside { -answer.distance } else { answer.distance };
-                system.particles.scalar_mut(system.columns.phi)[i] = phi;
+                system.columns.write(&mut system.particles, system.level, i, answer);
+                let phi = system.particles.scalar(system.columns.phi)[i];
                 system.particles.scalar_mut(system.level)[i] = phi;
-                system.particles.vector_mut(system.columns.closest_point)[i] = answer.point;
-                system.particles.vector_mut(system.columns.normal)[i] = answer.normal;
-                system.particles.scalar_mut(system.columns.curvature)[i] = answer.curvature;
             }
         }
         self.check_finite()?;
@@ -160,7 +153,11 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
 
     fn report(&self) -> Report {
         let errors = self.errors();
-        closest_point_report(&self.system.redistancing, errors, &self.phases, self.health(), self.method.clone())
+        closest_point_report(&self.system.redistancing, errors, self.health(), self.method.clone())
+    }
+
+    fn phases(&self) -> &Phases {
+        &self.phases
     }
 
     fn health(&self) -> Health {

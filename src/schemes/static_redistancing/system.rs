@@ -28,8 +28,6 @@ pub struct StaticSystem<const D: usize> {
     pub surface: Box<dyn Surface<D>>,
     /// h.
     pub spacing: f64,
-    /// w/2.
-    pub half_band: f64,
     /// How often to redistance.
     pub repeats: u64,
     pub(super) particles: Particles<D>,
@@ -75,6 +73,6 @@ impl<const D: usize> StaticSystem<D> {
         }
         let answers = vec![None; particles.len()];
         let redistancing = Redistancing::new(method, Domain::unbounded(), spacing);
-        Self { surface, spacing, half_band, repeats, particles, level, columns, redistancing, answers, interrupt }
+        Self { surface, spacing, repeats, particles, level, columns, redistancing, answers, interrupt }
     }
 }

@@ -1,0 +1,26 @@
+//! A whole redistancing with its phases booked: what every closest-point scheme does, each with its own bookkeeping
+//! of the answers.
+
+use crate::closest_point::{ClosestPoint, Redistancing};
+use crate::geometry::Vector;
+use crate::parallel::{Interrupt, Interrupted};
+use crate::simulation::Phases;
+
+/// Rebuilds the surface from the level of the particles, then asks it about every particle whose nearest sample lies
+/// within `reach`.
+///
+/// # Errors
+/// [`Interrupted`] when somebody asked to stop.
+pub fn redistance<const D: usize>(
+    surface: &mut Redistancing<D>,
+    positions: &[Vector<D>],
+    level: &[f64],
+    reach: f64,
+    answers: &mut [Option<ClosestPoint<D>>],
+    interrupt: &Interrupt,
+    phases: &mut Phases,
+) -> Result<(), Interrupted> {
+    phases.measure("redistancing/detection", || surface.detect(positions, level, interrupt))?;
+    phases.measure("redistancing/regression", || surface.fit_samples(positions, level, interrupt))?;
+    phases.measure("redistancing/query", || surface.closest_points(positions, reach, answers, interrupt))
+}
