@@ -357,7 +357,7 @@ impl From<Event> for EventView {
 
 impl From<FileRow> for FileView {
     fn from(file: FileRow) -> Self {
-        let FileRow { path, stored: _, attempt: _, size_bytes, sha256, media_type, time, step } = file;
+        let FileRow { path, attempt: _, size_bytes, sha256, media_type, time, step, content: _ } = file;
         Self { path, size_bytes, sha256, media_type, time, step }
     }
 }

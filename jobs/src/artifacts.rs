@@ -53,7 +53,6 @@ pub fn record(directory: &Path, path: &str, media_type: &str) -> io::Result<File
     let (sha256, size_bytes) = digest::of_file(&directory.join(path))?;
     Ok(FileRecord {
         path: path.to_owned(),
-        stored: None,
         size_bytes,
         sha256,
         media_type: media_type.to_owned(),

@@ -72,7 +72,8 @@ fn copy_files(data: &Path, target: &Path) -> Result<bool, BackupError> {
         let into = copy.job_directory(&job.id);
         // Everything the job has, so that a running attempt's records and series come along.
         copy_tree(&source(&job.id), &into)?;
-        let listed = copy.files(&job.id)?.into_iter().map(|f| (f.attempt, f.stored, f.size_bytes));
+        let listed = copy.files(&job.id)?.into_iter().filter(|f| f.content.is_none());
+        let listed = listed.map(|f| (f.attempt, f.path, f.size_bytes));
         let checkpoints = copy.checkpoints(&job.id)?.into_iter().map(|c| (c.attempt, c.path, c.size_bytes));
         for (attempt, path, size) in listed.chain(checkpoints) {
             let found = fs::metadata(attempt_directory(&into, attempt).join(&path)).map(|meta| meta.len());

@@ -1,6 +1,7 @@
 //! Files that others read: VTKHDF frames, CSV series, SVG pictures.
 
 pub mod csv;
+pub mod frame_index;
 pub mod hdf5_file;
 pub mod picture;
 pub mod vtkhdf;

@@ -59,8 +59,8 @@ impl Observer for Observers<'_> {
         let is_repeat = self.restored.take() == Some(step);
         if !is_repeat {
             self.progress.timed("output", || -> Result<(), ObserverError> {
-                for file in self.frames.observe(simulation)? {
-                    self.sink.put(&Record::File(file), false)?;
+                if let Some(frame) = self.frames.observe(simulation)? {
+                    self.sink.put(&Record::File(frame), false)?;
                 }
                 self.series.observe(simulation)?;
                 Ok(())

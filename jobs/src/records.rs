@@ -124,11 +124,8 @@ pub struct Usage {
 /// A file in the attempt's directory.
 #[derive(Debug, Clone, Serialize, Deserialize, PartialEq)]
 pub struct FileRecord {
-    /// Path among the job's files.
+    /// Path among the job's files, and below the attempt's directory.
     pub path: String,
-    /// Path below the attempt's directory, where that is another one.
-    #[serde(default)]
-    pub stored: Option<String>,
     /// Bytes.
     pub size_bytes: u64,
     /// Digest.

@@ -220,6 +220,14 @@ impl Store {
         rows::files(&self.read(), job)
     }
 
+    /// A published file of a job.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn file(&self, job: &str, path: &str) -> Result<Option<FileRow>, StoreError> {
+        rows::file(&self.read(), job, path)
+    }
+
     /// What a restart from a checkpoint needs to know; None where there is no such checkpoint.
     ///
     /// # Errors

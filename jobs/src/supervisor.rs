@@ -1,6 +1,7 @@
 //! The supervisor: one thread of the service that starts workers, imports what they say, holds them to their limits
 //! and settles how they ended. It also brings unfinished jobs to a legal state when the service starts.
 
+mod leftovers;
 mod limits;
 
 use crate::body::Wishes;
@@ -156,8 +157,10 @@ impl Supervisor {
             self.end_orphan(&job);
             // What the worker managed to say before counts, its verdict above all. Records that cannot be read are as
             // good as none: the job goes on from its last checkpoint.
-            if let Err(error) = self.store.import(&job.id, job.attempt, &mut ProgressPace::default()) {
-                tracing::error!(job = job.id, %error, "records could not be imported");
+            let imported = self.store.import(&job.id, job.attempt, &mut ProgressPace::default());
+            let cleared = imported.and_then(|_| leftovers::remove(&self.store, &job.id));
+            if let Err(error) = cleared {
+                tracing::error!(job = job.id, %error, "records could not be imported or leftovers not removed");
             }
             self.store.settle(&job.id, job.attempt, Loss { reason: Reason::ServerRestart, is_death: false })?;
             tracing::info!(job = job.id, attempt = job.attempt, "recovered");
@@ -235,7 +238,7 @@ impl Supervisor {
         // Records that cannot be read are as good as none; limits and the end are looked after all the same.
         let imported = self.store.import(&running.job, running.epoch, &mut running.pace).unwrap_or_else(|error| {
             tracing::error!(job = running.job, %error, "records could not be imported");
-            Imported::default()
+            Imported { is_whole: false, ..Imported::default() }
         });
         if imported.has_checkpoint {
             self.prune_checkpoints(k)?;
@@ -243,6 +246,9 @@ impl Supervisor {
         let running = &mut self.running[k];
         if let Some(exit) = exit {
             let reason = if exit.out_of_memory { Reason::WorkerOom } else { Reason::WorkerCrash };
+            if imported.is_whole {
+                leftovers::remove(&self.store, &running.job)?;
+            }
             self.book_disk(k)?;
             let running = &self.running[k];
             self.store.settle(&running.job, running.epoch, Loss { reason, is_death: true })?;

@@ -37,6 +37,12 @@ impl Expected {
             .map(|e| e["data"]["fraction"].as_f64().unwrap())
             .collect();
         assert!(fractions.is_sorted(), "{id}: the fraction falls: {fractions:?}");
+        // What killed attempts left behind is gone: as many frames and checkpoints on disk as listed.
+        let frames = files_below(service, id, "frames");
+        assert_eq!(frames.len(), self.frames.len(), "{id}: {frames:?}");
+        let listed = service.get(&format!("/v1/jobs/{id}/checkpoints")).json()["items"].as_array().unwrap().len();
+        let checkpoints = files_below(service, id, "checkpoints");
+        assert_eq!(checkpoints.len(), listed, "{id}: {checkpoints:?}");
     }
 }
 
@@ -150,18 +156,22 @@ fn an_orderly_shutdown_checkpoints_and_requeues() {
     expected.check(&service, &id);
 }
 
-fn checkpoint_files(service: &Service, id: &str) -> Vec<PathBuf> {
-    let mut files = Vec::new();
+/// All files in a folder of every attempt of a job, by name.
+fn files_below(service: &Service, id: &str, folder: &str) -> Vec<PathBuf> {
     let attempts = service.data.join("jobs").join(id).join("attempts");
-    for attempt in std::fs::read_dir(attempts).into_iter().flatten().flatten() {
-        for entry in std::fs::read_dir(attempt.path().join("checkpoints")).into_iter().flatten().flatten() {
-            if entry.path().extension().is_some_and(|e| e == "h5") {
-                files.push(entry.path());
-            }
-        }
-    }
+    let attempts = std::fs::read_dir(attempts).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = attempts
+        .flat_map(|attempt| std::fs::read_dir(attempt.path().join(folder)).into_iter().flatten().flatten())
+        .map(|entry| entry.path())
+        .collect();
     files.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     files
+}
+
+/// The whole checkpoints among them.
+fn checkpoint_files(service: &Service, id: &str) -> Vec<PathBuf> {
+    let is_whole = |path: &PathBuf| path.extension().is_some_and(|e| e == "h5");
+    files_below(service, id, "checkpoints").into_iter().filter(is_whole).collect()
 }
 
 type Damage = fn(&Path);

@@ -73,6 +73,38 @@ fn pause_and_resume_leave_no_trace_in_the_results() {
     assert_eq!(service.act(&disturbed, "resume").status, 409);
 }
 
+/// The index of frames is whole and matches its digest at every moment of a run.
+#[test]
+fn the_index_of_frames_is_true_while_the_job_runs() {
+    let (directory, service) = service(&["--slots", "1"]);
+    let mut body = long_job();
+    body["output"]["every_time"] = json!(6);
+    let id = service.submit(&body);
+    let mut seen = BTreeSet::new();
+    let path = format!("/v1/jobs/{id}/files/frames.vtkhdf.series");
+    loop {
+        let is_over = service.job(&id)["state"] == "succeeded";
+        let answer = service.get(&path);
+        if answer.status == 200 {
+            let place = directory.path().join("index.json");
+            std::fs::write(&place, &answer.bytes).unwrap();
+            let sum = std::process::Command::new("sha256sum").arg(&place).output().unwrap().stdout;
+            let sum = String::from_utf8(sum).unwrap();
+            assert_eq!(answer.header("etag").unwrap().trim_matches('"'), sum.split(' ').next().unwrap());
+            let frames = answer.json()["files"].as_array().unwrap().clone();
+            // Whatever the index names can be had.
+            let last = frames.last().unwrap()["name"].as_str().unwrap().to_owned();
+            assert_eq!(service.request("HEAD", &format!("/v1/jobs/{id}/files/{last}"), &[], None).status, 200);
+            seen.insert(frames.len());
+        }
+        if is_over {
+            break;
+        }
+    }
+    assert!(seen.len() > 2 && seen.last() == Some(&121), "{seen:?}");
+    assert!(service.get(&format!("/v1/jobs/{id}/files.tar")).bytes.len() > 100_000);
+}
+
 #[test]
 fn cancel_is_prompt_idempotent_and_final() {
     let (_directory, service) = service(&["--slots", "1"]);

@@ -2,7 +2,7 @@
 
 use crate::application::Application;
 use crate::error::{ApiError, Problem};
-use crate::file_response::{FileFacts, file_response};
+use crate::file_response::{FileFacts, bytes_response, file_response};
 use crate::routes::{job, with_store};
 use crate::views::{FileList, FileView};
 use axum::Json;
@@ -27,8 +27,28 @@ pub async fn list(State(application): State<Application>, Path(id): Path<String>
     Ok(Json(FileList { items: files.into_iter().map(FileView::from).collect(), next: None }))
 }
 
+/// A published file of a job as an answer.
+pub(super) async fn answer(
+    application: &Application,
+    id: &str,
+    path: &str,
+    headers: &HeaderMap,
+) -> Result<Response, ApiError> {
+    let row = job(application, id).await?;
+    let wanted = path.to_owned();
+    // Only what is listed exists, so no path can lead elsewhere.
+    let file = with_store(application, move |store| Ok(store.file(&row.id, &wanted)?)).await?;
+    let file = file.ok_or(ApiError::NotFound("file"))?;
+    let name = path.rsplit('/').next().unwrap_or("file").to_owned();
+    let facts = FileFacts { sha256: Some(file.sha256.clone()), media_type: file.media_type.clone(), name };
+    match &file.content {
+        Some(content) => bytes_response(content.as_bytes(), &facts, headers),
+        None => file_response(&location(application, id, &file), &facts, headers).await,
+    }
+}
+
 fn location(application: &Application, job: &str, file: &FileRow) -> PathBuf {
-    attempt_directory(&application.store.job_directory(job), file.attempt).join(&file.stored)
+    attempt_directory(&application.store.job_directory(job), file.attempt).join(&file.path)
 }
 
 /// A file, or a part of it. The tag is its SHA-256.
@@ -42,13 +62,7 @@ pub async fn get(
     Path((id, path)): Path<(String, String)>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let row = job(&application, &id).await?;
-    let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
-    // Only what is listed exists, so no path can lead elsewhere.
-    let file = files.into_iter().find(|file| file.path == path).ok_or(ApiError::NotFound("file"))?;
-    let name = file.path.rsplit('/').next().unwrap_or("file").to_owned();
-    let facts = FileFacts { sha256: Some(file.sha256.clone()), media_type: file.media_type.clone(), name };
-    file_response(&location(&application, &id, &file), &facts, &headers).await
+    answer(&application, &id, &path, &headers).await
 }
 
 /// All published files as one stream.
@@ -57,8 +71,8 @@ pub async fn get(
 pub async fn tar(State(application): State<Application>, Path(id): Path<String>) -> Result<Response, ApiError> {
     let row = job(&application, &id).await?;
     let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
-    let places: Vec<(String, PathBuf)> =
-        files.iter().map(|f| (f.path.clone(), location(&application, &id, f))).collect();
+    let places: Vec<(FileRow, PathBuf)> =
+        files.into_iter().map(|f| (f.clone(), location(&application, &id, &f))).collect();
     // A reader that is slow holds up a thread; there are so many for archives and no more.
     let permit = Arc::clone(&application.archives).try_acquire_owned().map_err(|_| ApiError::Busy)?;
     let (sender, receiver) = mpsc::channel::<Result<Bytes, io::Error>>(8);
@@ -69,7 +83,7 @@ pub async fn tar(State(application): State<Application>, Path(id): Path<String>)
         archive.mode(::tar::HeaderMode::Deterministic);
         let written = places
             .iter()
-            .try_for_each(|(path, place)| archive.append_path_with_name(place, format!("{top}/{path}")))
+            .try_for_each(|(file, place)| append(&mut archive, &format!("{top}/{}", file.path), file, place))
             .and_then(|()| archive.finish());
         if let Err(error) = written {
             // An archive that ends early must not look whole.
@@ -81,6 +95,19 @@ pub async fn tar(State(application): State<Application>, Path(id): Path<String>)
         .header(header::CONTENT_DISPOSITION, format!("attachment; filename=\"{id}.tar\""))
         .body(Body::from_stream(ReceiverStream::new(receiver)))
         .map_err(|error| ApiError::Internal(error.to_string()))
+}
+
+fn append<W: Write>(
+    archive: &mut ::tar::Builder<W>,
+    name: &str,
+    file: &FileRow,
+    place: &std::path::Path,
+) -> io::Result<()> {
+    let Some(content) = &file.content else { return archive.append_path_with_name(place, name) };
+    let mut header = ::tar::Header::new_gnu();
+    header.set_size(content.len() as u64);
+    header.set_mode(0o644);
+    archive.append_data(&mut header, name, content.as_bytes())
 }
 
 struct ChannelWriter(mpsc::Sender<Result<Bytes, io::Error>>);

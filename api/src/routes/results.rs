@@ -2,8 +2,8 @@
 
 use crate::application::Application;
 use crate::error::{ApiError, Problem, ProblemItem};
-use crate::file_response::{FileFacts, bytes_response, file_response};
-use crate::routes::{job, with_store};
+use crate::file_response::{FileFacts, bytes_response};
+use crate::routes::{files, job, with_store};
 use axum::Json;
 use axum::extract::{Path, Query, State};
 use axum::http::{HeaderMap, header};
@@ -92,10 +92,5 @@ pub async fn report(
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let row = job(&application, &id).await?;
-    let files = with_store(&application, move |store| Ok(store.files(&row.id)?)).await?;
-    let file = files.into_iter().find(|file| file.path == "report.json").ok_or(ApiError::NotFound("report yet"))?;
-    let facts = FileFacts { sha256: Some(file.sha256), media_type: file.media_type, name: "report.json".to_owned() };
-    let place = attempt_directory(&application.store.job_directory(&id), file.attempt).join(&file.stored);
-    file_response(&place, &facts, &headers).await
+    files::answer(&application, &id, "report.json", &headers).await
 }

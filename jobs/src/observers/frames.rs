@@ -2,18 +2,15 @@
 
 use crate::artifacts;
 use crate::digest;
-use crate::formats::vtkhdf;
+use crate::formats::{frame_index, vtkhdf};
 use crate::records::FileRecord;
 use meniscus::simulation::run::ObserverError;
 use meniscus::simulation::{OutputPlan, Simulation};
 use meniscus::time::FixedStep;
-use serde_json::json;
 use std::path::PathBuf;
 
 /// Media type of HDF5 files.
 pub const HDF5: &str = "application/x-hdf5";
-/// Path of the index.
-pub const INDEX: &str = "frames.vtkhdf.series";
 
 /// Writes frames when they are due.
 pub struct Frames {
@@ -53,14 +50,14 @@ impl Frames {
         self.before
     }
 
-    /// Writes the frame of this step, if it is due; returns the files that are new.
+    /// Writes the frame of this step, if it is due.
     ///
     /// # Errors
-    /// When a file cannot be written.
-    pub fn observe(&mut self, simulation: &dyn Simulation) -> Result<Vec<FileRecord>, ObserverError> {
+    /// When it cannot be written.
+    pub fn observe(&mut self, simulation: &dyn Simulation) -> Result<Option<FileRecord>, ObserverError> {
         let clock = simulation.clock();
         if !self.is_first && !self.plan.is_frame_due(&fixed_step(simulation), clock.step) {
-            return Ok(Vec::new());
+            return Ok(None);
         }
         self.is_first = false;
         let name = format!("frames/{:06}.vtkhdf", self.before + self.written.len() as u64);
@@ -71,7 +68,6 @@ impl Frames {
         let (sha256, size_bytes) = digest::of_file(&path)?;
         let frame = FileRecord {
             path: name,
-            stored: None,
             size_bytes,
             sha256,
             media_type: HDF5.to_owned(),
@@ -79,25 +75,18 @@ impl Frames {
             step: Some(clock.step),
         };
         self.written.push((self.epoch, frame.clone()));
-        Ok(vec![frame, self.write_index()?])
+        Ok(Some(frame))
     }
 
-    /// Writes the index of all frames so far.
+    /// Writes the index of all frames. While a job runs the service derives it from the published frames; the end of
+    /// the run makes it a file.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn write_index(&self) -> Result<FileRecord, ObserverError> {
-        let files: Vec<_> = self.written.iter().map(|(_, f)| json!({"name": f.path, "time": f.time})).collect();
-        let index = json!({"file-series-version": "1.0", "files": files});
-        let text = index.to_string();
-        // What is published never changes under its stored name; the plain name beside it is for people who open the
-        // directory itself.
-        let stored = format!("index/{:06}.series", self.written.len());
-        std::fs::create_dir_all(self.directory.join("index"))?;
-        artifacts::write(&self.directory.join(&stored), text.as_bytes())?;
-        artifacts::write(&self.directory.join(INDEX), text.as_bytes())?;
-        let record = artifacts::record(&self.directory, &stored, "application/json")?;
-        Ok(FileRecord { path: INDEX.to_owned(), stored: Some(stored), ..record })
+        let text = frame_index::text(self.written.iter().map(|(_, frame)| (frame.path.as_str(), frame.time)));
+        artifacts::write(&self.directory.join(frame_index::PATH), text.as_bytes())?;
+        Ok(artifacts::record(&self.directory, frame_index::PATH, frame_index::MEDIA_TYPE)?)
     }
 }
 

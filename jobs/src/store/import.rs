@@ -17,14 +17,22 @@ pub struct ProgressPace {
 }
 
 /// What an import brought.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Imported {
+    /// Whether every whole record that the worker has written is taken.
+    pub is_whole: bool,
     /// The worker's last word.
     pub verdict: Option<Verdict>,
     /// Whether a checkpoint came.
     pub has_checkpoint: bool,
     /// Whether anything came.
     pub any: bool,
+}
+
+impl Default for Imported {
+    fn default() -> Self {
+        Self { is_whole: true, verdict: None, has_checkpoint: false, any: false }
+    }
 }
 
 impl Store {
@@ -168,8 +176,8 @@ fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Re
         Record::File(file) => {
             transaction
                 .prepare_cached(
-                    "INSERT OR REPLACE INTO files (job, path, stored, attempt, size_bytes, sha256, media_type, time, step)
-                     VALUES (?1, ?2, ?9, ?3, ?4, ?5, ?6, ?7, ?8)",
+                    "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
                 )?
                 .execute(params![
                     job,
@@ -180,7 +188,6 @@ fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Re
                     file.media_type,
                     file.time,
                     file.step.map(|step| step as i64),
-                    file.stored.as_ref().unwrap_or(&file.path),
                 ])?;
             if file.step.is_some() {
                 let data =

@@ -51,7 +51,6 @@ const MIGRATIONS: &[&str] = &["
     CREATE TABLE files (
         job TEXT NOT NULL,
         path TEXT NOT NULL,
-        stored TEXT NOT NULL,
         attempt INTEGER NOT NULL,
         size_bytes INTEGER NOT NULL,
         sha256 TEXT NOT NULL,

@@ -1,6 +1,8 @@
 //! Rows as values.
 
 use super::StoreError;
+use crate::digest;
+use crate::formats::frame_index;
 use crate::job::{Reason, State};
 use crate::records::{Progress, Usage, Verdict};
 use rusqlite::{Connection, OptionalExtension, Row};
@@ -77,8 +79,6 @@ pub struct JobRow {
 pub struct FileRow {
     /// Path among the job's files.
     pub path: String,
-    /// Path below the attempt's directory.
-    pub stored: String,
     /// Attempt that wrote it.
     pub attempt: u64,
     /// Bytes.
@@ -91,6 +91,8 @@ pub struct FileRow {
     pub time: Option<f64>,
     /// Step.
     pub step: Option<u64>,
+    /// The whole content, where no attempt has written it.
+    pub content: Option<String>,
 }
 
 /// A verified checkpoint.
@@ -203,19 +205,50 @@ pub(super) fn checkpoints(connection: &Connection, job: &str) -> Result<Vec<Chec
     Ok(rows.collect::<Result<_, _>>()?)
 }
 
+fn file_of(row: &Row) -> rusqlite::Result<FileRow> {
+    Ok(FileRow {
+        path: row.get("path")?,
+        attempt: row.get::<_, i64>("attempt")? as u64,
+        size_bytes: row.get::<_, i64>("size_bytes")? as u64,
+        sha256: row.get("sha256")?,
+        media_type: row.get("media_type")?,
+        time: row.get("time")?,
+        step: row.get::<_, Option<i64>>("step")?.map(|step| step as u64),
+        content: None,
+    })
+}
+
+/// All files of a job by path, the index of its frames included as long as no attempt has written one.
 pub(super) fn files(connection: &Connection, job: &str) -> Result<Vec<FileRow>, StoreError> {
     let mut statement = connection.prepare_cached("SELECT * FROM files WHERE job = ?1 ORDER BY path")?;
-    let rows = statement.query_map([job], |row| {
-        Ok(FileRow {
-            path: row.get("path")?,
-            stored: row.get("stored")?,
-            attempt: row.get::<_, i64>("attempt")? as u64,
-            size_bytes: row.get::<_, i64>("size_bytes")? as u64,
-            sha256: row.get("sha256")?,
-            media_type: row.get("media_type")?,
-            time: row.get("time")?,
-            step: row.get::<_, Option<i64>>("step")?.map(|step| step as u64),
-        })
-    })?;
-    Ok(rows.collect::<Result<_, _>>()?)
+    let rows = statement.query_map([job], file_of)?;
+    let mut files = rows.collect::<Result<Vec<FileRow>, _>>()?;
+    let place = files.binary_search_by(|file| file.path.as_str().cmp(frame_index::PATH));
+    if let Err(place) = place
+        && files.iter().any(|file| file.step.is_some())
+    {
+        let frames = files.iter().filter(|file| file.step.is_some());
+        let content = frame_index::text(frames.map(|frame| (frame.path.as_str(), frame.time)));
+        let index = FileRow {
+            path: frame_index::PATH.to_owned(),
+            attempt: 0,
+            size_bytes: content.len() as u64,
+            sha256: digest::of_bytes(content.as_bytes()),
+            media_type: frame_index::MEDIA_TYPE.to_owned(),
+            time: None,
+            step: None,
+            content: Some(content),
+        };
+        files.insert(place, index);
+    }
+    Ok(files)
+}
+
+/// One file of a job.
+pub(super) fn file(connection: &Connection, job: &str, path: &str) -> Result<Option<FileRow>, StoreError> {
+    if path == frame_index::PATH {
+        return Ok(files(connection, job)?.into_iter().find(|file| file.path == path));
+    }
+    let mut statement = connection.prepare_cached("SELECT * FROM files WHERE job = ?1 AND path = ?2")?;
+    Ok(statement.query_row([job, path], file_of).optional()?)
 }
