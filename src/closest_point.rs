@@ -4,15 +4,18 @@
 //! zeros gives sample particles; queries start at the nearest sample and solve for the closest point of its
 //! polynomial's zero.
 
+pub mod detection;
 pub mod enclosed_measure;
 pub mod method;
 pub mod newton;
 pub mod projection;
+pub mod queries;
 pub mod redistancing;
 pub mod rescue;
 pub mod surface_columns;
 
 pub use method::PcpMethod;
+pub use queries::Answers;
 pub use redistancing::{ClosestPoint, Redistancing};
 pub use rescue::RescueCounts;
 pub use surface_columns::SurfaceColumns;

@@ -1,4 +1,5 @@
-//! Small dense problems that are solved once per particle.
+//! Small dense algebra: numbers in vector lanes, least squares, normal equations of many small problems at once.
 
 pub mod least_squares;
-pub mod small_system;
+pub mod normal_equations;
+pub mod number;

@@ -2,8 +2,8 @@
 
 use crate::geometry::Vector;
 use crate::polynomials::multi_index::term_count;
-use crate::polynomials::regression::radius_of_count;
-use crate::polynomials::{BasisKind, Neighborhood, PolynomialBasis, Regression};
+use crate::polynomials::neighborhood::radius_of_count;
+use crate::polynomials::{BasisKind, Neighborhood, PolynomialBasis, Regression, Solver};
 
 /// How particles are redistanced. Lengths are in multiples of the spacing h.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +14,10 @@ pub struct PcpMethod {
     pub basis: BasisKind,
     /// Which particles take part in a fit.
     pub neighborhood: NeighborhoodChoice,
+    /// How regressions are solved.
+    pub solver: Solver,
+    /// Whether only particles take part whose last normals agree with that of the fit's centre.
+    pub same_branch: bool,
     /// k of the weight exp(−k r²/r_c²).
     pub weight: f64,
     /// Least number of neighbours per coefficient.
@@ -45,16 +49,12 @@ impl PcpMethod {
     /// The regression for particles of spacing h.
     #[must_use]
     pub fn regression<const D: usize>(&self, spacing: f64) -> Regression<D> {
-        Regression {
-            basis: PolynomialBasis::new(self.basis, self.degree),
-            neighborhood: match self.neighborhood {
-                NeighborhoodChoice::Radius { cutoff_h } => Neighborhood::Radius { cutoff: cutoff_h * spacing },
-                NeighborhoodChoice::Nearest { count } => Neighborhood::Nearest { count },
-            },
-            weight: self.weight,
-            minimum_ratio: self.minimum_ratio,
-            spacing,
-        }
+        let neighborhood = match self.neighborhood {
+            NeighborhoodChoice::Radius { cutoff_h } => Neighborhood::Radius { cutoff: cutoff_h * spacing },
+            NeighborhoodChoice::Nearest { count } => Neighborhood::Nearest { count },
+        };
+        let basis = PolynomialBasis::new(self.basis, self.degree);
+        Regression::new(basis, neighborhood, self.weight, self.minimum_ratio, spacing, self.solver)
     }
 
     /// How far from the surface particles take part in fits, in multiples of h, growth of the radius included.

@@ -1,15 +1,30 @@
 //! The closest point on the zero of a local polynomial by a safeguarded Newton method (PCP eqs. 10 to 14).
 //!
 //! Splitting the Newton system of the Lagrangian into the normal n = ∇p/|∇p| and the tangent plane gives a normal
-//! step −p/|∇p| and a tangential step with the reduced Hessian P (I + λ∇∇p) P, λ the least-squares multiplier. The
+//! step −p/|∇p| and a tangential step with the reduced Hessian I + λ tᵢ·∇∇p·tⱼ, λ the least-squares multiplier. The
 //! reduced Hessian's pivots are held above a floor and the step's length below a share of the support, so the
 //! iteration cannot run off; near the solution both bounds are inactive and convergence is quadratic.
 
 use super::method::PcpMethod;
 use crate::geometry::Vector;
-use crate::linear_algebra::small_system::solve_symmetric_floored;
-use crate::polynomials::{Fit, Jet, LocalPolynomial};
-use nalgebra::SMatrix;
+use crate::linear_algebra::number::{LANES, Lanes, Number, add_scaled, difference, dot, times};
+use crate::polynomials::horner::derivatives;
+use crate::polynomials::{Fit, Jet};
+
+/// A local polynomial of the level set with the point of its zero where iterations start.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch<'a, const D: usize> {
+    /// Geometry of the fit.
+    pub fit: &'a Fit<D>,
+    /// Total degree that the coefficients are laid out for.
+    pub degree: usize,
+    /// Coefficients of monomials in nested order.
+    pub coefficients: &'a [f64],
+    /// A point with p = 0.
+    pub start: &'a Vector<D>,
+    /// p, ∇p, ∇∇p there.
+    pub jet: &'a Jet<f64, D>,
+}
 
 /// How an iteration ended.
 #[derive(Debug, Clone, Copy)]
@@ -22,74 +37,225 @@ pub enum NewtonEnd<const D: usize> {
     Stuck,
 }
 
-/// A closest point with the polynomial's derivatives there.
+/// A closest point with what the polynomial says there.
 #[derive(Debug, Clone, Copy)]
 pub struct Foot<const D: usize> {
     /// The point.
     pub point: Vector<D>,
-    /// p, ∇p, ∇∇p there.
-    pub jet: Jet<D>,
+    /// ∇p/|∇p|.
+    pub normal: Vector<D>,
+    /// ∇·n.
+    pub curvature: f64,
 }
 
 /// Least pivot of the reduced Hessian; 1 is a plane, 0 the centre of curvature.
 const PIVOT_FLOOR: f64 = 0.1;
 /// Longest step as a share of the support's radius.
-const LONGEST_STEP: f64 = 0.4;
-/// An end is accepted when the last step is shorter than this share of the support.
-const ACCEPTED: f64 = 1e-7;
+pub(super) const LONGEST_STEP: f64 = 0.4;
+/// A stalled end is accepted when the last step is shorter than this share of the support.
+pub(super) const ACCEPTED: f64 = 1e-7;
+/// A step shorter than this share of the support, and than a hundredth of the one before, is the last: convergence is
+/// quadratic, so the next would be shorter than its square.
+const QUADRATIC: f64 = 3e-8;
+/// See [`QUADRATIC`].
+const QUADRATIC_RATIO: f64 = 1e-2;
 
-/// Finds the point of p = 0 nearest to `query`, beginning at `start`. Returns the end and the iterations made.
-#[must_use]
-pub fn closest_point<const D: usize>(
-    method: &PcpMethod,
-    polynomial: &LocalPolynomial<D>,
-    fit: &Fit<D>,
-    query: &Vector<D>,
-    start: &Vector<D>,
-) -> (NewtonEnd<D>, u32) {
-    let mut x = *start;
-    let mut last = f64::INFINITY;
-    for iteration in 1..=method.max_iterations {
-        let jet = polynomial.jet(&(x - fit.centre));
-        let Some(mut step) = newton_step(&jet, &(query - x)) else {
-            return (NewtonEnd::Stuck, iteration);
-        };
-        let length = step.norm();
-        let stalled = length <= ACCEPTED * fit.radius && length >= 0.5 * last;
-        // Coordinates cannot move by less than their own last bit.
-        if method.is_converged(&step) || stalled || length <= f64::EPSILON * x.amax() {
-            // The jet is evaluated at most one converged step away: its change is below the step itself.
-            return (NewtonEnd::Converged(Foot { point: x + step, jet }), iteration);
-        }
-        let most = LONGEST_STEP * fit.radius;
-        if length > most {
-            step *= most / length;
-        }
-        x += step;
-        if (x - fit.middle).norm() > fit.radius {
-            return (NewtonEnd::LeftSupport(x), iteration);
-        }
-        last = length;
-    }
-    (NewtonEnd::Stuck, method.max_iterations)
+/// Whether the iteration ends with a step of this length.
+#[inline(always)]
+pub(super) fn is_last_step(method: &PcpMethod, length: f64, last: f64, radius: f64, largest_coordinate: f64) -> bool {
+    let is_quadratic = length <= QUADRATIC * radius && length <= QUADRATIC_RATIO * last;
+    let is_stalled = length <= ACCEPTED * radius && length >= 0.5 * last;
+    // Coordinates cannot move by less than their own last bit.
+    length <= method.tolerance || is_quadratic || is_stalled || length <= f64::EPSILON * largest_coordinate
 }
 
-/// One step for the offset `query − x`; None where the gradient vanishes or numbers are not finite.
-fn newton_step<const D: usize>(jet: &Jet<D>, offset: &Vector<D>) -> Option<Vector<D>> {
-    let slope = jet.gradient.norm();
-    if !(slope > 0.0 && jet.value.is_finite() && slope.is_finite()) {
-        return None;
+/// Finds the points of p = 0 nearest to up to [`LANES`] queries, all beginning at the patch's start. Returns the end of
+/// each and the iterations made.
+#[must_use]
+#[inline]
+pub fn closest_points<const D: usize>(
+    method: &PcpMethod,
+    patch: &Patch<D>,
+    queries: &[Vector<D>],
+) -> ([NewtonEnd<D>; LANES], u64) {
+    let fit = patch.fit;
+    let mut ends = [NewtonEnd::Stuck; LANES];
+    let live = queries.len().min(LANES);
+    let mut active = [false; LANES];
+    active[..live].fill(true);
+    let zero = Lanes::splat(0.0);
+    let (mut query, mut x, mut middle, mut centre) = ([zero; D], [zero; D], [zero; D], [zero; D]);
+    for d in 0..D {
+        let mut lanes = [queries[0][d]; LANES];
+        for lane in 1..live {
+            lanes[lane] = queries[lane][d];
+        }
+        query[d] = Lanes::new(lanes);
+        x[d] = Lanes::splat(patch.start[d]);
+        middle[d] = Lanes::splat(fit.middle[d]);
+        centre[d] = Lanes::splat(fit.centre[d]);
     }
-    let n = jet.gradient / slope;
+    let mut jet = Jet {
+        value: Lanes::splat(patch.jet.value),
+        gradient: patch.jet.gradient.map(Lanes::splat),
+        hessian: patch.jet.hessian.map(|row| row.map(Lanes::splat)),
+    };
+    let inverse_scale = 1.0 / fit.scale;
+    let most = Lanes::splat(LONGEST_STEP * fit.radius);
+    let limit = fit.radius * fit.radius;
+    let mut last = [f64::INFINITY; LANES];
+    let mut iterations = 0;
+    for iteration in 1..=method.max_iterations {
+        let offset = difference(&query, &x);
+        let step = newton_step(&jet, &offset);
+        let length = dot(&step, &step).sqrt();
+        let lengths = length.to_array();
+        let mut largest = x[0].abs();
+        for component in &x[1..] {
+            largest = largest.max(component.abs());
+        }
+        let largest = largest.to_array();
+        let factor = most / Number::max(length, most);
+        let next = add_scaled(&x, factor, &step);
+        let from_middle = difference(&next, &middle);
+        let away = dot(&from_middle, &from_middle).to_array();
+        let mut done = [false; LANES];
+        let mut any_done = false;
+        let mut any_left = false;
+        for lane in 0..LANES {
+            if !active[lane] {
+                continue;
+            }
+            iterations += 1;
+            if !lengths[lane].is_finite() {
+                // The gradient vanished or numbers ran over: the end stays `Stuck`.
+                active[lane] = false;
+            } else if is_last_step(method, lengths[lane], last[lane], fit.radius, largest[lane]) {
+                done[lane] = true;
+                any_done = true;
+                active[lane] = false;
+            } else if away[lane] > limit {
+                ends[lane] = NewtonEnd::LeftSupport(Vector::<D>::from_fn(|d, _| next[d].to_array()[lane]));
+                active[lane] = false;
+            }
+            any_left |= active[lane];
+        }
+        if any_done {
+            // The jet is at most one last step away: its quadratic part tells the normal there.
+            let jet = jet.moved(&step);
+            let foot = add_scaled(&x, Lanes::splat(1.0), &step);
+            let (normal, curvature) = (jet.normal(), jet.curvature().to_array());
+            for lane in (0..LANES).filter(|lane| done[*lane]) {
+                ends[lane] = NewtonEnd::Converged(Foot {
+                    point: Vector::<D>::from_fn(|d, _| foot[d].to_array()[lane]),
+                    normal: Vector::<D>::from_fn(|d, _| normal[d].to_array()[lane]),
+                    curvature: curvature[lane],
+                });
+            }
+        }
+        if !any_left || iteration == method.max_iterations {
+            break;
+        }
+        x = next;
+        last = lengths;
+        let t = difference(&x, &centre).map(|c| c * Lanes::splat(inverse_scale));
+        let local = derivatives(patch.degree, |place| Lanes::splat(patch.coefficients[place]), &t);
+        jet = Jet::from_local(&local, Lanes::splat(inverse_scale));
+    }
+    (ends, iterations)
+}
+
+/// One step for the offset `query − x`; not finite where the gradient vanishes.
+#[inline(always)]
+pub(super) fn newton_step<T: Number, const D: usize>(jet: &Jet<T, D>, offset: &[T; D]) -> [T; D] {
+    let floor = T::splat(PIVOT_FLOOR);
+    let one = T::splat(1.0);
+    let inverse = one / jet.slope();
+    let n = jet.gradient.map(|g| g * inverse);
     // x − query + λ∇p = 0 in the least-squares sense.
-    let lambda = offset.dot(&n) / slope;
-    let bent = SMatrix::<f64, D, D>::identity() + jet.hessian * lambda;
-    let normal_step = n * (-jet.value / slope);
-    let pull = offset - bent * normal_step;
-    let tangential = pull - n * n.dot(&pull);
-    let projector = SMatrix::<f64, D, D>::identity() - n * n.transpose();
-    let reduced = projector * bent * projector + n * n.transpose();
-    let (slide, _) = solve_symmetric_floored(&reduced, &tangential, PIVOT_FLOOR);
-    let step = normal_step + (slide - n * n.dot(&slide));
-    step.iter().all(|s| s.is_finite()).then_some(step)
+    let lambda = dot(offset, &n) * inverse;
+    let along = -(jet.value * inverse);
+    let step = n.map(|c| c * along);
+    // What is left to slide after the normal step: the offset less (I + λ∇∇p) times that step.
+    let bend = times(&jet.hessian, &step);
+    let pull = add_scaled(&difference(offset, &step), -lambda, &bend);
+    let (s, t) = tangents(&n);
+    let bent = times(&jet.hessian, &s);
+    let first = Number::max(lambda.mul_add(dot(&s, &bent), one), floor);
+    let mut slide = dot(&s, &pull) / first;
+    if D == 3 {
+        let factor = lambda * dot(&t, &bent) / first;
+        let diagonal = lambda.mul_add(dot(&t, &times(&jet.hessian, &t)), one);
+        let second = Number::max(diagonal - factor * factor * first, floor);
+        let other = (dot(&t, &pull) - factor * first * slide) / second;
+        slide = slide - factor * other;
+        let across = add_scaled(&step, other, &t);
+        return add_scaled(&across, slide, &s);
+    }
+    add_scaled(&step, slide, &s)
+}
+
+/// Unit vectors that span the plane across the unit normal n without a case distinction (Duff et al. 2017); the second
+/// is zero in two dimensions.
+#[inline(always)]
+pub(super) fn tangents<T: Number, const D: usize>(n: &[T; D]) -> ([T; D], [T; D]) {
+    let zero = T::splat(0.0);
+    let (mut s, mut t) = ([zero; D], [zero; D]);
+    if D == 2 {
+        s[0] = -n[1];
+        s[1] = n[0];
+    } else {
+        let one = T::splat(1.0);
+        let sign = Number::copysign(one, n[2]);
+        let a = -(one / (sign + n[2]));
+        let b = n[0] * n[1] * a;
+        s[0] = (sign * n[0] * n[0]).mul_add(a, one);
+        s[1] = sign * b;
+        s[2] = -(sign * n[0]);
+        t[0] = b;
+        t[1] = (n[1] * n[1]).mul_add(a, sign);
+        t[2] = -n[1];
+    }
+    (s, t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{newton_step, tangents};
+    use crate::geometry::random::CounterRandom;
+    use crate::linear_algebra::number::dot;
+    use crate::polynomials::Jet;
+
+    #[test]
+    fn tangents_are_orthonormal_for_every_normal() {
+        let random = CounterRandom::new(2);
+        for k in 0..1000 {
+            let mut n: [f64; 3] = std::array::from_fn(|d| random.symmetric(&[k, d as i64]));
+            if k == 0 {
+                n = [0.0, 0.0, -1.0];
+            }
+            let size = dot(&n, &n).sqrt();
+            let n = n.map(|c| c / size);
+            let (s, t) = tangents(&n);
+            for (a, b, expected) in [(s, s, 1.0), (t, t, 1.0), (s, t, 0.0), (s, n, 0.0), (t, n, 0.0)] {
+                assert!((dot(&a, &b) - expected).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn one_step_from_the_pole_of_a_paraboloid_is_newtons() {
+        // p = z + (a x² + b y²)/2 at the origin, query (u, v, w): slides of u/(1 + w a), v/(1 + w b).
+        let (a, b) = (0.7, -0.4);
+        let jet =
+            Jet { value: 0.0, gradient: [0.0, 0.0, 1.0], hessian: [[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, 0.0]] };
+        let step = newton_step(&jet, &[0.3, -0.2, 0.5]);
+        let expected = [0.3 / (1.0 + 0.5 * a), -0.2 / (1.0 + 0.5 * b), 0.0];
+        for d in 0..3 {
+            assert!((step[d] - expected[d]).abs() < 1e-15);
+        }
+        // Beyond the centre of curvature the pivot is held above its floor.
+        let far = newton_step(&jet, &[0.0, 0.01, 5.0]);
+        assert!((far[1] - 0.1).abs() < 1e-15);
+    }
 }

@@ -1,13 +1,15 @@
 //! Redistancing as a whole: near-surface particles → fits → sample particles; queries → closest points.
 
+use super::detection::Detection;
 use super::method::PcpMethod;
-use super::newton::{NewtonEnd, closest_point};
+use super::newton::{Foot, NewtonEnd, Patch, closest_points};
 use super::projection::project;
 use super::rescue::{RescueCounts, add};
 use crate::geometry::{Domain, Vector};
+use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
-use crate::polynomials::{Fit, LocalPolynomial, Regression, RegressionScratch};
+use crate::polynomials::{Fit, Jet, Regression, RegressionScratch};
 use rayon::prelude::{
     IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator, ParallelSlice, ParallelSliceMut,
 };
@@ -29,8 +31,8 @@ pub struct ClosestPoint<const D: usize> {
 
 /// The surface of a set of particles: sample particles with their polynomials, and the means to rebuild it.
 ///
-/// 1. [`Self::rebuild`]: detection of near-surface particles, regression, projection.
-/// 2. [`Self::closest_points`] or [`Self::query`]: nearest sample, Newton, rescue.
+/// 1. [`Self::detect`] and [`Self::fit_samples`]: detection of near-surface particles, regression, projection.
+/// 2. [`Self::closest_points`](super::queries) or [`Self::query`]: nearest sample, Newton, rescue.
 ///
 /// All storage is reused; a rebuild allocates only while counts grow.
 #[derive(Debug)]
@@ -39,25 +41,24 @@ pub struct Redistancing<const D: usize> {
     domain: Domain<D>,
     spacing: f64,
     regression: Regression<D>,
-    cells: CellList<D>,
-    is_near: Vec<bool>,
-    is_inside: Vec<bool>,
-    near: Vec<usize>,
+    detection: Detection<D>,
     fitted: Vec<Option<Sample<D>>>,
     coefficients: Vec<f64>,
-    /// Sample particles, with the place of their coefficients.
-    samples: Vec<(Sample<D>, usize)>,
+    samples: Vec<Sample<D>>,
     sample_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
     counts: RescueCounts,
     worst_condition: f64,
 }
 
+/// A sample particle: a point of the surface with the polynomial that it was projected with.
 #[derive(Debug, Clone, Copy)]
-struct Sample<const D: usize> {
+pub(super) struct Sample<const D: usize> {
     point: Vector<D>,
-    normal: Vector<D>,
+    jet: Jet<f64, D>,
     fit: Fit<D>,
+    /// Where its coefficients begin.
+    place: usize,
 }
 
 /// Rounds of moving on to another sample's polynomial before the sample itself is taken.
@@ -70,13 +71,10 @@ impl<const D: usize> Redistancing<D> {
         Self {
             regression: method.regression(spacing),
             method,
-            cells: CellList::new(domain.clone()),
+            detection: Detection::new(domain.clone()),
             sample_cells: CellList::new(domain.clone()),
             domain,
             spacing,
-            is_near: Vec::new(),
-            is_inside: Vec::new(),
-            near: Vec::new(),
             fitted: Vec::new(),
             coefficients: Vec::new(),
             samples: Vec::new(),
@@ -94,7 +92,15 @@ impl<const D: usize> Redistancing<D> {
 
     /// Positions of the sample particles.
     pub fn sample_points(&self) -> impl ExactSizeIterator<Item = Vector<D>> + '_ {
-        self.samples.iter().map(|(sample, _)| sample.point)
+        self.samples.iter().map(|sample| sample.point)
+    }
+
+    pub(super) fn samples(&self) -> &[Sample<D>] {
+        &self.samples
+    }
+
+    pub(super) fn sample_cells(&self) -> &CellList<D> {
+        &self.sample_cells
     }
 
     /// What did not go the plain way so far.
@@ -122,29 +128,13 @@ impl<const D: usize> Redistancing<D> {
     /// [`Interrupted`] when somebody asked to stop.
     pub fn detect(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
         let threshold = self.method.sample_threshold_h * self.spacing;
-        self.cells.rebuild(positions.iter().copied(), threshold);
-        self.is_near.resize(positions.len(), false);
-        self.is_inside.clear();
-        self.is_inside.extend(level.iter().map(|l| *l < 0.0));
-        let cells = &self.cells;
-        self.is_near.par_chunks_mut(BLOCK).enumerate().for_each(|(block, flags)| {
-            if interrupt.is_raised() {
-                return;
-            }
-            for (k, flag) in flags.iter_mut().enumerate() {
-                let i = block * BLOCK + k;
-                let inside = level[i] < 0.0;
-                *flag = false;
-                cells.for_each_within(&positions[i], threshold, |j, _, _| *flag |= (level[j] < 0.0) != inside);
-            }
-        });
-        interrupt.check()?;
-        self.near.clear();
-        self.near.extend((0..positions.len()).filter(|&i| self.is_near[i]));
-        Ok(())
+        self.detection.rebuild(positions, level, threshold, interrupt)
     }
 
     /// Step two of a rebuild: fits about the near-surface particles and their projection onto the surface.
+    ///
+    /// `normals` are those of the last redistancing (zero where unknown): where the method says so, only particles
+    /// whose normals agree with that of the fit's centre take part, so that two sheets of a filament are kept apart.
     ///
     /// # Errors
     /// [`Interrupted`] when somebody asked to stop.
@@ -152,52 +142,65 @@ impl<const D: usize> Redistancing<D> {
         &mut self,
         positions: &[Vector<D>],
         level: &[f64],
+        normals: Option<&[Vector<D>]>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         let terms = self.regression.terms();
-        self.fitted.resize(self.near.len(), None);
-        self.coefficients.resize(self.near.len() * terms, 0.0);
+        let near = self.detection.near();
+        self.fitted.resize(near.len(), None);
+        self.coefficients.resize(near.len() * terms, 0.0);
         let (cells, regression, method, scratch, counts) =
-            (&self.cells, &self.regression, &self.method, &self.scratch, &self.counts);
+            (self.detection.cells(), &self.regression, &self.method, &self.scratch, &self.counts);
+        let normals = normals.filter(|_| method.same_branch);
+        let is_same_branch = |i: usize, j: usize| {
+            // Unknown normals, which are zero, agree with every other.
+            normals.is_none_or(|normals| i == j || normals[i].dot(&normals[j]) >= 0.0)
+        };
         self.fitted
             .par_chunks_mut(BLOCK)
             .zip(self.coefficients.par_chunks_mut(BLOCK * terms))
-            .zip(self.near.par_chunks(BLOCK))
-            .for_each(|((fitted, coefficients), near)| {
+            .zip(near.par_chunks(BLOCK))
+            .enumerate()
+            .for_each(|(block, ((fitted, coefficients), near))| {
                 if interrupt.is_raised() {
                     return;
                 }
+                let mut place = block * BLOCK * terms;
                 scratch.with(|scratch| {
-                    for ((slot, coefficients), &i) in fitted.iter_mut().zip(coefficients.chunks_mut(terms)).zip(near) {
-                        let x = &positions[i];
-                        let fit = regression.fit(cells, x, level, scratch, coefficients);
-                        *slot = fit.and_then(|fit| {
-                            let polynomial = fit.polynomial(&regression.basis, coefficients);
-                            let projected = project(method, &polynomial, &fit, x);
-                            add(&counts.unprojected, u64::from(projected.is_none()));
-                            projected.map(|p| Sample { point: p.point, normal: p.normal, fit })
-                        });
-                        count_fit(counts, fit.as_ref(), regression.basis.degree());
+                    let lanes = fitted.chunks_mut(LANES).zip(coefficients.chunks_mut(LANES * terms));
+                    for ((fitted, coefficients), near) in lanes.zip(near.chunks(LANES)) {
+                        let last = near.len() - 1;
+                        let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| positions[near[lane.min(last)]]);
+                        let fits = regression.fit_lanes(
+                            cells,
+                            &centres[..near.len()],
+                            &|j, _| level[j],
+                            1,
+                            &|lane, j| is_same_branch(near[lane], j),
+                            scratch,
+                            coefficients,
+                        );
+                        for ((slot, coefficients), (fit, x)) in
+                            fitted.iter_mut().zip(coefficients.chunks(terms)).zip(fits.iter().zip(&centres))
+                        {
+                            *slot = fit.and_then(|fit| {
+                                let polynomial = fit.polynomial(regression.degree(), coefficients);
+                                let projected = project(method, &polynomial, &fit, x);
+                                add(&counts.unprojected, u64::from(projected.is_none()));
+                                projected.map(|(point, jet)| Sample { point, jet, fit, place })
+                            });
+                            place += terms;
+                            count_fit(counts, fit.as_ref(), regression.degree());
+                        }
                     }
                 });
             });
         interrupt.check()?;
         self.samples.clear();
-        for (place, sample) in self.fitted.iter().enumerate() {
-            if let Some(sample) = sample {
-                self.worst_condition = self.worst_condition.max(sample.fit.condition);
-                self.samples.push((*sample, place));
-            }
-        }
-        self.sample_cells.rebuild(self.samples.iter().map(|(s, _)| s.point), 2.0 * self.spacing);
+        self.samples.extend(self.fitted.iter().flatten());
+        self.worst_condition = self.samples.iter().fold(self.worst_condition, |worst, s| worst.max(s.fit.condition));
+        self.sample_cells.rebuild(self.samples.iter().map(|s| s.point), SAMPLE_CELL * self.spacing);
         Ok(())
-    }
-
-    fn polynomial(&self, sample: usize) -> (&Sample<D>, LocalPolynomial<'_, D>) {
-        let (sample, place) = &self.samples[sample];
-        let terms = self.regression.terms();
-        let coefficients = &self.coefficients[place * terms..(place + 1) * terms];
-        (sample, sample.fit.polynomial(&self.regression.basis, coefficients))
     }
 
     /// The closest point of the surface for any point whose nearest sample lies within `reach`; None if none does.
@@ -207,94 +210,125 @@ impl<const D: usize> Redistancing<D> {
     /// 3. A foot farther than the sample, or none: the sample itself (counted).
     #[must_use]
     pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
+        let (nearest, distance) = self.sample_cells.nearest(x, reach)?;
         // Only the queries of a redistancing are counted.
-        self.solve(x, reach, &mut Tally::default())
+        Some(self.solve(nearest, &[x], &[distance; LANES], &mut Tally::default())[0])
     }
 
-    fn solve(&self, x: &Vector<D>, reach: f64, tally: &mut Tally) -> Option<ClosestPoint<D>> {
-        let (nearest, sample_distance) = self.sample_cells.nearest(x, reach)?;
-        tally.queries += 1;
-        let mut current = nearest;
-        let mut start = self.samples[nearest].0.point;
-        for hop in 0..=MOST_HOPS {
-            let (sample, polynomial) = self.polynomial(current);
-            // Everything in the frame of this sample, the short way round a periodic axis.
-            let query = sample.point + self.domain.displacement(&sample.point, x);
-            let (end, iterations) = closest_point(&self.method, &polynomial, &sample.fit, &query, &start);
-            tally.iterations += u64::from(iterations);
-            match end {
-                NewtonEnd::Converged(foot) => {
-                    let distance = (query - foot.point).norm();
-                    // Equal up to the tolerance and the last bits of the coordinates counts as not farther.
-                    let slack = self.method.tolerance.max(16.0 * f64::EPSILON * query.amax());
-                    if distance <= sample_distance * (1.0 + 1e-9) + slack {
-                        tally.hopped += u64::from(hop > 0);
-                        let normal = foot.jet.normal();
-                        return Some(ClosestPoint {
-                            point: self.domain.wrap(foot.point),
-                            distance,
-                            normal,
-                            curvature: foot.jet.curvature(),
-                            is_outside: (query - foot.point).dot(&normal) >= 0.0,
-                        });
-                    }
-                    break;
-                }
-                NewtonEnd::LeftSupport(at) => {
-                    let Some((next, _)) = self.sample_cells.nearest(&at, f64::INFINITY) else {
-                        break;
-                    };
-                    if next == current {
-                        break;
-                    }
-                    current = next;
-                    let point = self.samples[next].0.point;
-                    start = point;
-                }
-                NewtonEnd::Stuck => break,
-            }
-        }
-        tally.sample_distance += 1;
-        let (sample, polynomial) = self.polynomial(nearest);
-        let offset = self.domain.displacement(&sample.point, x);
-        Some(ClosestPoint {
-            point: self.domain.wrap(sample.point),
-            distance: sample_distance,
-            normal: sample.normal,
-            curvature: polynomial.jet(&(sample.point - sample.fit.centre)).curvature(),
-            is_outside: offset.dot(&sample.normal) >= 0.0,
+    pub(super) fn squared_distance(&self, sample: &Sample<D>, x: &Vector<D>) -> f64 {
+        self.domain.displacement(x, &sample.point).norm_squared()
+    }
+
+    fn patch(&self, sample: usize) -> Patch<'_, D> {
+        let Sample { point, jet, fit, place } = &self.samples[sample];
+        let coefficients = &self.coefficients[*place..place + self.regression.terms()];
+        Patch { fit, degree: self.regression.degree(), coefficients, start: point, jet }
+    }
+
+    /// The point in the frame of a sample: the short way round a periodic axis.
+    fn in_frame_of(&self, sample: usize, x: &Vector<D>) -> Vector<D> {
+        let point = self.samples[sample].point;
+        point + self.domain.displacement(&point, x)
+    }
+
+    /// Answers for points that have the same nearest sample, at the given distances from it.
+    pub(super) fn solve(
+        &self,
+        nearest: usize,
+        points: &[&Vector<D>],
+        distances: &[f64; LANES],
+        tally: &mut Tally,
+    ) -> [ClosestPoint<D>; LANES] {
+        let last = points.len() - 1;
+        let queries: [Vector<D>; LANES] = std::array::from_fn(|lane| self.in_frame_of(nearest, points[lane.min(last)]));
+        let (ends, iterations) = closest_points(&self.method, &self.patch(nearest), &queries[..points.len()]);
+        tally.queries += points.len() as u64;
+        tally.iterations += iterations;
+        std::array::from_fn(|lane| {
+            let lane = lane.min(last);
+            let foot = match ends[lane] {
+                NewtonEnd::Converged(foot) => self.accepted(&queries[lane], &foot, distances[lane]),
+                NewtonEnd::LeftSupport(at) => self.hop(nearest, points[lane], &at, distances[lane], tally),
+                NewtonEnd::Stuck => None,
+            };
+            foot.unwrap_or_else(|| {
+                tally.sample_distance += 1;
+                self.sample_itself(nearest, points[lane], distances[lane])
+            })
         })
     }
 
-    /// [`Self::query`] for many points in parallel; `answers` has one place a point.
-    ///
-    /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
-    pub fn closest_points(
+    /// The answer of a foot, unless it lies farther from the query than the sample does.
+    fn accepted(&self, query: &Vector<D>, foot: &Foot<D>, sample_distance: f64) -> Option<ClosestPoint<D>> {
+        let offset = query - foot.point;
+        let distance = offset.norm();
+        // Equal up to the tolerance and the last bits of the coordinates counts as not farther.
+        let slack = self.method.tolerance.max(16.0 * f64::EPSILON * query.amax());
+        (distance <= sample_distance * (1.0 + 1e-9) + slack).then(|| ClosestPoint {
+            point: self.domain.wrap(foot.point),
+            distance,
+            normal: foot.normal,
+            curvature: foot.curvature,
+            is_outside: offset.dot(&foot.normal) >= 0.0,
+        })
+    }
+
+    /// On with the sample nearest to where an iterate left its polynomial's support, a few times.
+    fn hop(
         &self,
-        points: &[Vector<D>],
-        reach: f64,
-        answers: &mut [Option<ClosestPoint<D>>],
-        interrupt: &Interrupt,
-    ) -> Result<(), Interrupted> {
-        answers.par_chunks_mut(BLOCK).zip(points.par_chunks(BLOCK)).for_each(|(answers, points)| {
-            if interrupt.is_raised() {
-                return;
+        from: usize,
+        x: &Vector<D>,
+        at: &Vector<D>,
+        distance: f64,
+        tally: &mut Tally,
+    ) -> Option<ClosestPoint<D>> {
+        let (mut current, mut at) = (from, *at);
+        for _ in 0..MOST_HOPS {
+            let (next, _) = self.sample_cells.nearest(&at, f64::INFINITY)?;
+            if next == current {
+                return None;
             }
-            let mut tally = Tally::default();
-            for (answer, x) in answers.iter_mut().zip(points) {
-                *answer = self.solve(x, reach, &mut tally);
+            current = next;
+            let query = self.in_frame_of(current, x);
+            let (ends, iterations) = closest_points(&self.method, &self.patch(current), &[query]);
+            tally.iterations += iterations;
+            match ends[0] {
+                NewtonEnd::Converged(foot) => {
+                    let accepted = self.accepted(&query, &foot, distance);
+                    tally.hopped += u64::from(accepted.is_some());
+                    return accepted;
+                }
+                NewtonEnd::LeftSupport(place) => at = place,
+                NewtonEnd::Stuck => return None,
             }
-            tally.book(&self.counts);
-        });
-        interrupt.check()
+        }
+        None
+    }
+
+    fn sample_itself(&self, nearest: usize, x: &Vector<D>, distance: f64) -> ClosestPoint<D> {
+        let Sample { point, jet, .. } = &self.samples[nearest];
+        let normal = Vector::<D>::from(jet.normal());
+        ClosestPoint {
+            point: self.domain.wrap(*point),
+            distance,
+            normal,
+            curvature: jet.curvature(),
+            is_outside: self.domain.displacement(point, x).dot(&normal) >= 0.0,
+        }
+    }
+
+    pub(super) fn book(&self, tally: &Tally) {
+        add(&self.counts.queries, tally.queries);
+        add(&self.counts.iterations, tally.iterations);
+        add(&self.counts.hopped, tally.hopped);
+        add(&self.counts.sample_distance, tally.sample_distance);
     }
 
     /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
     /// the surface has gaps.
     #[must_use]
     pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
-        self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.is_inside[i])
+        self.detection.is_nearest_inside(x)
     }
 
     /// Whether the surface has no sample at all.
@@ -305,7 +339,7 @@ impl<const D: usize> Redistancing<D> {
 
     /// Mean and maximum of a measure over the sample particles, in their order; (0, 0) without samples.
     pub fn over_samples(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
-        let values: Vec<f64> = self.samples.par_iter().map(|(sample, _)| measure(&sample.point)).collect();
+        let values: Vec<f64> = self.samples.par_iter().map(|sample| measure(&sample.point)).collect();
         // A NaN must not be lost in the maximum.
         let is_broken = values.iter().any(|v| v.is_nan());
         let most = if is_broken { f64::NAN } else { values.iter().copied().fold(0.0, f64::max) };
@@ -313,22 +347,16 @@ impl<const D: usize> Redistancing<D> {
     }
 }
 
+/// Edge of the cells of sample particles, in spacings.
+const SAMPLE_CELL: f64 = 3.0;
+
 /// Counts of one block of queries, booked at once to keep threads off each other's cache lines.
 #[derive(Debug, Default)]
-struct Tally {
+pub(super) struct Tally {
     queries: u64,
     iterations: u64,
     hopped: u64,
     sample_distance: u64,
-}
-
-impl Tally {
-    fn book(&self, counts: &RescueCounts) {
-        add(&counts.queries, self.queries);
-        add(&counts.iterations, self.iterations);
-        add(&counts.hopped, self.hopped);
-        add(&counts.sample_distance, self.sample_distance);
-    }
 }
 
 fn count_fit<const D: usize>(counts: &RescueCounts, fit: Option<&Fit<D>>, degree: usize) {
@@ -338,6 +366,7 @@ fn count_fit<const D: usize>(counts: &RescueCounts, fit: Option<&Fit<D>>, degree
         Some(fit) => {
             add(&counts.enlarged, u64::from(fit.enlargements > 0));
             add(&counts.lowered, u64::from(fit.degree < degree));
+            add(&counts.decomposed, u64::from(fit.decomposed));
         }
     }
 }

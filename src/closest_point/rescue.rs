@@ -35,6 +35,8 @@ counters! {
     enlarged => "fits.larger_radius",
     /// Fits of a lower degree than asked.
     lowered => "fits.lower_degree",
+    /// Fits whose moments were too ill-conditioned, solved by orthogonal decomposition instead.
+    decomposed => "fits.orthogonal",
     /// Near-surface particles without any fit.
     unfitted => "fits.none",
     /// Fits whose zero could not be reached: no sample particle.

@@ -1,6 +1,7 @@
 //! What particles know of the surface: the signed distance, closest point, normal and curvature, and who is in the
 //! narrow band (PCP paper, sections 3.3 and 3.4).
 
+use super::queries::Answers;
 use super::redistancing::ClosestPoint;
 use crate::geometry::Vector;
 use crate::particles::{FlagKey, Particles, ScalarKey, VectorKey};
@@ -62,20 +63,18 @@ impl SurfaceColumns {
         particles.scalar_mut(self.curvature)[i] = answer.curvature;
     }
 
-    /// Writes answers (one a particle, None beyond reach) and who is in the band by them.
+    /// Writes answers and who is in the band by them.
     pub fn store<const D: usize>(
         &self,
         particles: &mut Particles<D>,
         level: ScalarKey,
-        answers: &[Option<ClosestPoint<D>>],
+        answers: &Answers<D>,
         half_band: f64,
     ) {
-        for (i, answer) in answers.iter().enumerate() {
-            let answer = answer.filter(|a| a.distance <= half_band);
-            particles.flag_mut(self.in_band)[i] = u8::from(answer.is_some());
-            if let Some(answer) = answer {
-                self.write(particles, level, i, &answer);
-            }
+        particles.flag_mut(self.in_band).fill(0);
+        for (i, answer) in answers.iter().filter(|(_, a)| a.distance <= half_band) {
+            particles.flag_mut(self.in_band)[i] = 1;
+            self.write(particles, level, i, answer);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! Along periodic axes the grid divides the period into whole cells and rows wrap round; along the others it covers
 //! the bounding box of the points. Rebuilding reuses all storage.
 
-use super::NeighborSearch;
+use super::{Neighbor, NeighborSearch};
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
 
@@ -16,6 +16,10 @@ pub struct CellList<const D: usize> {
     low: Vector<D>,
     /// Cell edges.
     edge: Vector<D>,
+    /// 1/edge: divisions cost as much as the rest of a look-up.
+    inverse_edge: Vector<D>,
+    /// Whether any axis is periodic.
+    is_wrapped: bool,
     counts: [usize; D],
     /// First sorted place of each cell, and one more for the end.
     starts: Vec<usize>,
@@ -31,9 +35,11 @@ impl<const D: usize> CellList<D> {
     #[must_use]
     pub fn new(domain: Domain<D>) -> Self {
         Self {
+            is_wrapped: domain.axes().iter().any(|axis| matches!(axis, Axis::Periodic { .. })),
             domain,
             low: Vector::<D>::zeros(),
             edge: Vector::<D>::repeat(1.0),
+            inverse_edge: Vector::<D>::repeat(1.0),
             counts: [1; D],
             starts: vec![0, 0],
             order: Vec::new(),
@@ -84,6 +90,7 @@ impl<const D: usize> CellList<D> {
             }
             wanted *= 1.5;
         }
+        self.inverse_edge = self.edge.map(|edge| 1.0 / edge);
         self.sort(points);
     }
 
@@ -93,7 +100,7 @@ impl<const D: usize> CellList<D> {
         self.starts.resize(cells + 1, 0);
         self.cell_of.clear();
         for x in points.clone() {
-            let cell = self.flat(&self.cell(&self.domain.wrap(x)));
+            let cell = self.flat(&self.cell(&self.wrap(x)));
             self.cell_of.push(cell);
             self.starts[cell + 1] += 1;
         }
@@ -108,7 +115,7 @@ impl<const D: usize> CellList<D> {
             let cell = self.cell_of[i];
             let place = self.starts[cell];
             self.order[place] = i;
-            self.sorted[place] = self.domain.wrap(x);
+            self.sorted[place] = self.wrap(x);
             self.starts[cell] += 1;
         }
         for c in (1..=cells).rev() {
@@ -131,13 +138,30 @@ impl<const D: usize> CellList<D> {
 
     fn cell(&self, x: &Vector<D>) -> [usize; D] {
         std::array::from_fn(|d| {
-            let index = ((x[d] - self.low[d]) / self.edge[d]).floor();
+            let index = (x[d] - self.low[d]) * self.inverse_edge[d];
             (index.max(0.0) as usize).min(self.counts[d] - 1)
         })
     }
 
     fn flat(&self, cell: &[usize; D]) -> usize {
         (0..D).rev().fold(0, |flat, d| flat * self.counts[d] + cell[d])
+    }
+
+    #[inline(always)]
+    fn wrap(&self, x: Vector<D>) -> Vector<D> {
+        if self.is_wrapped { self.domain.wrap(x) } else { x }
+    }
+
+    #[inline(always)]
+    fn displacement(&self, from: &Vector<D>, to: &Vector<D>) -> Vector<D> {
+        if self.is_wrapped { self.domain.displacement(from, to) } else { to - from }
+    }
+
+    /// Whether a span of a row holds so few points that narrowing it costs more than it saves.
+    #[inline(always)]
+    fn is_row_short(&self, base: usize, span: (i64, i64)) -> bool {
+        let (first, last) = (self.wrapped(span.0, 0), self.wrapped(span.1, 0));
+        first <= last && self.starts[base + last + 1] - self.starts[base + first] < 8
     }
 
     fn is_periodic(&self, d: usize) -> bool {
@@ -147,9 +171,10 @@ impl<const D: usize> CellList<D> {
     /// Range of (unwrapped) cell indices along axis d that can hold points within `radius` of `x`.
     fn span(&self, x: &Vector<D>, radius: f64, d: usize) -> (i64, i64) {
         // The padding covers rounding of the divisions for points exactly `radius` away.
-        let pad = 1e-9 * (1.0 + (x[d] - self.low[d]).abs() / self.edge[d]);
-        let first = ((x[d] - radius - self.low[d]) / self.edge[d] - pad).floor();
-        let last = ((x[d] + radius - self.low[d]) / self.edge[d] + pad).floor();
+        let (at, reach) = ((x[d] - self.low[d]) * self.inverse_edge[d], radius * self.inverse_edge[d]);
+        let pad = 1e-9 * (1.0 + at.abs());
+        let first = (at - reach - pad).floor();
+        let last = (at + reach + pad).floor();
         let count = self.counts[d] as f64;
         if self.is_periodic(d) {
             if last - first + 1.0 >= count { (0, self.counts[d] as i64 - 1) } else { (first as i64, last as i64) }
@@ -159,24 +184,24 @@ impl<const D: usize> CellList<D> {
     }
 
     /// Calls `visit` with each range of sorted places that the given spans of cells cover.
+    #[inline(always)]
     fn for_each_range(&self, spans: &[(i64, i64); D], mut visit: impl FnMut(usize, usize)) {
+        self.for_each_row(spans, |_, base| self.for_each_part(base, spans[0], &mut visit));
+    }
+
+    /// Calls `visit` with the (unwrapped) indices and the first cell of each row of the given spans.
+    #[inline(always)]
+    fn for_each_row(&self, spans: &[(i64, i64); D], mut visit: impl FnMut(&[i64; D], usize)) {
         if spans.iter().any(|(first, last)| first > last) {
             return;
         }
-        let wrap = |index: i64, d: usize| index.rem_euclid(self.counts[d] as i64) as usize;
         let mut row: [i64; D] = std::array::from_fn(|d| spans[d].0);
         loop {
             let mut base = 0;
             for d in (1..D).rev() {
-                base = (base + wrap(row[d], d)) * self.counts[d - 1];
+                base = (base + self.wrapped(row[d], d)) * self.counts[d - 1];
             }
-            let (first, last) = (wrap(spans[0].0, 0), wrap(spans[0].1, 0));
-            if first <= last {
-                visit(self.starts[base + first], self.starts[base + last + 1]);
-            } else {
-                visit(self.starts[base + first], self.starts[base + self.counts[0]]);
-                visit(self.starts[base], self.starts[base + last + 1]);
-            }
+            visit(&row, base);
             let mut d = 1;
             loop {
                 if d == D {
@@ -192,19 +217,67 @@ impl<const D: usize> CellList<D> {
         }
     }
 
+    /// The one or two ranges of places of a span of cells of a row.
+    #[inline(always)]
+    fn for_each_part(&self, base: usize, span: (i64, i64), mut visit: impl FnMut(usize, usize)) {
+        if span.0 > span.1 {
+            return;
+        }
+        let (first, last) = (self.wrapped(span.0, 0), self.wrapped(span.1, 0));
+        let (mut from, mut to) = (self.starts[base + first], self.starts[base + last + 1]);
+        let mut rest = None;
+        if first > last {
+            (rest, from, to) = (Some((self.starts[base], to)), from, self.starts[base + self.counts[0]]);
+        }
+        // One call, so that it can be inlined.
+        loop {
+            if from < to {
+                visit(from, to);
+            }
+            let Some(range) = rest.take() else { break };
+            (from, to) = range;
+        }
+    }
+
+    #[inline(always)]
+    fn wrapped(&self, index: i64, d: usize) -> usize {
+        let count = self.counts[d] as i64;
+        // A division in the innermost loop is worth avoiding.
+        if (0..count).contains(&index) { index as usize } else { index.rem_euclid(count) as usize }
+    }
+
     fn spans(&self, x: &Vector<D>, radius: f64) -> [(i64, i64); D] {
         std::array::from_fn(|d| self.span(x, radius, d))
     }
 }
 
 impl<const D: usize> NeighborSearch<D> for CellList<D> {
+    fn gather(&self, x: &Vector<D>, radius: f64, found: &mut Vec<Neighbor<D>>) {
+        let x = self.wrap(*x);
+        let limit = radius * radius;
+        let nobody = Neighbor { r2: 0.0, index: 0, dx: Vector::<D>::zeros() };
+        found.clear();
+        self.for_each_range(&self.spans(&x, radius), |from, to| {
+            let mut end = found.len();
+            // Every candidate is written where the next hit belongs: a branch would be guessed wrong half the time.
+            found.resize(end + (to - from), nobody);
+            for (place, position) in (from..to).zip(&self.sorted[from..to]) {
+                let dx = self.displacement(&x, position);
+                let r2 = dx.norm_squared();
+                found[end] = Neighbor { r2, index: self.order[place], dx };
+                end += usize::from(r2 <= limit);
+            }
+            found.truncate(end);
+        });
+    }
+
     #[inline]
     fn for_each_within(&self, x: &Vector<D>, radius: f64, mut visit: impl FnMut(usize, &Vector<D>, f64)) {
-        let x = self.domain.wrap(*x);
+        let x = self.wrap(*x);
         let limit = radius * radius;
         self.for_each_range(&self.spans(&x, radius), |from, to| {
             for place in from..to {
-                let dx = self.domain.displacement(&x, &self.sorted[place]);
+                let dx = self.displacement(&x, &self.sorted[place]);
                 let r2 = dx.norm_squared();
                 if r2 <= limit {
                     visit(self.order[place], &dx, r2);
@@ -240,6 +313,102 @@ impl<const D: usize> NeighborSearch<D> for CellList<D> {
 }
 
 impl<const D: usize> CellList<D> {
+    /// The points in the order of their cells.
+    #[must_use]
+    pub fn order(&self) -> &[usize] {
+        &self.order
+    }
+
+    /// Positions in that order, wrapped into the domain.
+    #[must_use]
+    pub fn sorted(&self) -> &[Vector<D>] {
+        &self.sorted
+    }
+
+    /// Places of the points of each cell: those of cell c are `starts[c]..starts[c + 1]`.
+    #[must_use]
+    pub fn starts(&self) -> &[usize] {
+        &self.starts
+    }
+
+    /// Whether the place of any point within `radius` fulfils the condition; the search ends with the first that does.
+    pub fn any_within(&self, x: &Vector<D>, radius: f64, condition: impl Fn(usize) -> bool) -> bool {
+        let x = self.wrap(*x);
+        let limit = radius * radius;
+        let mut found = false;
+        self.for_each_range(&self.spans(&x, radius), |from, to| {
+            found = found
+                || (from..to).zip(&self.sorted[from..to]).any(|(place, position)| {
+                    // The condition is often the cheaper half.
+                    condition(place) && self.displacement(&x, position).norm_squared() <= limit
+                });
+        });
+        found
+    }
+
+    /// Gives every cell the union of its own marks and those of the cells round it.
+    pub fn spread(&self, marks: &mut Vec<u8>, before: &mut Vec<u8>) {
+        let mut stride = 1;
+        for d in 0..D {
+            let (count, wraps) = (self.counts[d], self.is_periodic(d));
+            before.clone_from(marks);
+            for cell in 0..marks.len() {
+                let at = cell / stride % count;
+                let last = (count - 1) * stride;
+                if at > 0 || wraps {
+                    marks[cell] |= before[if at > 0 { cell - stride } else { cell + last }];
+                }
+                if at + 1 < count || wraps {
+                    marks[cell] |= before[if at + 1 < count { cell + stride } else { cell - last }];
+                }
+            }
+            stride *= count;
+        }
+    }
+
+    /// The nearest point, as (index, r²), for someone who knows a point at the squared distance `known.1`.
+    ///
+    /// Rows of cells, and cells of a row, beyond the best so far are left out. Among equals the least index.
+    #[must_use]
+    pub fn nearest_from(&self, x: &Vector<D>, known: (usize, f64)) -> (usize, f64) {
+        let x = self.wrap(*x);
+        let mut best = known;
+        let spans = self.spans(&x, known.1.sqrt());
+        // A span of a whole period says nothing of how far its rows are.
+        let is_whole: [bool; D] =
+            std::array::from_fn(|d| self.is_periodic(d) && spans[d].1 - spans[d].0 + 1 >= self.counts[d] as i64);
+        self.for_each_row(&spans, |row, base| {
+            let mut away = 0.0;
+            for d in 1..D {
+                if !is_whole[d] {
+                    let start = self.low[d] + row[d] as f64 * self.edge[d];
+                    let gap = (start - x[d]).max(x[d] - start - self.edge[d]).max(0.0);
+                    away += gap * gap;
+                }
+            }
+            // Slack for the rounding of cell borders.
+            if away * (1.0 - 1e-9) > best.1 {
+                return;
+            }
+            let mut along = spans[0];
+            if !is_whole[0] && !self.is_row_short(base, along) {
+                let reach = (best.1 - away * (1.0 - 1e-9)).sqrt();
+                let narrow = self.span(&x, reach, 0);
+                along = (along.0.max(narrow.0), along.1.min(narrow.1));
+            }
+            self.for_each_part(base, along, |from, to| {
+                for (place, position) in (from..to).zip(&self.sorted[from..to]) {
+                    let dx = self.displacement(&x, position);
+                    let r2 = dx.norm_squared();
+                    if r2 < best.1 || r2 <= best.1 && self.order[place] < best.0 {
+                        best = (self.order[place], r2);
+                    }
+                }
+            });
+        });
+        best
+    }
+
     /// A distance that no point of the list exceeds from `x`.
     fn farthest(&self, x: &Vector<D>) -> f64 {
         let high = Vector::<D>::from_fn(|d, _| self.low[d] + self.edge[d] * self.counts[d] as f64);
@@ -248,80 +417,4 @@ impl<const D: usize> CellList<D> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{Axis, CellList, Domain, NeighborSearch, Vector};
-    use crate::geometry::random::CounterRandom;
-    use crate::neighbors::BruteForce;
-
-    fn domains<const D: usize>() -> Vec<Domain<D>> {
-        let periodic = Axis::Periodic { start: -1.0, length: 2.0 };
-        let mut mixed = [Axis::Unbounded; D];
-        mixed[0] = periodic;
-        vec![Domain::unbounded(), Domain::new([periodic; D]), Domain::new(mixed)]
-    }
-
-    fn cloud<const D: usize>(n: i64, seed: u64) -> Vec<Vector<D>> {
-        let random = CounterRandom::new(seed);
-        (0..n).map(|i| Vector::<D>::from_fn(|d, _| random.symmetric(&[i, d as i64]))).collect()
-    }
-
-    fn within<const D: usize>(search: &impl NeighborSearch<D>, x: &Vector<D>, radius: f64) -> Vec<(usize, u64)> {
-        let mut found = Vec::new();
-        search.for_each_within(x, radius, |j, _, r2| found.push((j, r2.to_bits())));
-        found.sort_unstable();
-        found
-    }
-
-    fn compare<const D: usize>(points: &[Vector<D>], queries: &[Vector<D>], radius: f64) {
-        for domain in domains::<D>() {
-            let wrapped: Vec<Vector<D>> = points.iter().map(|x| domain.wrap(*x)).collect();
-            let oracle = BruteForce { domain: &domain, points: &wrapped };
-            for edge in [0.05, radius * 0.9999, radius, radius * 1.0001, 0.9, 7.0] {
-                let mut cells = CellList::new(domain.clone());
-                cells.rebuild(points.iter().copied(), edge);
-                for x in queries {
-                    let x = domain.wrap(*x);
-                    for r in [radius * 0.9999, radius, radius * 1.0001] {
-                        assert_eq!(within(&cells, &x, r), within(&oracle, &x, r), "edge {edge}, radius {r}");
-                    }
-                    let (a, b) = (cells.nearest(&x, 0.3), oracle.nearest(&x, 0.3));
-                    assert_eq!(a, b, "edge {edge} at {x:?}");
-                    assert_eq!(cells.nearest(&x, 1e9), oracle.nearest(&x, 1e9));
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn agrees_with_brute_force_in_2d_and_3d() {
-        compare::<2>(&cloud(400, 1), &cloud(60, 2), 0.31);
-        compare::<3>(&cloud(400, 3), &cloud(40, 4), 0.31);
-    }
-
-    #[test]
-    fn agrees_for_lattices_whose_neighbours_lie_exactly_on_the_radius() {
-        let points: Vec<Vector<2>> =
-            (0..256).map(|k| Vector::<2>::new(f64::from(k % 16) / 8.0 - 1.0, f64::from(k / 16) / 8.0 - 1.0)).collect();
-        compare::<2>(&points, &points[..64], 0.25);
-    }
-
-    #[test]
-    fn box_edges_one_ulp_apart_and_far_outliers() {
-        let mut points = cloud::<2>(50, 5);
-        for edge in [-1.0_f64, 1.0] {
-            points.push(Vector::<2>::new(edge, edge));
-            points.push(Vector::<2>::new(edge.next_up(), edge.next_down()));
-        }
-        points.push(Vector::<2>::new(1e6, -1e6));
-        compare::<2>(&points, &points.clone(), 0.31);
-    }
-
-    #[test]
-    fn empty_and_single() {
-        let mut cells = CellList::<3>::new(Domain::unbounded());
-        cells.rebuild(std::iter::empty(), 0.1);
-        assert_eq!(cells.nearest(&Vector::<3>::zeros(), 1e9), None);
-        cells.rebuild([Vector::<3>::new(5.0, 5.0, 5.0)].into_iter(), 0.1);
-        assert_eq!(cells.nearest(&Vector::<3>::new(5.0, 5.0, 1.0), 1e9), Some((0, 4.0)));
-    }
-}
+mod tests;

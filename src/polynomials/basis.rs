@@ -1,10 +1,11 @@
 //! Polynomial bases as products of one-dimensional Newton factors u_k(x) = ∏_{j<k} (x − p_j).
 //!
 //! Monomials are the case p_j = 0. The minter basis (PCP paper, section 3.1) is the Lagrange basis of the unisolvent
-//! nodes, which is a triangular combination of Newton factors: regressions use the Lagrange values, evaluation the
-//! Newton form. So one evaluator serves all bases, and because indices are graded, dropping the trailing terms gives
-//! the basis of lower degree.
+//! nodes, which is a triangular combination of Newton factors. Regressions use the values of the basis; what they
+//! find is expanded into monomials of the centred, scaled coordinates, for which one fast evaluator serves all bases.
+//! Because indices are graded, dropping the trailing terms gives the basis of lower degree.
 
+use super::horner::nested_indices;
 use super::multi_index::MultiIndexSet;
 use super::unisolvent_nodes::{lagrange_in_newton_form, leja_ordered_chebyshev_lobatto};
 use super::{MAX_DEGREE, MAX_TERMS};
@@ -31,10 +32,14 @@ pub struct PolynomialBasis<const D: usize> {
     nodes: [f64; MAX_DEGREE],
     /// Row α: the coefficients of the Lagrange polynomial L_α in Newton form. Empty for monomials.
     lagrange: Vec<f64>,
+    /// Row β: the Newton factor N_β in monomials. Empty for monomials.
+    expansion: Vec<f64>,
+    /// The nested place (see [`super::horner`]) of each graded index.
+    nested: Vec<usize>,
 }
 
 /// One-dimensional factors u_0 … u_n at one coordinate, with derivatives.
-pub(super) type Factors = [f64; MAX_DEGREE + 1];
+type Factors = [f64; MAX_DEGREE + 1];
 
 impl<const D: usize> PolynomialBasis<D> {
     /// A basis of the given kind, `1 ≤ degree ≤ 8`.
@@ -43,12 +48,16 @@ impl<const D: usize> PolynomialBasis<D> {
         let set = MultiIndexSet::total_degree(degree);
         let mut nodes = [0.0; MAX_DEGREE];
         let mut lagrange = Vec::new();
+        let mut expansion = Vec::new();
         if kind == BasisKind::Minter {
             let generating = leja_ordered_chebyshev_lobatto(degree);
             nodes[..degree].copy_from_slice(&generating[..degree]);
             lagrange = lagrange_in_newton_form(&set, &generating);
+            expansion = newton_factors_in_monomials(&set, &nodes);
         }
-        Self { kind, degree, set, nodes, lagrange }
+        let places = nested_indices::<D>(degree);
+        let nested = set.indices().iter().filter_map(|index| places.iter().position(|other| other == index)).collect();
+        Self { kind, degree, set, nodes, lagrange, expansion, nested }
     }
 
     /// Which basis it is.
@@ -63,32 +72,17 @@ impl<const D: usize> PolynomialBasis<D> {
         self.degree
     }
 
-    pub(super) fn indices(&self) -> &[[u8; D]] {
+    fn indices(&self) -> &[[u8; D]] {
         self.set.indices()
     }
 
-    pub(super) fn factors(&self, x: f64, degree: usize) -> Factors {
+    fn factors(&self, x: f64, degree: usize) -> Factors {
         let mut u = [0.0; MAX_DEGREE + 1];
         u[0] = 1.0;
         for k in 0..degree {
             u[k + 1] = u[k] * (x - self.nodes[k]);
         }
         u
-    }
-
-    /// Factors with first and second derivatives.
-    pub(super) fn factor_jets(&self, x: f64, degree: usize) -> (Factors, Factors, Factors) {
-        let mut u = [0.0; MAX_DEGREE + 1];
-        let mut first = u;
-        let mut second = u;
-        u[0] = 1.0;
-        for k in 0..degree {
-            let s = x - self.nodes[k];
-            u[k + 1] = u[k] * s;
-            first[k + 1] = first[k] * s + u[k];
-            second[k + 1] = second[k] * s + 2.0 * first[k];
-        }
-        (u, first, second)
     }
 
     /// Values of the first `row.len()` basis functions at `x` (local coordinates), as a regression row needs them.
@@ -111,18 +105,47 @@ impl<const D: usize> PolynomialBasis<D> {
         }
     }
 
-    /// Turns the coefficients of a regression into those of the Newton factors, in place.
-    pub fn to_newton_form(&self, coefficients: &mut [f64]) {
-        if self.lagrange.is_empty() {
-            return;
-        }
+    /// Writes the polynomial with the given coefficients in this basis (graded, possibly of a lower degree) in monomials
+    /// of the same coordinates, in nested order with zeros for terms beyond. The coefficients are used up.
+    pub fn expand(&self, coefficients: &mut [f64], monomials: &mut [f64]) {
         let terms = coefficients.len();
         let stride = self.indices().len();
-        for beta in (0..terms).rev() {
-            coefficients[beta] =
-                (0..=beta).map(|alpha| coefficients[alpha] * self.lagrange[alpha * stride + beta]).sum();
+        if !self.lagrange.is_empty() {
+            for beta in (0..terms).rev() {
+                coefficients[beta] =
+                    (0..=beta).map(|alpha| coefficients[alpha] * self.lagrange[alpha * stride + beta]).sum();
+            }
+            for gamma in 0..terms {
+                coefficients[gamma] =
+                    (gamma..terms).map(|beta| coefficients[beta] * self.expansion[beta * stride + gamma]).sum();
+            }
+        }
+        monomials.fill(0.0);
+        for (coefficient, place) in coefficients.iter().zip(&self.nested) {
+            monomials[*place] = *coefficient;
         }
     }
+}
+
+/// Rows of the matrix that expands ∏_d ∏_{j < β_d} (x_d − p_j) in monomials: lower triangular for graded indices.
+fn newton_factors_in_monomials<const D: usize>(set: &MultiIndexSet<D>, nodes: &[f64; MAX_DEGREE]) -> Vec<f64> {
+    // One-dimensional factors: u_{k+1} = (x − p_k) u_k.
+    let mut factors = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];
+    factors[0][0] = 1.0;
+    for k in 0..MAX_DEGREE {
+        for m in 0..=k {
+            factors[k + 1][m + 1] += factors[k][m];
+            factors[k + 1][m] -= nodes[k] * factors[k][m];
+        }
+    }
+    let indices = set.indices();
+    let mut matrix = Vec::with_capacity(indices.len() * indices.len());
+    for beta in indices {
+        matrix.extend(
+            indices.iter().map(|gamma| (0..D).map(|d| factors[beta[d] as usize][gamma[d] as usize]).product::<f64>()),
+        );
+    }
+    matrix
 }
 
 #[cfg(test)]
@@ -143,6 +166,26 @@ mod tests {
                     assert!((value - f64::from(u8::from(a == b))).abs() < 1e-12);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn expansion_into_monomials_keeps_the_polynomial() {
+        let random = crate::geometry::random::CounterRandom::new(3);
+        let x = Vector::<3>::new(0.3, -0.8, 0.55);
+        let monomials = PolynomialBasis::<3>::new(BasisKind::Monomial, 6);
+        for (kind, degree) in [(BasisKind::Minter, 6), (BasisKind::Minter, 3), (BasisKind::Monomial, 4)] {
+            let basis = PolynomialBasis::<3>::new(kind, 6);
+            let terms = crate::polynomials::multi_index::term_count::<3>(degree);
+            let mut coefficients: Vec<f64> = (0..terms).map(|k| random.symmetric(&[k as i64])).collect();
+            let (mut row, mut expanded) = (vec![0.0; terms], vec![0.0; 84]);
+            basis.row(&x, degree, &mut row);
+            let value: f64 = row.iter().zip(&coefficients).map(|(r, c)| r * c).sum();
+            basis.expand(&mut coefficients, &mut expanded);
+            let mut graded = vec![0.0; 84];
+            monomials.row(&x, 6, &mut graded);
+            let again: f64 = graded.iter().zip(&basis.nested).map(|(r, place)| r * expanded[*place]).sum();
+            assert!((again - value).abs() < 1e-12, "{kind:?}: {again} for {value}");
         }
     }
 

@@ -155,6 +155,8 @@ fn check_value(kind: &Kind, value: &Value, pointer: &str, violations: &mut Vec<V
                 _ => refuse(violations, pointer, "type", "a list of two or three numbers is needed", value, kind),
             }
         }
+        Kind::Flag if value.is_boolean() => Some(value.clone()),
+        Kind::Flag => refuse(violations, pointer, "type", "true or false is needed", value, kind),
         Kind::Word(words) => match value.as_str() {
             Some(word) if words.contains(&word) => Some(value.clone()),
             word => {
@@ -268,6 +270,7 @@ pub fn describe(kind: &Kind) -> Value {
         Kind::Choices { variants, least } => {
             json!({"at_least": least, "each": variants().iter().map(|v| v.name).collect::<Vec<_>>()})
         }
+        Kind::Flag => json!([true, false]),
         Kind::Word(words) => json!(words),
     }
 }

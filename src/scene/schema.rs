@@ -49,6 +49,8 @@ pub enum Kind {
         /// Most.
         most: u64,
     },
+    /// True or false.
+    Flag,
     /// Two or three numbers.
     Vector {
         /// Whether all must be positive.

@@ -2,6 +2,7 @@
 
 use crate::closest_point::PcpMethod;
 use crate::closest_point::method::NeighborhoodChoice;
+use crate::polynomials::Solver;
 use crate::polynomials::basis::BasisKind;
 use crate::polynomials::multi_index::term_count;
 use crate::scene::schema::POSITIVE;
@@ -33,6 +34,19 @@ pub static PARAMETERS: &[Parameter] = &[
         DefaultValue::Absent,
     ),
     Parameter::new("cutoff_h", "short for neighborhood radius {cutoff_h}", POSITIVE, DefaultValue::Absent),
+    Parameter::new(
+        "same_branch",
+        "whether only particles take part in a fit whose last normals agree with that of its centre",
+        Kind::Flag,
+        DefaultValue::Json("true"),
+    ),
+    Parameter::new(
+        "solver",
+        "moments: Gram matrices of scaled monomials, several fits at once, the same polynomial in every basis, with \
+         orthogonal where they are too ill-conditioned; orthogonal: QR in the basis, as in the paper",
+        Kind::Word(&["moments", "orthogonal"]),
+        DefaultValue::Json("\"moments\""),
+    ),
     Parameter::new("weight", "k in the weight exp(−k r²/r_c²)", WEIGHT, DefaultValue::Json("2")),
     Parameter::new(
         "minimum_ratio",
@@ -88,6 +102,8 @@ struct Written {
     basis: String,
     neighborhood: Option<Neighborhood>,
     cutoff_h: Option<f64>,
+    same_branch: bool,
+    solver: String,
     weight: f64,
     minimum_ratio: Option<f64>,
     sample_threshold_h: f64,
@@ -148,6 +164,8 @@ pub fn understand(
             _ => BasisKind::Minter,
         },
         neighborhood,
+        solver: if parsed.solver == "orthogonal" { Solver::Orthogonal } else { Solver::Moments },
+        same_branch: parsed.same_branch,
         weight: parsed.weight,
         minimum_ratio: match neighborhood {
             // A count that is given is meant.

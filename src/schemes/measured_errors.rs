@@ -81,7 +81,13 @@ pub fn closest_point_report<const D: usize>(
         errors,
         health,
         worst_condition: surface.worst_condition(),
-        rescued_fits: some(&["fits.larger_radius", "fits.lower_degree", "fits.none", "samples.not_projected"]),
+        rescued_fits: some(&[
+            "fits.larger_radius",
+            "fits.lower_degree",
+            "fits.orthogonal",
+            "fits.none",
+            "samples.not_projected",
+        ]),
         newton: Newton {
             solves,
             iterations_mean: get(&counts.iterations) as f64 / solves.max(1) as f64,

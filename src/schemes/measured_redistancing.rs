@@ -1,7 +1,7 @@
 //! A whole redistancing with its phases booked: what every closest-point scheme does, each with its own bookkeeping
 //! of the answers.
 
-use crate::closest_point::{ClosestPoint, Redistancing};
+use crate::closest_point::{Answers, Redistancing};
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::simulation::Phases;
@@ -11,16 +11,18 @@ use crate::simulation::Phases;
 ///
 /// # Errors
 /// [`Interrupted`] when somebody asked to stop.
+#[expect(clippy::too_many_arguments, reason = "inputs, output and bookkeeping, each named")]
 pub fn redistance<const D: usize>(
     surface: &mut Redistancing<D>,
     positions: &[Vector<D>],
     level: &[f64],
+    normals: Option<&[Vector<D>]>,
     reach: f64,
-    answers: &mut [Option<ClosestPoint<D>>],
+    answers: &mut Answers<D>,
     interrupt: &Interrupt,
     phases: &mut Phases,
 ) -> Result<(), Interrupted> {
     phases.measure("redistancing/detection", || surface.detect(positions, level, interrupt))?;
-    phases.measure("redistancing/regression", || surface.fit_samples(positions, level, interrupt))?;
+    phases.measure("redistancing/regression", || surface.fit_samples(positions, level, normals, interrupt))?;
     phases.measure("redistancing/query", || surface.closest_points(positions, reach, answers, interrupt))
 }

@@ -83,7 +83,7 @@ pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Val
         (true, _) => 2.4,
     };
     let method = json!({
-        "type": "pcp", "degree": 4, "basis": "minter", "weight": 0, "minimum_ratio": 1,
+        "type": "pcp", "degree": 4, "basis": "minter", "solver": "orthogonal", "same_branch": false, "weight": 0, "minimum_ratio": 1,
         "sample_threshold_h": 1.5, "tolerance": 1e-14, "max_iterations": 1000
     });
     let mut preset = Map::from_iter([("jitter".to_owned(), json!(0.3)), ("method".to_owned(), method)]);

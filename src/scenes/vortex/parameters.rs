@@ -127,7 +127,7 @@ fn method_variants() -> &'static [Variant] {
 /// What section 4.2 states.
 pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Value> {
     let mut method = json!({
-        "type": "pcp", "degree": 4, "basis": "minter", "weight": 0, "minimum_ratio": 1,
+        "type": "pcp", "degree": 4, "basis": "minter", "solver": "orthogonal", "same_branch": false, "weight": 0, "minimum_ratio": 1,
         "sample_threshold_h": 1.5, "tolerance": 1e-10, "max_iterations": 100
     });
     let own_neighborhood =

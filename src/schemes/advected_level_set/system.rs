@@ -1,7 +1,7 @@
 //! The particles of an advected level set, their transport and their redistancing.
 
 use super::reference::ExactMotion;
-use crate::closest_point::{ClosestPoint, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{Answers, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
@@ -49,7 +49,7 @@ pub struct AdvectedSystem<const D: usize> {
     pub(super) psi: ScalarKey,
     pub(super) columns: SurfaceColumns,
     pub(super) redistancing: Redistancing<D>,
-    pub(super) answers: Vec<Option<ClosestPoint<D>>>,
+    pub(super) answers: Answers<D>,
     pub(super) interrupt: Interrupt,
 }
 
@@ -85,7 +85,7 @@ impl<const D: usize> AdvectedSystem<D> {
             particles.scalar_mut(columns.curvature)[i] = exact.curvature.unwrap_or(0.0);
             particles.flag_mut(columns.in_band)[i] = 1;
         }
-        let answers = vec![None; particles.len()];
+        let answers = Answers::default();
         let redistancing = Redistancing::new(method.clone(), Domain::unbounded(), spacing);
         Self {
             motion,
@@ -133,8 +133,9 @@ impl<const D: usize> AdvectedSystem<D> {
     pub(super) fn redistance(&mut self, phases: &mut Phases) -> Result<(), Interrupted> {
         let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
         // Whoever is nearer than w/2 to a sample is asked for the exact distance (PCP 3.4).
+        let normals = Some(self.particles.vector(self.columns.normal));
         let (surface, answers) = (&mut self.redistancing, &mut self.answers);
-        redistance(surface, positions, psi, self.half_band, answers, &self.interrupt, phases)?;
+        redistance(surface, positions, psi, normals, self.half_band, answers, &self.interrupt, phases)?;
         self.columns.store(&mut self.particles, self.psi, &self.answers, self.half_band);
         if self.field == FieldChoice::Overwrite {
             for i in 0..self.particles.len() {
@@ -153,9 +154,11 @@ impl<const D: usize> AdvectedSystem<D> {
         let mut particles = self.particles.clone();
         let mut surface = Redistancing::new(self.method.clone(), Domain::unbounded(), self.spacing);
         let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
-        let mut answers = vec![None; positions.len()];
+        let mut answers = Answers::default();
+        let normals = Some(self.particles.vector(self.columns.normal));
         let (never, mut phases) = (Interrupt::default(), Phases::new(CpuClock::still()));
-        let found = redistance(&mut surface, positions, psi, self.half_band, &mut answers, &never, &mut phases);
+        let found =
+            redistance(&mut surface, positions, psi, normals, self.half_band, &mut answers, &never, &mut phases);
         if found.is_ok() {
             self.columns.store(&mut particles, self.psi, &answers, self.half_band);
         }

@@ -87,18 +87,18 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let system = &mut self.system;
         let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
         let (surface, answers) = (&mut system.redistancing, &mut system.answers);
-        redistance(surface, positions, level, f64::INFINITY, answers, &system.interrupt, &mut self.phases)?;
+        let normals = (self.step > 0).then(|| system.particles.vector(system.columns.normal));
+        let (interrupt, phases) = (&system.interrupt, &mut self.phases);
+        redistance(surface, positions, level, normals, f64::INFINITY, answers, interrupt, phases)?;
         if surface.is_lost() {
             let Clock { step, time } = self.fixed.clock(self.step + 1);
             return Err(StepError::InterfaceLost { step, time });
         }
         // Particles beyond the band serve the fits and are redistanced like the others; the band's flags stay.
-        for (i, answer) in system.answers.iter().enumerate() {
-            if let Some(answer) = answer {
-                system.columns.write(&mut system.particles, system.level, i, answer);
-                let phi = system.particles.scalar(system.columns.phi)[i];
-                system.particles.scalar_mut(system.level)[i] = phi;
-            }
+        for (i, answer) in system.answers.iter() {
+            system.columns.write(&mut system.particles, system.level, i, answer);
+            let phi = system.particles.scalar(system.columns.phi)[i];
+            system.particles.scalar_mut(system.level)[i] = phi;
         }
         self.check_finite()?;
         self.step += 1;

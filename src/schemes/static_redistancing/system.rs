@@ -1,6 +1,6 @@
 //! The particles of a static redistancing and what is asked of them.
 
-use crate::closest_point::{ClosestPoint, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{Answers, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::Interrupt;
@@ -34,7 +34,7 @@ pub struct StaticSystem<const D: usize> {
     pub(super) level: ScalarKey,
     pub(super) columns: SurfaceColumns,
     pub(super) redistancing: Redistancing<D>,
-    pub(super) answers: Vec<Option<ClosestPoint<D>>>,
+    pub(super) answers: Answers<D>,
     pub(super) interrupt: Interrupt,
 }
 
@@ -71,7 +71,7 @@ impl<const D: usize> StaticSystem<D> {
             particles.scalar_mut(columns.phi)[i] = particles.scalar(level)[i];
             particles.flag_mut(columns.in_band)[i] = u8::from(distance.abs() <= half_band);
         }
-        let answers = vec![None; particles.len()];
+        let answers = Answers::default();
         let redistancing = Redistancing::new(method, Domain::unbounded(), spacing);
         Self { surface, spacing, repeats, particles, level, columns, redistancing, answers, interrupt }
     }

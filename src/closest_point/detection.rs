@@ -1,0 +1,119 @@
+//! Which particles lie next to the surface: those with another of the opposite sign within ξ (PCP paper, section 3.1).
+
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+use crate::parallel::{BLOCK, Interrupt, Interrupted};
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
+
+/// Particles in cells of edge ξ, their signs, and the near-surface ones in the order of cells.
+#[derive(Debug)]
+pub struct Detection<const D: usize> {
+    cells: CellList<D>,
+    is_inside: Vec<bool>,
+    /// The same in the order of cells.
+    signs: Vec<bool>,
+    marks: Vec<u8>,
+    before: Vec<u8>,
+    /// Places (in cell order) of particles with both signs in the cells round them.
+    candidates: Vec<usize>,
+    is_near: Vec<bool>,
+    near: Vec<usize>,
+}
+
+/// Marks of a cell.
+const INSIDE: u8 = 1;
+const OUTSIDE: u8 = 2;
+
+impl<const D: usize> Detection<D> {
+    /// Nobody yet.
+    #[must_use]
+    pub fn new(domain: Domain<D>) -> Self {
+        Self {
+            cells: CellList::new(domain),
+            is_inside: Vec::new(),
+            signs: Vec::new(),
+            marks: Vec::new(),
+            before: Vec::new(),
+            candidates: Vec::new(),
+            is_near: Vec::new(),
+            near: Vec::new(),
+        }
+    }
+
+    /// The particles in cells.
+    #[must_use]
+    pub fn cells(&self) -> &CellList<D> {
+        &self.cells
+    }
+
+    /// Whether the level of each particle is negative.
+    #[must_use]
+    pub fn is_inside(&self) -> &[bool] {
+        &self.is_inside
+    }
+
+    /// The particles next to the surface.
+    #[must_use]
+    pub fn near(&self) -> &[usize] {
+        &self.near
+    }
+
+    /// Finds them anew. A level of exactly zero counts as outside.
+    ///
+    /// 1. Cells of edge ξ; a cell is marked with the signs in it and in the cells round it.
+    /// 2. Only in cells with both marks are pairs looked at.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn rebuild(
+        &mut self,
+        positions: &[Vector<D>],
+        level: &[f64],
+        threshold: f64,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        self.cells.rebuild(positions.iter().copied(), threshold);
+        self.is_inside.clear();
+        self.is_inside.extend(level.iter().map(|l| *l < 0.0));
+        let (cells, is_inside) = (&self.cells, &self.is_inside);
+        let (starts, order) = (cells.starts(), cells.order());
+        self.signs.clear();
+        self.signs.extend(order.iter().map(|i| is_inside[*i]));
+        let signs = &self.signs;
+        self.marks.clear();
+        self.marks.extend(starts.windows(2).map(|range| {
+            let mark = |inside: &bool| if *inside { INSIDE } else { OUTSIDE };
+            signs[range[0]..range[1]].iter().map(mark).fold(0, |all, mark| all | mark)
+        }));
+        cells.spread(&mut self.marks, &mut self.before);
+        self.candidates.clear();
+        for (cell, mark) in self.marks.iter().enumerate() {
+            if *mark == INSIDE | OUTSIDE {
+                self.candidates.extend(starts[cell]..starts[cell + 1]);
+            }
+        }
+        self.is_near.resize(self.candidates.len(), false);
+        let sorted = cells.sorted();
+        self.is_near.par_chunks_mut(BLOCK).zip(self.candidates.par_chunks(BLOCK)).for_each(|(flags, places)| {
+            if interrupt.is_raised() {
+                return;
+            }
+            for (flag, place) in flags.iter_mut().zip(places) {
+                let inside = signs[*place];
+                *flag = cells.any_within(&sorted[*place], threshold, |other| signs[other] != inside);
+            }
+        });
+        interrupt.check()?;
+        self.near.clear();
+        let found = self.candidates.iter().zip(&self.is_near).filter(|(_, near)| **near);
+        self.near.extend(found.map(|(place, _)| order[*place]));
+        Ok(())
+    }
+
+    /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
+    /// the surface has gaps.
+    #[must_use]
+    pub fn is_nearest_inside(&self, x: &Vector<D>) -> bool {
+        self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.is_inside[i])
+    }
+}

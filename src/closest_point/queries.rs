@@ -1,0 +1,122 @@
+//! Closest points for many queries at once.
+//!
+//! 1. The nearest sample of every query, each search starting from the sample of the query before.
+//! 2. Queries sorted by sample, so that those of one sample stand side by side.
+//! 3. Newton's method on the sample's polynomial for several queries in vector lanes.
+
+use super::redistancing::{ClosestPoint, Redistancing, Tally};
+use crate::geometry::Vector;
+use crate::linear_algebra::number::LANES;
+use crate::neighbors::NeighborSearch;
+use crate::parallel::{Interrupt, Interrupted};
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
+
+/// Queries of one parallel task: enough to profit from the one before.
+const QUERIES: usize = 256;
+/// Mark of a query without a sample in reach.
+const NONE: usize = usize::MAX;
+
+/// The answers to the queries that have a sample in reach, in the order of samples.
+#[derive(Debug)]
+pub struct Answers<const D: usize> {
+    /// Nearest sample and squared distance from it, query by query.
+    nearest: Vec<(usize, f64)>,
+    /// First place of each sample in `queries`.
+    starts: Vec<usize>,
+    queries: Vec<usize>,
+    feet: Vec<Option<ClosestPoint<D>>>,
+}
+
+impl<const D: usize> Default for Answers<D> {
+    fn default() -> Self {
+        Self { nearest: Vec::new(), starts: Vec::new(), queries: Vec::new(), feet: Vec::new() }
+    }
+}
+
+impl<const D: usize> Answers<D> {
+    /// Queries and their answers, each query at most once.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &ClosestPoint<D>)> {
+        self.queries.iter().zip(&self.feet).filter_map(|(query, foot)| Some((*query, foot.as_ref()?)))
+    }
+
+    fn sort_by_sample(&mut self, samples: usize) {
+        self.starts.clear();
+        self.starts.resize(samples + 1, 0);
+        for (sample, _) in self.nearest.iter().filter(|n| n.0 != NONE) {
+            self.starts[sample + 1] += 1;
+        }
+        for k in 0..samples {
+            self.starts[k + 1] += self.starts[k];
+        }
+        self.queries.resize(self.starts[samples], 0);
+        for (query, (sample, _)) in self.nearest.iter().enumerate() {
+            if *sample != NONE {
+                self.queries[self.starts[*sample]] = query;
+                self.starts[*sample] += 1;
+            }
+        }
+    }
+}
+
+impl<const D: usize> Redistancing<D> {
+    /// [`Self::query`] for many points.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn closest_points(
+        &self,
+        points: &[Vector<D>],
+        reach: f64,
+        answers: &mut Answers<D>,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        answers.nearest.resize(points.len(), (NONE, 0.0));
+        answers.nearest.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(nearest, points)| {
+            if !interrupt.is_raised() {
+                self.nearest_samples(points, reach, nearest);
+            }
+        });
+        interrupt.check()?;
+        answers.sort_by_sample(self.samples().len());
+        let Answers { nearest, queries, feet, .. } = answers;
+        feet.resize(queries.len(), None);
+        let nearest = &*nearest;
+        feet.par_chunks_mut(QUERIES).zip(queries.par_chunks(QUERIES)).for_each(|(feet, queries)| {
+            if interrupt.is_raised() {
+                return;
+            }
+            let mut tally = Tally::default();
+            let mut done = 0;
+            for same in queries.chunk_by(|a, b| nearest[*a].0 == nearest[*b].0) {
+                let sample = nearest[same[0]].0;
+                for lanes in same.chunks(LANES) {
+                    let last = lanes.len() - 1;
+                    let at: [&Vector<D>; LANES] = std::array::from_fn(|lane| &points[lanes[lane.min(last)]]);
+                    let away: [f64; LANES] = std::array::from_fn(|lane| nearest[lanes[lane.min(last)]].1.sqrt());
+                    let found = self.solve(sample, &at[..lanes.len()], &away, &mut tally);
+                    for (foot, answer) in feet[done..].iter_mut().zip(&found[..lanes.len()]) {
+                        *foot = Some(*answer);
+                    }
+                    done += lanes.len();
+                }
+            }
+            self.book(&tally);
+        });
+        interrupt.check()
+    }
+
+    fn nearest_samples(&self, points: &[Vector<D>], reach: f64, nearest: &mut [(usize, f64)]) {
+        let (cells, samples) = (self.sample_cells(), self.samples());
+        let mut last = None;
+        for (x, slot) in points.iter().zip(nearest) {
+            let known = match last {
+                Some(sample) => Some((sample, self.squared_distance(&samples[sample], x))),
+                // Without a neighbour to start from, the search itself ends at the reach.
+                None => cells.nearest(x, reach).map(|(sample, distance)| (sample, distance * distance)),
+            };
+            let found = known.map(|known| cells.nearest_from(x, known)).filter(|(_, r2)| r2.sqrt() <= reach);
+            *slot = found.unwrap_or((NONE, 0.0));
+            last = found.map(|f| f.0);
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Symmetric positive systems of equal size, one in each vector lane, by L D Lᵀ.
+//!
+//! Regressions with moderately conditioned matrices are solved this way at a fraction of the cost of an orthogonal
+//! decomposition: the condition is squared, which costs digits that the pivots show.
+
+use super::number::Lanes;
+
+/// Systems `G c = b` with packed lower triangles (row by row, diagonal last in its row) and room for their factors.
+#[derive(Debug, Clone, Default)]
+pub struct LaneSystems {
+    size: usize,
+    /// G on the way in; below the diagonal L, on it 1/d after [`Self::factorise`].
+    matrix: Vec<Lanes>,
+    /// The rows of L D in the making.
+    row: Vec<Lanes>,
+}
+
+/// The place of row i in a packed lower triangle.
+#[inline(always)]
+#[must_use]
+pub fn packed_row(i: usize) -> usize {
+    i * (i + 1) / 2
+}
+
+impl LaneSystems {
+    /// Sets the size; the matrix is then written through [`Self::matrix_mut`].
+    pub fn reset(&mut self, size: usize) {
+        self.size = size;
+        self.matrix.resize(packed_row(size), Lanes::splat(0.0));
+        self.row.resize(2 * size, Lanes::splat(0.0));
+    }
+
+    /// The packed lower triangle.
+    pub fn matrix_mut(&mut self) -> &mut [Lanes] {
+        &mut self.matrix
+    }
+
+    /// Factorises in place. Returns, for each lane, the least share d_i/G_ii of a pivot in its diagonal: how far a
+    /// column is from a combination of those before it. Zero or less (or NaN) means a matrix of low rank.
+    pub fn factorise(&mut self) -> Lanes {
+        let n = self.size;
+        let one = Lanes::splat(1.0);
+        let mut least = one;
+        let (first, second) = self.row.split_at_mut(n);
+        // Two rows at a time share the loads of the rows above.
+        let mut i = 0;
+        while i < n {
+            let pair = i + 1 < n;
+            let (above, below) = self.matrix.split_at_mut(packed_row(i));
+            let (row, next) = below.split_at_mut(i + 1);
+            if pair {
+                for j in 0..i {
+                    let l = &above[packed_row(j)..=packed_row(j) + j];
+                    let (mut a, mut b) = (row[j], next[j]);
+                    for k in 0..j {
+                        a = (-first[k]).mul_add(l[k], a);
+                        b = (-second[k]).mul_add(l[k], b);
+                    }
+                    first[j] = a;
+                    second[j] = b;
+                }
+            } else {
+                for j in 0..i {
+                    let l = &above[packed_row(j)..=packed_row(j) + j];
+                    let mut a = row[j];
+                    for k in 0..j {
+                        a = (-first[k]).mul_add(l[k], a);
+                    }
+                    first[j] = a;
+                }
+            }
+            let inverse_of = |j: usize| above[packed_row(j) + j];
+            let inverse = finish_row(i, row, first, &inverse_of, &mut least);
+            if pair {
+                let mut last = next[i];
+                for k in 0..i {
+                    last = (-second[k]).mul_add(row[k], last);
+                }
+                second[i] = last;
+                let inverse_of = |j: usize| if j == i { inverse } else { above[packed_row(j) + j] };
+                finish_row(i + 1, next, second, &inverse_of, &mut least);
+            }
+            i += 2;
+        }
+        least
+    }
+
+    /// Solves for one right-hand side in place.
+    pub fn solve(&self, b: &mut [Lanes]) {
+        let n = self.size;
+        for i in 0..n {
+            let row = &self.matrix[packed_row(i)..packed_row(i) + i];
+            let mut sum = b[i];
+            for (l, x) in row.iter().zip(b.iter()) {
+                sum = (-*l).mul_add(*x, sum);
+            }
+            b[i] = sum;
+        }
+        for i in 0..n {
+            b[i] *= self.matrix[packed_row(i) + i];
+        }
+        for i in (0..n).rev() {
+            let x = b[i];
+            for (sum, l) in b[..i].iter_mut().zip(&self.matrix[packed_row(i)..]) {
+                *sum = (-*l).mul_add(x, *sum);
+            }
+        }
+    }
+}
+
+/// Turns row i of L D into that of L and puts 1/d_i on the diagonal, which is returned.
+#[inline(always)]
+fn finish_row(
+    i: usize,
+    row: &mut [Lanes],
+    scaled: &[Lanes],
+    inverse_of: &impl Fn(usize) -> Lanes,
+    least: &mut Lanes,
+) -> Lanes {
+    let diagonal = row[i];
+    let mut d = diagonal;
+    for j in 0..i {
+        let l = scaled[j] * inverse_of(j);
+        d = (-scaled[j]).mul_add(l, d);
+        row[j] = l;
+    }
+    // `min` in this order lets a NaN pass into the result.
+    let share = d / diagonal;
+    *least = share.simd_ge(*least).select(*least, share);
+    let inverse = Lanes::splat(1.0) / d;
+    row[i] = inverse;
+    inverse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LaneSystems, Lanes, packed_row};
+    use crate::geometry::random::CounterRandom;
+    use crate::linear_algebra::number::LANES;
+
+    #[test]
+    fn solves_a_system_in_each_lane() {
+        let random = CounterRandom::new(8);
+        for n in [1, 2, 3, 15, 20, 35] {
+            // Gram matrices of random rows.
+            let entry = |lane: usize, r: usize, c: usize| random.symmetric(&[lane as i64, r as i64, c as i64]);
+            let gram = |lane: usize, i: usize, j: usize| -> f64 {
+                (0..2 * n).map(|r| entry(lane, r, i) * entry(lane, r, j)).sum()
+            };
+            let mut systems = LaneSystems::default();
+            systems.reset(n);
+            for i in 0..n {
+                for j in 0..=i {
+                    systems.matrix_mut()[packed_row(i) + j] = Lanes::new(std::array::from_fn(|l| gram(l, i, j)));
+                }
+            }
+            let least = systems.factorise().to_array();
+            assert!(least.iter().all(|s| *s > 1e-6 && *s <= 1.0), "{least:?}");
+            let exact = |lane: usize, i: usize| random.symmetric(&[99, lane as i64, i as i64]);
+            let mut b: Vec<Lanes> = (0..n)
+                .map(|i| {
+                    Lanes::new(std::array::from_fn(|l| (0..n).map(|j| gram(l, i.max(j), i.min(j)) * exact(l, j)).sum()))
+                })
+                .collect();
+            systems.solve(&mut b);
+            for (i, x) in b.iter().enumerate() {
+                for l in 0..LANES {
+                    assert!((x.to_array()[l] - exact(l, i)).abs() < 1e-9, "size {n}, lane {l}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_lane_of_low_rank_shows_and_leaves_the_others_alone() {
+        let mut systems = LaneSystems::default();
+        systems.reset(2);
+        let lanes = |first: f64| Lanes::new([first, 2.0, 2.0, 2.0]);
+        systems.matrix_mut().copy_from_slice(&[lanes(1.0), lanes(1.0), lanes(1.0)]);
+        systems.matrix_mut()[1] = Lanes::new([1.0, 0.5, 0.5, 0.5]);
+        let least = systems.factorise().to_array();
+        assert_eq!(least[0], 0.0);
+        assert!(least[1] > 0.9);
+    }
+}
