@@ -6,6 +6,8 @@
 
 pub mod detection;
 pub mod enclosed_measure;
+pub mod level_surface;
+pub mod material;
 pub mod method;
 pub mod newton;
 pub mod projection;
@@ -14,6 +16,8 @@ pub mod redistancing;
 pub mod rescue;
 pub mod surface_columns;
 
+pub use level_surface::LevelSurface;
+pub use material::MaterialSurface;
 pub use method::PcpMethod;
 pub use queries::Answers;
 pub use redistancing::{ClosestPoint, Redistancing};

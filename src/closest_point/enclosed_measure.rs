@@ -4,7 +4,7 @@
 //! all; cells that it cuts are halved along every axis, and the smallest ones count the share that a linear
 //! function with their corner values leaves inside.
 
-use super::redistancing::Redistancing;
+use super::level_surface::LevelSurface;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
@@ -24,7 +24,7 @@ const COARSE_CELLS: f64 = 16.0;
 ///
 /// # Errors
 /// [`Interrupted`] when somebody asked to stop.
-pub fn enclosed_measure<const D: usize>(surface: &Redistancing<D>, interrupt: &Interrupt) -> Result<f64, Interrupted> {
+pub fn enclosed_measure<const D: usize>(surface: &LevelSurface<D>, interrupt: &Interrupt) -> Result<f64, Interrupted> {
     if surface.is_lost() {
         return Ok(0.0);
     }
@@ -68,7 +68,7 @@ pub fn enclosed_measure<const D: usize>(surface: &Redistancing<D>, interrupt: &I
 const FAR: f64 = 2.0;
 
 /// The inside part of one cubic cell.
-fn inside_of_cell<const D: usize>(surface: &Redistancing<D>, corner: &Vector<D>, edge: f64, halvings: u32) -> f64 {
+fn inside_of_cell<const D: usize>(surface: &LevelSurface<D>, corner: &Vector<D>, edge: f64, halvings: u32) -> f64 {
     let whole = edge.powi(D as i32);
     let centre = corner.add_scalar(0.5 * edge);
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();

@@ -43,6 +43,11 @@ pub enum NeighborhoodChoice {
         /// n_n.
         count: usize,
     },
+    /// The nearest `count` particles of the initial positions, in which fits are made: for unbroken histories.
+    Material {
+        /// n_n.
+        count: usize,
+    },
 }
 
 impl PcpMethod {
@@ -51,7 +56,9 @@ impl PcpMethod {
     pub fn regression<const D: usize>(&self, spacing: f64) -> Regression<D> {
         let neighborhood = match self.neighborhood {
             NeighborhoodChoice::Radius { cutoff_h } => Neighborhood::Radius { cutoff: cutoff_h * spacing },
-            NeighborhoodChoice::Nearest { count } => Neighborhood::Nearest { count },
+            NeighborhoodChoice::Nearest { count } | NeighborhoodChoice::Material { count } => {
+                Neighborhood::Nearest { count }
+            }
         };
         let basis = PolynomialBasis::new(self.basis, self.degree);
         Regression::new(basis, neighborhood, self.weight, self.minimum_ratio, spacing, self.solver)
@@ -64,7 +71,7 @@ impl PcpMethod {
         let by_count = radius_of_count::<D>;
         let cutoff = match self.neighborhood {
             NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,
-            NeighborhoodChoice::Nearest { count } => by_count(count as f64),
+            NeighborhoodChoice::Nearest { count } | NeighborhoodChoice::Material { count } => by_count(count as f64),
         };
         // Half again over what an even distribution needs leaves room for the growth of a starved neighbourhood.
         self.sample_threshold_h + 1.5 * cutoff.max(by_count(self.minimum_ratio * terms)) + 1.0

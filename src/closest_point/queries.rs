@@ -12,7 +12,7 @@ use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
 /// Queries of one parallel task: enough to profit from the one before.
-const QUERIES: usize = 256;
+pub(super) const QUERIES: usize = 256;
 /// Mark of a query without a sample in reach.
 const NONE: usize = usize::MAX;
 
@@ -37,6 +37,14 @@ impl<const D: usize> Answers<D> {
     /// Queries and their answers, each query at most once.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &ClosestPoint<D>)> {
         self.queries.iter().zip(&self.feet).filter_map(|(query, foot)| Some((*query, foot.as_ref()?)))
+    }
+
+    /// Room for one answer a query, in the order of queries.
+    pub(super) fn one_a_query(&mut self, queries: usize) -> &mut [Option<ClosestPoint<D>>] {
+        self.queries.clear();
+        self.queries.extend(0..queries);
+        self.feet.resize(queries, None);
+        &mut self.feet
     }
 
     fn sort_by_sample(&mut self, samples: usize) {
@@ -100,7 +108,7 @@ impl<const D: usize> Redistancing<D> {
                     done += lanes.len();
                 }
             }
-            self.book(&tally);
+            tally.book(self.counts());
         });
         interrupt.check()
     }

@@ -10,9 +10,7 @@ use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
 use crate::polynomials::{Fit, Jet, Regression, RegressionScratch};
-use rayon::prelude::{
-    IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator, ParallelSlice, ParallelSliceMut,
-};
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
 /// The answer to a query.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -317,13 +315,6 @@ impl<const D: usize> Redistancing<D> {
         }
     }
 
-    pub(super) fn book(&self, tally: &Tally) {
-        add(&self.counts.queries, tally.queries);
-        add(&self.counts.iterations, tally.iterations);
-        add(&self.counts.hopped, tally.hopped);
-        add(&self.counts.sample_distance, tally.sample_distance);
-    }
-
     /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
     /// the surface has gaps.
     #[must_use]
@@ -336,15 +327,6 @@ impl<const D: usize> Redistancing<D> {
     pub fn is_lost(&self) -> bool {
         self.samples.is_empty()
     }
-
-    /// Mean and maximum of a measure over the sample particles, in their order; (0, 0) without samples.
-    pub fn over_samples(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
-        let values: Vec<f64> = self.samples.par_iter().map(|sample| measure(&sample.point)).collect();
-        // A NaN must not be lost in the maximum.
-        let is_broken = values.iter().any(|v| v.is_nan());
-        let most = if is_broken { f64::NAN } else { values.iter().copied().fold(0.0, f64::max) };
-        (values.iter().sum::<f64>() / values.len().max(1) as f64, most)
-    }
 }
 
 /// Edge of the cells of sample particles, in spacings.
@@ -353,13 +335,22 @@ const SAMPLE_CELL: f64 = 3.0;
 /// Counts of one block of queries, booked at once to keep threads off each other's cache lines.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
-    queries: u64,
-    iterations: u64,
-    hopped: u64,
-    sample_distance: u64,
+    pub(super) queries: u64,
+    pub(super) iterations: u64,
+    pub(super) hopped: u64,
+    pub(super) sample_distance: u64,
 }
 
-fn count_fit<const D: usize>(counts: &RescueCounts, fit: Option<&Fit<D>>, degree: usize) {
+impl Tally {
+    pub(super) fn book(&self, counts: &RescueCounts) {
+        add(&counts.queries, self.queries);
+        add(&counts.iterations, self.iterations);
+        add(&counts.hopped, self.hopped);
+        add(&counts.sample_distance, self.sample_distance);
+    }
+}
+
+pub(super) fn count_fit<const D: usize>(counts: &RescueCounts, fit: Option<&Fit<D>>, degree: usize) {
     add(&counts.fits, 1);
     match fit {
         None => add(&counts.unfitted, 1),

@@ -96,8 +96,8 @@ impl LaneSystems {
             }
             b[i] = sum;
         }
-        for i in 0..n {
-            b[i] *= self.matrix[packed_row(i) + i];
+        for (i, x) in b.iter_mut().enumerate() {
+            *x *= self.matrix[packed_row(i) + i];
         }
         for i in (0..n).rev() {
             let x = b[i];

@@ -90,6 +90,16 @@ static NEIGHBORHOODS: &[Variant] = &[
             DefaultValue::Json("30"),
         )],
     },
+    Variant {
+        name: "material",
+        doc: "the nearest particles of the initial positions, in which fits are made; for particles that keep their level",
+        parameters: &[Parameter::new(
+            "count",
+            "how many",
+            Kind::Integer { least: 4, most: 10_000 },
+            DefaultValue::Json("30"),
+        )],
+    },
 ];
 
 fn neighborhoods() -> &'static [Variant] {
@@ -111,11 +121,12 @@ struct Written {
     max_iterations: u32,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 enum Neighborhood {
     Radius { cutoff_h: f64 },
     Nearest { count: usize },
+    Material { count: usize },
 }
 
 /// The method of checked parameters, and the parameters with what was left open.
@@ -140,22 +151,18 @@ pub fn understand(
         (Some(Neighborhood::Radius { cutoff_h }), _) | (None, Some(cutoff_h)) => {
             NeighborhoodChoice::Radius { cutoff_h }
         }
-        (Some(Neighborhood::Nearest { count }), _) => {
-            if count < terms {
-                let detail = format!("degree {} has {terms} coefficients", parsed.degree);
-                let at = format!("{pointer}/neighborhood/count");
-                return Err(vec![Violation::new(
-                    at,
-                    "range",
-                    detail,
-                    &json!(count),
-                    json!(format!("a whole number ≥ {terms}")),
-                )]);
-            }
-            NeighborhoodChoice::Nearest { count }
-        }
+        (Some(Neighborhood::Nearest { count }), _) => NeighborhoodChoice::Nearest { count },
+        (Some(Neighborhood::Material { count }), _) => NeighborhoodChoice::Material { count },
         (None, None) => NeighborhoodChoice::Radius { cutoff_h: 2.5 },
     };
+    if let NeighborhoodChoice::Nearest { count } | NeighborhoodChoice::Material { count } = neighborhood
+        && count < terms
+    {
+        let detail = format!("degree {} has {terms} coefficients", parsed.degree);
+        let at = format!("{pointer}/neighborhood/count");
+        let allowed = json!(format!("a whole number ≥ {terms}"));
+        return Err(vec![Violation::new(at, "range", detail, &json!(count), allowed)]);
+    }
     let method = PcpMethod {
         degree: parsed.degree,
         basis: match parsed.basis.as_str() {
@@ -169,7 +176,7 @@ pub fn understand(
         weight: parsed.weight,
         minimum_ratio: match neighborhood {
             // A count that is given is meant.
-            NeighborhoodChoice::Nearest { .. } => parsed.minimum_ratio.unwrap_or(1.0),
+            NeighborhoodChoice::Nearest { .. } | NeighborhoodChoice::Material { .. } => parsed.minimum_ratio.unwrap_or(1.0),
             NeighborhoodChoice::Radius { .. } => parsed.minimum_ratio.unwrap_or(default_ratio),
         },
         sample_threshold_h: parsed.sample_threshold_h,
@@ -180,10 +187,19 @@ pub fn understand(
     resolved["neighborhood"] = match neighborhood {
         NeighborhoodChoice::Radius { cutoff_h } => json!({"type": "radius", "cutoff_h": cutoff_h}),
         NeighborhoodChoice::Nearest { count } => json!({"type": "nearest", "count": count}),
+        NeighborhoodChoice::Material { count } => json!({"type": "material", "count": count}),
     };
     resolved["minimum_ratio"] = json!(method.minimum_ratio);
     if let Some(map) = resolved.as_object_mut() {
         map.shift_remove("cutoff_h");
     }
     Ok((method, resolved))
+}
+
+/// A violation where fits in material coordinates are asked for particles that do not keep their level.
+#[must_use]
+pub fn refuse_material(method: &PcpMethod, detail: &str) -> Option<Violation> {
+    let NeighborhoodChoice::Material { .. } = method.neighborhood else { return None };
+    let (at, allowed) = ("/method/neighborhood/type", json!(["radius", "nearest"]));
+    Some(Violation::new(at, "conflict", detail, &json!("material"), allowed))
 }

@@ -1,7 +1,7 @@
 //! Root-mean-square and maximum of errors, and the report entries that closest-point schemes share.
 
 use crate::closest_point::rescue::get;
-use crate::closest_point::{Redistancing, RescueCounts};
+use crate::closest_point::{LevelSurface, RescueCounts};
 use crate::simulation::report::Newton;
 use crate::simulation::{ErrorEntry, Health, Report};
 use std::collections::BTreeMap;
@@ -66,7 +66,7 @@ pub fn rescued(counts: &RescueCounts) -> u64 {
 /// The report of a closest-point scheme from its parts.
 #[must_use]
 pub fn closest_point_report<const D: usize>(
-    surface: &Redistancing<D>,
+    surface: &LevelSurface<D>,
     errors: Vec<ErrorEntry>,
     health: Health,
     method: BTreeMap<&'static str, String>,

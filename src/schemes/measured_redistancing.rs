@@ -1,7 +1,7 @@
 //! A whole redistancing with its phases booked: what every closest-point scheme does, each with its own bookkeeping
 //! of the answers.
 
-use crate::closest_point::{Answers, Redistancing};
+use crate::closest_point::{Answers, LevelSurface};
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::simulation::Phases;
@@ -13,7 +13,7 @@ use crate::simulation::Phases;
 /// [`Interrupted`] when somebody asked to stop.
 #[expect(clippy::too_many_arguments, reason = "inputs, output and bookkeeping, each named")]
 pub fn redistance<const D: usize>(
-    surface: &mut Redistancing<D>,
+    surface: &mut LevelSurface<D>,
     positions: &[Vector<D>],
     level: &[f64],
     normals: Option<&[Vector<D>]>,

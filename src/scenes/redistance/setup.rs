@@ -46,6 +46,8 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let method = match pcp_parameters::understand(&written.method, "/method", D, default_ratio) {
         Ok((method, full)) => {
             resolved["method"] = full;
+            let detail = "particles at rest have no initial positions beside their own";
+            violations.extend(pcp_parameters::refuse_material(&method, detail));
             Some(method)
         }
         Err(found) => {

@@ -84,6 +84,10 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let method = match pcp_parameters::understand(&method_json, "/method", D, default_ratio) {
         Ok((method, full)) => {
             resolved["method"] = full;
+            if written.field == Field::Overwrite {
+                let detail = "material fits need particles that keep their level: field dual";
+                violations.extend(pcp_parameters::refuse_material(&method, detail));
+            }
             Some(method)
         }
         Err(found) => {

@@ -29,6 +29,11 @@ struct AdvectedFront<const D: usize> {
 
 /// Error of one inner step of the reference paths.
 const TOLERANCE: PathIntegrator = PathIntegrator::Dopri5 { tolerance: 1e-12 };
+/// The same for paths of which only the rough end is wanted.
+const ROUGH: PathIntegrator = PathIntegrator::Dopri5 { tolerance: 1e-7 };
+/// Distance from the surface beyond which the end of a rough path is on the right side: a thousand times the error of
+/// such a path in the flows here.
+const ROUGH_SIDE: f64 = 1e-2;
 /// Points of the front at most.
 const MOST_POINTS: f64 = 2e5;
 /// Points of the front per spacing of the particles, so that the chords' error stays far below the method's.
@@ -95,8 +100,13 @@ impl<const D: usize> ExactFront<'_, D> {
                 self.motion.surface.signed_distance(&start)
             }
             Some(front) => {
-                let start = TOLERANCE.advance(flow, x, self.time, -self.time);
-                front.distance(x).copysign(self.motion.surface.signed_distance(&start))
+                let start_distance = |integrator: PathIntegrator| {
+                    self.motion.surface.signed_distance(&integrator.advance(flow, x, self.time, -self.time))
+                };
+                // Only the side is wanted: far from the surface a rough path tells it.
+                let rough = start_distance(ROUGH);
+                let side = if rough.abs() > ROUGH_SIDE { rough } else { start_distance(TOLERANCE) };
+                front.distance(x).copysign(side)
             }
         }
     }

@@ -1,8 +1,9 @@
 //! Transport and redistancing step by step.
 
 use super::system::{AdvectedSystem, FieldChoice, RedistanceWhen};
-use crate::closest_point::Redistancing;
+use crate::closest_point::LevelSurface;
 use crate::closest_point::enclosed_measure::enclosed_measure;
+use crate::parallel::{Interrupt, Interrupted};
 use crate::particles::Particles;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, entry, rescued};
 use crate::simulation::state::check_length;
@@ -126,7 +127,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
         &self,
         time: f64,
         particles: &Particles<D>,
-        surface: &Redistancing<D>,
+        surface: &LevelSurface<D>,
         measure: f64,
     ) -> Option<MeasuredErrors> {
         let system = &self.system;
@@ -161,7 +162,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
         let measured = if self.redistanced == now.step {
             self.measure_errors(now.time, &self.system.particles, &self.system.redistancing, self.measure)
         } else {
-            let (particles, surface) = self.system.redistanced_copy();
+            let (particles, surface) = self.system.redistanced_copy(&self.system.interrupt)?;
             let measure = enclosed_measure(&surface, &self.system.interrupt)?;
             self.measure_errors(now.time, &particles, &surface, measure)
         };
@@ -237,8 +238,14 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let particles = if self.redistanced == self.step {
             &self.system.particles
         } else {
-            fresh = self.system.redistanced_copy().0;
-            &fresh
+            // Without an interrupt nothing fails; the particles as they are would be shown otherwise.
+            match self.system.redistanced_copy(&Interrupt::default()) {
+                Ok((copy, _)) => {
+                    fresh = copy;
+                    &fresh
+                }
+                Err(Interrupted) => &self.system.particles,
+            }
         };
         let mut fields = Fields::at(particles.positions());
         fields.surface(particles, &self.system.columns, true);

@@ -1,7 +1,8 @@
 //! The particles of an advected level set, their transport and their redistancing.
 
 use super::reference::ExactMotion;
-use crate::closest_point::{Answers, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::method::NeighborhoodChoice;
+use crate::closest_point::{Answers, LevelSurface, MaterialSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
@@ -48,7 +49,7 @@ pub struct AdvectedSystem<const D: usize> {
     /// ψ, constant along paths (dual) or the distance of the last redistancing.
     pub(super) psi: ScalarKey,
     pub(super) columns: SurfaceColumns,
-    pub(super) redistancing: Redistancing<D>,
+    pub(super) redistancing: LevelSurface<D>,
     pub(super) answers: Answers<D>,
     pub(super) interrupt: Interrupt,
 }
@@ -86,7 +87,13 @@ impl<const D: usize> AdvectedSystem<D> {
             particles.flag_mut(columns.in_band)[i] = 1;
         }
         let answers = Answers::default();
-        let redistancing = Redistancing::new(method.clone(), Domain::unbounded(), spacing);
+        let redistancing = if let NeighborhoodChoice::Material { .. } = method.neighborhood {
+            let (positions, level) = (particles.positions(), particles.scalar(psi));
+            let surface = MaterialSurface::new(method.clone(), spacing, positions, level, &interrupt);
+            LevelSurface::Material(Box::new(surface))
+        } else {
+            LevelSurface::Spatial(Box::new(Redistancing::new(method.clone(), Domain::unbounded(), spacing)))
+        };
         Self {
             motion,
             spacing,
@@ -150,18 +157,24 @@ impl<const D: usize> AdvectedSystem<D> {
 
     /// A copy of the particles with the surface columns of the present moment, and its surface, for what is asked
     /// between redistancings.
-    pub(super) fn redistanced_copy(&self) -> (Particles<D>, Redistancing<D>) {
+    pub(super) fn redistanced_copy(
+        &self,
+        interrupt: &Interrupt,
+    ) -> Result<(Particles<D>, LevelSurface<D>), Interrupted> {
         let mut particles = self.particles.clone();
-        let mut surface = Redistancing::new(self.method.clone(), Domain::unbounded(), self.spacing);
+        let mut surface = match &self.redistancing {
+            LevelSurface::Material(surface) => LevelSurface::Material(Box::new(surface.fresh())),
+            LevelSurface::Spatial(_) => {
+                let (method, domain) = (self.method.clone(), Domain::unbounded());
+                LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.spacing)))
+            }
+        };
         let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
         let mut answers = Answers::default();
         let normals = Some(self.particles.vector(self.columns.normal));
-        let (never, mut phases) = (Interrupt::default(), Phases::new(CpuClock::still()));
-        let found =
-            redistance(&mut surface, positions, psi, normals, self.half_band, &mut answers, &never, &mut phases);
-        if found.is_ok() {
-            self.columns.store(&mut particles, self.psi, &answers, self.half_band);
-        }
-        (particles, surface)
+        let mut phases = Phases::new(CpuClock::still());
+        redistance(&mut surface, positions, psi, normals, self.half_band, &mut answers, interrupt, &mut phases)?;
+        self.columns.store(&mut particles, self.psi, &answers, self.half_band);
+        Ok((particles, surface))
     }
 }

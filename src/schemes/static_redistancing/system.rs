@@ -1,6 +1,6 @@
 //! The particles of a static redistancing and what is asked of them.
 
-use crate::closest_point::{Answers, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{Answers, LevelSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::Interrupt;
@@ -33,7 +33,7 @@ pub struct StaticSystem<const D: usize> {
     pub(super) particles: Particles<D>,
     pub(super) level: ScalarKey,
     pub(super) columns: SurfaceColumns,
-    pub(super) redistancing: Redistancing<D>,
+    pub(super) redistancing: LevelSurface<D>,
     pub(super) answers: Answers<D>,
     pub(super) interrupt: Interrupt,
 }
@@ -72,7 +72,7 @@ impl<const D: usize> StaticSystem<D> {
             particles.flag_mut(columns.in_band)[i] = u8::from(distance.abs() <= half_band);
         }
         let answers = Answers::default();
-        let redistancing = Redistancing::new(method, Domain::unbounded(), spacing);
+        let redistancing = LevelSurface::Spatial(Box::new(Redistancing::new(method, Domain::unbounded(), spacing)));
         Self { surface, spacing, repeats, particles, level, columns, redistancing, answers, interrupt }
     }
 }

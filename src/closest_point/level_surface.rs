@@ -1,0 +1,128 @@
+//! A surface of particles, by whichever fits: in space or in material coordinates.
+
+use super::material::MaterialSurface;
+use super::queries::Answers;
+use super::redistancing::{ClosestPoint, Redistancing};
+use super::rescue::RescueCounts;
+use crate::geometry::Vector;
+use crate::parallel::{Interrupt, Interrupted};
+use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+
+/// The zero of a level set carried by particles.
+#[derive(Debug)]
+pub enum LevelSurface<const D: usize> {
+    /// Fits over neighbours in space.
+    Spatial(Box<Redistancing<D>>),
+    /// Fits over neighbours in the initial positions.
+    Material(Box<MaterialSurface<D>>),
+}
+
+macro_rules! each {
+    ($self:ident, $surface:ident => $value:expr) => {
+        match $self {
+            Self::Spatial($surface) => $value,
+            Self::Material($surface) => $value,
+        }
+    };
+}
+
+impl<const D: usize> LevelSurface<D> {
+    /// Step one of a rebuild: which particles lie next to the surface. In material coordinates they stay the same.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn detect(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
+        match self {
+            Self::Spatial(surface) => surface.detect(positions, level, interrupt),
+            Self::Material(_) => Ok(()),
+        }
+    }
+
+    /// Step two of a rebuild: fits and points of the surface.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn fit_samples(
+        &mut self,
+        positions: &[Vector<D>],
+        level: &[f64],
+        normals: Option<&[Vector<D>]>,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        match self {
+            Self::Spatial(surface) => surface.fit_samples(positions, level, normals, interrupt),
+            Self::Material(surface) => surface.fit(positions, interrupt),
+        }
+    }
+
+    /// The closest point of the surface for any point with a point of the surface within `reach`.
+    #[must_use]
+    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
+        each!(self, surface => surface.query(x, reach))
+    }
+
+    /// [`Self::query`] for many points.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn closest_points(
+        &self,
+        points: &[Vector<D>],
+        reach: f64,
+        answers: &mut Answers<D>,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        each!(self, surface => surface.closest_points(points, reach, answers, interrupt))
+    }
+
+    /// h.
+    #[must_use]
+    pub fn spacing(&self) -> f64 {
+        each!(self, surface => surface.spacing())
+    }
+
+    /// Points of the surface, in a fixed order.
+    #[must_use]
+    pub fn sample_points(&self) -> Vec<Vector<D>> {
+        each!(self, surface => surface.sample_points().collect())
+    }
+
+    /// Whether the surface has no point at all.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        each!(self, surface => surface.is_lost())
+    }
+
+    /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
+    /// the surface has gaps.
+    #[must_use]
+    pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
+        each!(self, surface => surface.is_nearest_particle_inside(x))
+    }
+
+    /// What did not go the plain way so far.
+    #[must_use]
+    pub fn counts(&self) -> &RescueCounts {
+        each!(self, surface => surface.counts())
+    }
+
+    /// The worst condition of a scaled regression matrix so far.
+    #[must_use]
+    pub fn worst_condition(&self) -> f64 {
+        each!(self, surface => surface.worst_condition())
+    }
+
+    /// Takes over the worst condition of an earlier part of the same run.
+    pub fn restore_worst_condition(&mut self, condition: f64) {
+        each!(self, surface => surface.restore_worst_condition(condition));
+    }
+
+    /// Mean and maximum of a measure over the points of the surface, in their order; (0, 0) without any.
+    pub fn over_samples(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
+        let values: Vec<f64> = self.sample_points().par_iter().map(&measure).collect();
+        // A NaN must not be lost in the maximum.
+        let is_broken = values.iter().any(|v| v.is_nan());
+        let most = if is_broken { f64::NAN } else { values.iter().copied().fold(0.0, f64::max) };
+        (values.iter().sum::<f64>() / values.len().max(1) as f64, most)
+    }
+}

@@ -1,0 +1,426 @@
+//! The surface by fits in material coordinates, for particles with unbroken histories.
+//!
+//! Where particles are carried by a flow and keep their level ψ, both ψ and the position x are smooth functions of the
+//! particle's initial position X, however distorted the particles lie now. Fits of ψ(X) and x(X) over neighbours in the
+//! *initial* positions keep two sheets of a filament apart by themselves, and the neighbours never change. In the plane
+//! tangent to that map, the chain rule gives the level set in space:
+//!
+//! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹,
+//!
+//! so that closest points are found by the same Newton steps as in space; a step s moves X by J⁻¹ s.
+
+use super::detection::Detection;
+use super::method::PcpMethod;
+use super::newton::{ACCEPTED, LONGEST_STEP, is_last_step, newton_step, tangents};
+use super::queries::{Answers, QUERIES};
+use super::redistancing::{ClosestPoint, Tally, count_fit};
+use super::rescue::{RescueCounts, add};
+use crate::geometry::{Domain, Vector};
+use crate::linear_algebra::number::LANES;
+use crate::neighbors::{CellList, NeighborSearch};
+use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
+use crate::polynomials::horner::derivatives;
+use crate::polynomials::{Fit, Jet, Regression, RegressionScratch};
+use nalgebra::SMatrix;
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
+use std::sync::Arc;
+
+/// Particles as they were at the start: what never changes.
+#[derive(Debug)]
+struct Origin<const D: usize> {
+    positions: Vec<Vector<D>>,
+    level: Vec<f64>,
+    detection: Detection<D>,
+}
+
+/// The zero of a level set in material coordinates.
+#[derive(Debug)]
+pub struct MaterialSurface<const D: usize> {
+    method: PcpMethod,
+    spacing: f64,
+    regression: Regression<D>,
+    origin: Arc<Origin<D>>,
+    fits: Vec<Option<Fit<D>>>,
+    coefficients: Vec<f64>,
+    /// Points of the surface, several a fit where the flow has stretched it.
+    seeds: Vec<Seed<D>>,
+    found: Vec<Vec<Seed<D>>>,
+    seed_cells: CellList<D>,
+    /// Particles where they are now.
+    cells: CellList<D>,
+    scratch: PerThread<RegressionScratch<D>>,
+    counts: RescueCounts,
+    worst_condition: f64,
+}
+
+/// A point of the surface.
+#[derive(Debug, Clone, Copy)]
+struct Seed<const D: usize> {
+    patch: usize,
+    material: Vector<D>,
+    spot: Spot<D>,
+}
+
+/// What the fits say at a material point.
+#[derive(Debug, Clone, Copy)]
+struct Spot<const D: usize> {
+    point: Vector<D>,
+    /// The level set in space.
+    jet: Jet<f64, D>,
+    /// ∂ψ in initial positions.
+    rise: Vector<D>,
+    /// J⁻¹.
+    inverse: SMatrix<f64, D, D>,
+}
+
+/// Share of a spacing, in initial positions, that a patch's seeds reach along the surface.
+const SEED_REACH: f64 = 0.8;
+/// Most seeds to either side along one direction: a stretch beyond that leaves gaps between them.
+const MOST_SEEDS: i32 = 64;
+/// Rounds of moving on to another seed's fit before the seed itself is taken.
+const MOST_HOPS: usize = 4;
+
+impl<const D: usize> MaterialSurface<D> {
+    /// For particles at their initial positions with the level that they keep. An interrupt leaves a surface without
+    /// points: whoever asked ends the run before its first step.
+    #[must_use]
+    pub fn new(
+        method: PcpMethod,
+        spacing: f64,
+        positions: &[Vector<D>],
+        level: &[f64],
+        interrupt: &Interrupt,
+    ) -> Self {
+        let mut detection = Detection::new(Domain::unbounded());
+        if detection.rebuild(positions, level, method.sample_threshold_h * spacing, interrupt).is_err() {
+            detection = Detection::new(Domain::unbounded());
+        }
+        let origin = Origin { positions: positions.to_vec(), level: level.to_vec(), detection };
+        Self::over(method, spacing, Arc::new(origin))
+    }
+
+    fn over(method: PcpMethod, spacing: f64, origin: Arc<Origin<D>>) -> Self {
+        Self {
+            regression: method.regression(spacing),
+            method,
+            spacing,
+            origin,
+            fits: Vec::new(),
+            coefficients: Vec::new(),
+            seeds: Vec::new(),
+            found: Vec::new(),
+            seed_cells: CellList::new(Domain::unbounded()),
+            cells: CellList::new(Domain::unbounded()),
+            scratch: PerThread::new(),
+            counts: RescueCounts::default(),
+            worst_condition: 0.0,
+        }
+    }
+
+    /// A surface of the same particles that knows nothing of their present positions yet.
+    #[must_use]
+    pub fn fresh(&self) -> Self {
+        Self::over(self.method.clone(), self.spacing, Arc::clone(&self.origin))
+    }
+
+    /// h.
+    #[must_use]
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// What did not go the plain way so far.
+    #[must_use]
+    pub fn counts(&self) -> &RescueCounts {
+        &self.counts
+    }
+
+    /// The worst condition of a scaled regression matrix so far.
+    #[must_use]
+    pub fn worst_condition(&self) -> f64 {
+        self.worst_condition
+    }
+
+    /// Takes over the worst condition of an earlier part of the same run.
+    pub fn restore_worst_condition(&mut self, condition: f64) {
+        self.worst_condition = condition;
+    }
+
+    /// Points of the surface.
+    pub fn sample_points(&self) -> impl ExactSizeIterator<Item = Vector<D>> + '_ {
+        self.seeds.iter().map(|seed| seed.spot.point)
+    }
+
+    /// Whether the surface has no point at all.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.seeds.is_empty()
+    }
+
+    /// Whether the particle nearest to `x` has a negative level.
+    #[must_use]
+    pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
+        self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.origin.level[i] < 0.0)
+    }
+
+    /// Fits ψ(X) and x(X) about the particles that started next to the surface, and seeds.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn fit(&mut self, positions: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
+        let quantities = 1 + D;
+        let size = quantities * self.regression.terms();
+        self.cells.rebuild(positions.iter().copied(), 1.5 * self.spacing);
+        let origin = Arc::clone(&self.origin);
+        let near = origin.detection.near();
+        self.fits.resize(near.len(), None);
+        self.coefficients.resize(near.len() * size, 0.0);
+        let (regression, scratch) = (&self.regression, &self.scratch);
+        self.fits
+            .par_chunks_mut(LANES)
+            .zip(self.coefficients.par_chunks_mut(LANES * size))
+            .zip(near.par_chunks(LANES))
+            .for_each(|((fits, coefficients), near)| {
+                if interrupt.is_raised() {
+                    return;
+                }
+                let last = near.len() - 1;
+                let centres: [Vector<D>; LANES] =
+                    std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
+                let value = |j: usize, q: usize| if q == 0 { origin.level[j] } else { positions[j][q - 1] };
+                scratch.with(|scratch| {
+                    let cells = origin.detection.cells();
+                    let all = |_, _| true;
+                    let centres = &centres[..near.len()];
+                    let found = regression.fit_lanes(cells, centres, &value, quantities, &all, scratch, coefficients);
+                    fits.copy_from_slice(&found[..near.len()]);
+                });
+            });
+        interrupt.check()?;
+        for fit in &self.fits {
+            count_fit(&self.counts, fit.as_ref(), self.regression.degree());
+            self.worst_condition = fit.map_or(self.worst_condition, |fit| self.worst_condition.max(fit.condition));
+        }
+        let mut found = std::mem::take(&mut self.found);
+        found.resize_with(near.len(), Vec::new);
+        found.par_chunks_mut(BLOCK).enumerate().for_each(|(block, lists)| {
+            if !interrupt.is_raised() {
+                for (k, list) in lists.iter_mut().enumerate() {
+                    self.seed(block * BLOCK + k, list);
+                }
+            }
+        });
+        interrupt.check()?;
+        self.seeds.clear();
+        for (list, fit) in found.iter().zip(&self.fits) {
+            add(&self.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
+            self.seeds.extend(list);
+        }
+        self.found = found;
+        self.seed_cells.rebuild(self.seeds.iter().map(|seed| seed.spot.point), 2.0 * self.spacing);
+        Ok(())
+    }
+
+    /// What the fits of a patch say at a material point.
+    #[inline]
+    fn spot(&self, patch: usize, fit: &Fit<D>, material: &Vector<D>) -> Option<Spot<D>> {
+        let terms = self.regression.terms();
+        let degree = self.regression.degree();
+        let coefficients = &self.coefficients[patch * (1 + D) * terms..(patch + 1) * (1 + D) * terms];
+        let scale = 1.0 / fit.scale;
+        let t: [f64; D] = ((material - fit.centre) * scale).into();
+        let of = |quantity: usize| {
+            let own = &coefficients[quantity * terms..(quantity + 1) * terms];
+            Jet::from_local(&derivatives(degree, |place| own[place], &t), scale)
+        };
+        let level = of(0);
+        let map: [Jet<f64, D>; D] = std::array::from_fn(|d| of(1 + d));
+        let jacobian = SMatrix::<f64, D, D>::from_fn(|d, a| map[d].gradient[a]);
+        let inverse = jacobian.try_inverse()?;
+        let gradient = inverse.transpose() * Vector::<D>::from(level.gradient);
+        let bent = SMatrix::<f64, D, D>::from_fn(|a, b| {
+            level.hessian[a][b] - (0..D).map(|d| gradient[d] * map[d].hessian[a][b]).sum::<f64>()
+        });
+        let hessian = inverse.transpose() * bent * inverse;
+        let point = Vector::<D>::from_fn(|d, _| map[d].value);
+        let jet = Jet {
+            value: level.value,
+            gradient: gradient.into(),
+            hessian: std::array::from_fn(|d| std::array::from_fn(|e| hessian[(d, e)])),
+        };
+        Some(Spot { point, jet, rise: Vector::<D>::from(level.gradient), inverse })
+    }
+
+    /// Moves a material point onto ψ = 0 along ∂ψ: the shortest way in initial positions, where the gradient in space may
+    /// lead far along the surface.
+    fn project(&self, patch: usize, fit: &Fit<D>, start: &Vector<D>) -> Option<Seed<D>> {
+        let mut material = *start;
+        let mut last = f64::INFINITY;
+        for _ in 0..self.method.max_iterations.min(50) {
+            let spot = self.spot(patch, fit, &material)?;
+            let mut shift = spot.rise * (-spot.jet.value / spot.rise.norm_squared());
+            let length = shift.norm();
+            if !length.is_finite() {
+                return None;
+            }
+            let largest = material.amax();
+            if is_last_step(&self.method, length, last, fit.radius, largest) {
+                let material = material + shift;
+                return self.spot(patch, fit, &material).map(|spot| Seed { patch, material, spot });
+            }
+            let most = LONGEST_STEP * fit.radius;
+            if length > most {
+                shift *= most / length;
+            }
+            material += shift;
+            if (material - fit.middle).norm_squared() > fit.radius * fit.radius {
+                return None;
+            }
+            last = length;
+        }
+        None
+    }
+
+    /// The seeds of a patch: its projected centre, and points along the surface every h where it has been stretched.
+    fn seed(&self, patch: usize, seeds: &mut Vec<Seed<D>>) {
+        seeds.clear();
+        let Some(fit) = &self.fits[patch] else { return };
+        let Some(first) = self.project(patch, fit, &fit.middle) else { return };
+        seeds.push(first);
+        let (s, t) = tangents(&first.spot.jet.normal());
+        let along = first.spot.inverse * Vector::<D>::from(s) * self.spacing;
+        let across = first.spot.inverse * Vector::<D>::from(t) * self.spacing;
+        let reach = SEED_REACH * self.spacing;
+        let most = |way: &Vector<D>| ((reach / way.norm()) as i32).min(MOST_SEEDS);
+        let (i_most, j_most) = (most(&along), if D == 3 { most(&across) } else { 0 });
+        for j in -j_most..=j_most {
+            for i in -i_most..=i_most {
+                if i != 0 || j != 0 {
+                    let start = first.material + along * f64::from(i) + across * f64::from(j);
+                    seeds.extend(self.project(patch, fit, &start));
+                }
+            }
+        }
+    }
+
+    /// The closest point of the surface for any point whose nearest seed lies within `reach`; None if none does.
+    #[must_use]
+    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
+        let (nearest, distance) = self.seed_cells.nearest(x, reach)?;
+        Some(self.solve(nearest, distance, x, &mut Tally::default()))
+    }
+
+    /// Newton from the nearest seed; where it leaves the fit, on from the seed nearest to there; a foot farther than the
+    /// seed, or none: the seed itself (counted).
+    fn solve(&self, nearest: usize, distance: f64, x: &Vector<D>, tally: &mut Tally) -> ClosestPoint<D> {
+        tally.queries += 1;
+        let mut current = nearest;
+        for hop in 0..=MOST_HOPS {
+            match self.newton(&self.seeds[current], x, tally) {
+                Ok(answer) => {
+                    let slack = self.method.tolerance.max(16.0 * f64::EPSILON * x.amax());
+                    if answer.distance <= distance * (1.0 + 1e-9) + slack {
+                        tally.hopped += u64::from(hop > 0);
+                        return answer;
+                    }
+                    break;
+                }
+                Err(Some(left)) => match self.seed_cells.nearest(&left, f64::INFINITY) {
+                    Some((next, _)) if next != current => current = next,
+                    _ => break,
+                },
+                Err(None) => break,
+            }
+        }
+        tally.sample_distance += 1;
+        let Spot { point, jet, .. } = &self.seeds[nearest].spot;
+        answer(x, point, jet)
+    }
+
+    /// The foot, or where the iteration left the fit, if it did.
+    fn newton(
+        &self,
+        seed: &Seed<D>,
+        x: &Vector<D>,
+        tally: &mut Tally,
+    ) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
+        let fit = self.fits[seed.patch].as_ref().ok_or(None)?;
+        let mut material = seed.material;
+        let mut spot = seed.spot;
+        let mut last = f64::INFINITY;
+        let mut left = false;
+        for _ in 0..self.method.max_iterations {
+            tally.iterations += 1;
+            let offset: [f64; D] = (x - spot.point).into();
+            let step = newton_step(&spot.jet, &offset);
+            let mut shift = spot.inverse * Vector::<D>::from(step);
+            let length = shift.norm();
+            if !length.is_finite() {
+                return Err(None);
+            }
+            if is_last_step(&self.method, length, last, fit.radius, material.amax()) {
+                let foot = spot.point + Vector::<D>::from(step);
+                return Ok(answer(x, &foot, &spot.jet.moved(&step)));
+            }
+            let most = LONGEST_STEP * fit.radius;
+            if length > most {
+                shift *= most / length;
+            }
+            material += shift;
+            // Once outside, an iteration may come back; staying there it has nothing to say.
+            let outside = (material - fit.middle).norm_squared() > fit.radius * fit.radius;
+            spot = self.spot(seed.patch, fit, &material).ok_or(None)?;
+            if outside && (left || length <= ACCEPTED * fit.radius) {
+                return Err(Some(spot.point));
+            }
+            left = outside;
+            last = length;
+        }
+        Err(None)
+    }
+
+    /// [`Self::query`] for many points.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn closest_points(
+        &self,
+        points: &[Vector<D>],
+        reach: f64,
+        answers: &mut Answers<D>,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        let feet = answers.one_a_query(points.len());
+        feet.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(feet, points)| {
+            if interrupt.is_raised() {
+                return;
+            }
+            let mut tally = Tally::default();
+            let mut last: Option<usize> = None;
+            for (foot, x) in feet.iter_mut().zip(points) {
+                let known = match last {
+                    Some(seed) => Some((seed, (self.seeds[seed].spot.point - x).norm_squared())),
+                    None => self.seed_cells.nearest(x, reach).map(|(seed, distance)| (seed, distance * distance)),
+                };
+                let nearest = known.map(|known| self.seed_cells.nearest_from(x, known));
+                let nearest = nearest.map(|(seed, r2)| (seed, r2.sqrt())).filter(|(_, distance)| *distance <= reach);
+                *foot = nearest.map(|(seed, distance)| self.solve(seed, distance, x, &mut tally));
+                last = nearest.map(|n| n.0);
+            }
+            tally.book(&self.counts);
+        });
+        interrupt.check()
+    }
+}
+
+fn answer<const D: usize>(x: &Vector<D>, foot: &Vector<D>, jet: &Jet<f64, D>) -> ClosestPoint<D> {
+    let offset = x - foot;
+    let normal = Vector::<D>::from(jet.normal());
+    ClosestPoint {
+        point: *foot,
+        distance: offset.norm(),
+        normal,
+        curvature: jet.curvature(),
+        is_outside: offset.dot(&normal) >= 0.0,
+    }
+}
