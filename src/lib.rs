@@ -9,6 +9,7 @@
 pub mod parallel;
 pub mod geometry;
 pub mod linear_algebra;
+pub mod smoothing_kernels;
 pub mod particles;
 pub mod neighbors;
 pub mod polynomials;

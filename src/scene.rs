@@ -5,9 +5,11 @@
 
 pub mod check;
 pub mod json_schema;
+pub mod rows;
 pub mod schema;
 
 pub use check::{Violation, check};
+pub use rows::Rows;
 pub use schema::{Default as DefaultValue, Kind, Parameter, Variant};
 
 use crate::parallel::Interrupt;
@@ -28,6 +30,8 @@ pub struct SceneKind {
     pub preset: fn(name: &str, given: &Map<String, Value>) -> Map<String, Value>,
     /// A small job body that runs in seconds.
     pub example: &'static str,
+    /// What the kind must show.
+    pub rows: fn() -> Rows,
     /// From checked parameters (all defaults present) to a scene.
     pub understand: fn(parameters: &Value) -> Understood,
 }

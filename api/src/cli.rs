@@ -5,8 +5,8 @@ use crate::config::Config;
 use crate::foreground;
 use crate::telemetry;
 use clap::{Parser, Subcommand};
-use meniscus_jobs::backup;
 use meniscus_jobs::executor::worker_process;
+use meniscus_jobs::{backup, verify};
 use std::fmt::Display;
 use std::io::Write;
 use std::net::SocketAddr;
@@ -59,6 +59,21 @@ enum Command {
         #[arg(long)]
         threads: Option<usize>,
     },
+    /// Run what scenes must show and compare the figures; fails when one is missed.
+    Verify {
+        /// Kinds of scenes, with commas between; all when not given.
+        #[arg(long, value_delimiter = ',')]
+        only: Vec<String>,
+        /// Long rows too, and tables and pictures of the results.
+        #[arg(long)]
+        full: bool,
+        /// Directory of the runs; those of the same build are not repeated.
+        #[arg(long, default_value = "verify-output")]
+        runs: PathBuf,
+        /// Directory of the results of a full table.
+        #[arg(long, default_value = "docs/results")]
+        results: PathBuf,
+    },
     /// Make a consistent copy of a data directory, also of one in use.
     Backup {
         /// Directory for the copy, new or empty.
@@ -99,6 +114,15 @@ pub fn main() -> ExitCode {
         Command::Run { scene, out, threads } => foreground::run(&scene, &out, threads).unwrap_or_else(|e| fail(&e)),
         Command::Resume { checkpoint, out, threads } => {
             foreground::resume(&checkpoint, &out, threads).unwrap_or_else(|error| fail(&error))
+        }
+        Command::Verify { only, full, runs, results } => {
+            let request = verify::Request { only, full, runs, results };
+            let shown = |outcome: &verify::Outcome| writeln!(std::io::stdout(), "{outcome}");
+            match verify::verify(&request, shown) {
+                Ok(true) => ExitCode::SUCCESS,
+                Ok(false) => ExitCode::FAILURE,
+                Err(error) => fail(&error),
+            }
         }
         Command::Backup { target, data } => {
             backup::back_up(&data, &target).map_or_else(|e| fail(&e), |()| ExitCode::SUCCESS)

@@ -409,7 +409,7 @@ mod tests {
         let scene = &body.resolved["scene"];
         assert_eq!(scene["field"], "dual");
         assert_eq!(scene["redistance"]["type"], "for_output");
-        assert_eq!(scene["method"]["neighborhood"]["type"], "nearest");
+        assert_eq!(scene["method"]["neighborhood"]["type"], "material");
         assert_eq!(body.resolved["limits"]["threads"], 2);
         assert_eq!(body.resolved["output"]["series_every_steps"], 10);
         assert_eq!(body.resolved["checkpoint"]["every_wall_s"], 60.0);

@@ -28,4 +28,5 @@ pub mod report;
 pub mod store;
 pub mod strict_json;
 pub mod supervisor;
+pub mod verify;
 pub mod worker;

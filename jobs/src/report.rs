@@ -52,7 +52,8 @@ pub fn compose(
     })
 }
 
-fn cpu_name() -> Option<String> {
+/// The name of this machine's processor.
+pub(crate) fn cpu_name() -> Option<String> {
     let info = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = info.lines().find(|line| line.starts_with("model name"))?;
     line.split(':').nth(1).map(|name| name.trim().to_owned())

@@ -84,13 +84,7 @@ impl<const D: usize> MaterialSurface<D> {
     /// For particles at their initial positions with the level that they keep. An interrupt leaves a surface without
     /// points: whoever asked ends the run before its first step.
     #[must_use]
-    pub fn new(
-        method: PcpMethod,
-        spacing: f64,
-        positions: &[Vector<D>],
-        level: &[f64],
-        interrupt: &Interrupt,
-    ) -> Self {
+    pub fn new(method: PcpMethod, spacing: f64, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Self {
         let mut detection = Detection::new(Domain::unbounded());
         if detection.rebuild(positions, level, method.sample_threshold_h * spacing, interrupt).is_err() {
             detection = Detection::new(Domain::unbounded());
@@ -185,8 +179,7 @@ impl<const D: usize> MaterialSurface<D> {
                     return;
                 }
                 let last = near.len() - 1;
-                let centres: [Vector<D>; LANES] =
-                    std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
+                let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
                 let value = |j: usize, q: usize| if q == 0 { origin.level[j] } else { positions[j][q - 1] };
                 scratch.with(|scratch| {
                     let cells = origin.detection.cells();
@@ -338,12 +331,7 @@ impl<const D: usize> MaterialSurface<D> {
     }
 
     /// The foot, or where the iteration left the fit, if it did.
-    fn newton(
-        &self,
-        seed: &Seed<D>,
-        x: &Vector<D>,
-        tally: &mut Tally,
-    ) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
+    fn newton(&self, seed: &Seed<D>, x: &Vector<D>, tally: &mut Tally) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
         let fit = self.fits[seed.patch].as_ref().ok_or(None)?;
         let mut material = seed.material;
         let mut spot = seed.spot;

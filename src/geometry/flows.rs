@@ -3,10 +3,12 @@
 pub mod rotation;
 pub mod single_vortex;
 pub mod translation;
+pub mod vortex_3d;
 
 pub use rotation::Rotation;
 pub use single_vortex::SingleVortex;
 pub use translation::Translation;
+pub use vortex_3d::Vortex3d;
 
 use super::Vector;
 

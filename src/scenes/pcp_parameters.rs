@@ -176,7 +176,9 @@ pub fn understand(
         weight: parsed.weight,
         minimum_ratio: match neighborhood {
             // A count that is given is meant.
-            NeighborhoodChoice::Nearest { .. } | NeighborhoodChoice::Material { .. } => parsed.minimum_ratio.unwrap_or(1.0),
+            NeighborhoodChoice::Nearest { .. } | NeighborhoodChoice::Material { .. } => {
+                parsed.minimum_ratio.unwrap_or(1.0)
+            }
             NeighborhoodChoice::Radius { .. } => parsed.minimum_ratio.unwrap_or(default_ratio),
         },
         sample_threshold_h: parsed.sample_threshold_h,

@@ -1,6 +1,7 @@
 //! `redistance`: static geometry (PCP paper, section 4.1).
 
 mod parameters;
+mod rows;
 mod setup;
 
 use crate::scene::SceneKind;
@@ -14,4 +15,5 @@ pub static KIND: SceneKind = SceneKind {
     preset: parameters::preset,
     example: include_str!("redistance/example.json"),
     understand: setup::understand,
+    rows: rows::rows,
 };

@@ -1,6 +1,7 @@
 //! `vortex`: an interface in a prescribed flow (PCP paper, section 4.2).
 
 mod parameters;
+mod rows;
 mod setup;
 
 use crate::scene::SceneKind;
@@ -14,4 +15,5 @@ pub static KIND: SceneKind = SceneKind {
     preset: parameters::preset,
     example: include_str!("vortex/example.json"),
     understand: setup::understand,
+    rows: rows::rows,
 };

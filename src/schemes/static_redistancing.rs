@@ -1,7 +1,10 @@
-//! Redistancing of resting particles about a known surface (PCP paper, section 4.1).
+//! Redistancing of resting particles about a known surface (PCP paper, section 4.1), on the particles themselves or, as a baseline,
+//! on a grid that their values are interpolated to.
 
+mod remeshing;
 mod simulation;
 mod system;
 
+pub use remeshing::{RemeshingKernel, grid_method};
 pub use simulation::StaticRedistancing;
 pub use system::{InitialLevel, StaticSystem};

@@ -64,8 +64,37 @@ fn initial_variants() -> &'static [Variant] {
     INITIAL
 }
 
-static METHODS: [Variant; 1] =
-    [Variant { name: "pcp", doc: "particle closest point", parameters: pcp_parameters::PARAMETERS }];
+static METHODS: [Variant; 2] = [
+    Variant { name: "pcp", doc: "particle closest point", parameters: pcp_parameters::PARAMETERS },
+    Variant {
+        name: "remesh",
+        doc: "the baseline: interpolation to a grid, then closest points on it by Taylor polynomials of degree 4",
+        parameters: &[Parameter::new(
+            "kernel",
+            "how values get to the nodes",
+            Kind::Choice(kernel_variants),
+            DefaultValue::Json("\"lambda44_normalized\""),
+        )],
+    },
+];
+
+const SMOOTHING: &[Parameter] = &[Parameter::new(
+    "smoothing_h",
+    "ε/h; 1.5 (1/(16 h))^0.35 when not given: it must grow as h falls",
+    POSITIVE,
+    DefaultValue::Absent,
+)];
+
+static KERNELS: &[Variant] = &[
+    Variant { name: "lambda44", doc: "Λ₄,₄, plain sums", parameters: &[] },
+    Variant { name: "lambda44_normalized", doc: "Λ₄,₄, divided by the sum of weights", parameters: &[] },
+    Variant { name: "wendland_c2", doc: "Wendland C², weighted by volumes and normalised", parameters: SMOOTHING },
+    Variant { name: "gaussian", doc: "Gaussian, weighted by volumes and normalised", parameters: SMOOTHING },
+];
+
+fn kernel_variants() -> &'static [Variant] {
+    KERNELS
+}
 
 fn method_variants() -> &'static [Variant] {
     &METHODS

@@ -7,7 +7,9 @@ use crate::geometry::{Surface, Vector};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
-use crate::schemes::static_redistancing::{InitialLevel, StaticRedistancing, StaticSystem};
+use crate::schemes::static_redistancing::{
+    InitialLevel, RemeshingKernel, StaticRedistancing, StaticSystem, grid_method,
+};
 use crate::simulation::Simulation;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -17,6 +19,7 @@ struct RedistanceScene<const D: usize> {
     shape: Value,
     lattice: Lattice,
     method: PcpMethod,
+    remeshing: Option<RemeshingKernel>,
     initial: InitialLevel<D>,
     half_band: f64,
     repeats: u64,
@@ -43,7 +46,16 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let surface = shapes::surface::<D>(&shape, "/shape").map_err(|found| violations.extend(found)).ok();
     // Overwritten every step: distances become the input of the next redistancing.
     let default_ratio = if written.repeat > 1 { 2.0 } else { 1.5 };
-    let method = match pcp_parameters::understand(&written.method, "/method", D, default_ratio) {
+    let remeshing = (written.method["type"] == "remesh").then(|| {
+        let (kernel, full) = remeshing_kernel(&written.method["kernel"], written.spacing);
+        resolved["method"]["kernel"] = full;
+        kernel
+    });
+    let understood = match remeshing {
+        Some(_) => Ok((grid_method(), resolved["method"].clone())),
+        None => pcp_parameters::understand(&written.method, "/method", D, default_ratio),
+    };
+    let method = match understood {
         Ok((method, full)) => {
             resolved["method"] = full;
             let detail = "particles at rest have no initial positions beside their own";
@@ -105,10 +117,28 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         shape,
         lattice,
         method,
+        remeshing,
         initial,
         half_band: 0.5 * band,
         repeats: written.repeat,
     }))
+}
+
+/// The kernel of a remeshing, and its parameters with what was left open.
+fn remeshing_kernel(written: &Value, spacing: f64) -> (RemeshingKernel, Value) {
+    let mut full = written.clone();
+    let default = 1.5 * (1.0 / (16.0 * spacing)).powf(0.35);
+    let smoothing_h = written["smoothing_h"].as_f64().unwrap_or(default);
+    let kernel = match written["type"].as_str() {
+        Some("lambda44") => RemeshingKernel::Lambda44,
+        Some("wendland_c2") => RemeshingKernel::WendlandC2 { smoothing_h },
+        Some("gaussian") => RemeshingKernel::Gaussian { smoothing_h },
+        _ => RemeshingKernel::Lambda44Normalized,
+    };
+    if let RemeshingKernel::WendlandC2 { .. } | RemeshingKernel::Gaussian { .. } = kernel {
+        full["smoothing_h"] = json!(smoothing_h);
+    }
+    (kernel, full)
 }
 
 /// Whether 1 + 0.5 x + 0.3 y is positive wherever particles are made.
@@ -150,11 +180,13 @@ impl<const D: usize> Scene for RedistanceScene<D> {
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
         let surface = shapes::surface::<D>(&self.shape, "/shape")?;
-        let method = BTreeMap::from([("method", "pcp, as given".to_owned())]);
+        let name = if self.remeshing.is_some() { "remeshing to a grid, as given" } else { "pcp, as given" };
+        let method = BTreeMap::from([("method", name.to_owned())]);
         let system = StaticSystem::new(
             surface,
             &self.lattice,
             self.method.clone(),
+            self.remeshing,
             self.initial,
             self.half_band,
             self.repeats,

@@ -69,6 +69,16 @@ static FLOWS: &[Variant] = &[
         )],
     },
     Variant {
+        name: "vortex_3d",
+        doc: "the deforming flow in the unit cube (3D)",
+        parameters: &[Parameter::new(
+            "period",
+            "T of the reversal; null never turns; 2 when not given",
+            POSITIVE,
+            DefaultValue::JsonOrNull("2"),
+        )],
+    },
+    Variant {
         name: "rotation",
         doc: "rigid rotation about a point in the x–y plane",
         parameters: &[
@@ -102,7 +112,11 @@ fn integrator_variants() -> &'static [Variant] {
 }
 
 static REDISTANCE: &[Variant] = &[
-    Variant { name: "auto", doc: "for_output with a dual field, every step with an overwritten one", parameters: &[] },
+    Variant {
+        name: "auto",
+        doc: "for_output with a dual field, every second step with an overwritten one",
+        parameters: &[],
+    },
     Variant {
         name: "every",
         doc: "after every so many steps",
@@ -172,9 +186,20 @@ pub(super) struct Written {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub(super) enum Flow {
-    SingleVortex { period: Option<f64> },
-    Rotation { center: Vec<f64>, angular_velocity: f64 },
-    Translation { velocity: Vec<f64> },
+    SingleVortex {
+        period: Option<f64>,
+    },
+    #[serde(rename = "vortex_3d")]
+    Vortex3d {
+        period: Option<f64>,
+    },
+    Rotation {
+        center: Vec<f64>,
+        angular_velocity: f64,
+    },
+    Translation {
+        velocity: Vec<f64>,
+    },
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]

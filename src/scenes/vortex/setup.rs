@@ -2,7 +2,7 @@
 
 use super::parameters::{Field, Flow, Integrator, Redistance, Written};
 use crate::closest_point::PcpMethod;
-use crate::geometry::flows::{Rotation, SingleVortex, Translation};
+use crate::geometry::flows::{Rotation, SingleVortex, Translation, Vortex3d};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{self, Vector};
 use crate::scene::check;
@@ -31,10 +31,13 @@ struct VortexScene<const D: usize> {
     when: RedistanceWhen,
 }
 
-/// Degree and neighbours for a dual field: of the choices tried the least error at T/2 without loss at T (README beside).
+/// Degree and neighbours of fits in initial positions, for a dual field: of the choices tried the least error at T/2
+/// (README beside).
 const AUTO_DUAL: (u64, u64) = (4, 24);
-/// Fits that stay stable when the distance is overwritten every step.
-const AUTO_OVERWRITE: (u64, u64) = (3, 60);
+/// Degree and neighbours of fits in space that stay stable when the distance is overwritten every few steps.
+const AUTO_OVERWRITE: (u64, u64) = (3, 50);
+/// Steps between redistancings of an overwritten field: each one costs accuracy, too few let neighbourhoods go astray.
+const AUTO_EVERY: u64 = 2;
 
 pub(super) fn understand(parameters: &Value) -> Understood {
     let written: Written = serde_json::from_value(parameters.clone())
@@ -60,23 +63,29 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let mut chosen = BTreeMap::new();
     let mut method_json = written.method.clone();
     if method_json["type"] == "auto" {
-        let ((degree, count), why) = match written.field {
-            Field::Dual => (AUTO_DUAL, "small neighbourhoods by count: nothing accumulates with a dual field"),
-            Field::Overwrite => {
-                (AUTO_OVERWRITE, "twice the coefficients and more: fewer neighbours are unstable when overwritten")
+        let ((degree, count), neighborhood, why) = match written.field {
+            Field::Dual => {
+                (AUTO_DUAL, "material", "particles keep their level, so fits in initial positions stay sound")
             }
+            Field::Overwrite => (
+                AUTO_OVERWRITE,
+                "nearest",
+                "several neighbours a coefficient, on the same branch: fewer are unstable when overwritten",
+            ),
         };
         // In space a fit of the same degree needs proportionally more neighbours.
         let count = if D == 2 { count } else { 2 * count };
+        // Fewer sample particles cost accuracy at T/2 of a vortex and gain it at T, where four resolutions were compared.
+        let sample_threshold_h = if written.field == Field::Overwrite { 1.2 } else { 1.5 };
         let choice = json!({
-            "degree": degree, "neighborhood": {"type": "nearest", "count": count}, "tolerance": 1e-12,
+            "degree": degree, "sample_threshold_h": sample_threshold_h, "neighborhood": {"type": neighborhood, "count": count}, "tolerance": 1e-12,
             "max_iterations": 100
         });
         let mut method =
             check(pcp_parameters::PARAMETERS, choice.as_object().unwrap_or(&Map::new()), "/method", &mut violations);
         method.shift_insert(0, "type".into(), json!("pcp"));
         method_json = Value::Object(method);
-        chosen.insert("method", format!("pcp, degree {degree}, nearest {count}: {why}"));
+        chosen.insert("method", format!("pcp, degree {degree}, {neighborhood} {count}: {why}"));
     } else {
         chosen.insert("method", "pcp, as given".to_owned());
     }
@@ -129,9 +138,10 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
             RedistanceWhen::ForOutput
         }
         (Redistance::Auto, Field::Overwrite) => {
-            chosen.insert("redistance", "every step, as in the paper".to_owned());
-            resolved["redistance"] = json!({"type": "every", "steps": 1});
-            RedistanceWhen::Every(1)
+            let why = "an overwritten level must stay a distance, and every overwriting costs accuracy";
+            chosen.insert("redistance", format!("every {AUTO_EVERY} steps: {why}"));
+            resolved["redistance"] = json!({"type": "every", "steps": AUTO_EVERY});
+            RedistanceWhen::Every(AUTO_EVERY)
         }
     };
     resolved["dimension"] = json!(D);
@@ -167,19 +177,19 @@ fn flow<const D: usize>(flow: &Flow) -> Result<Box<dyn geometry::Flow<D>>, Viola
         let detail = format!("the scene has {D} dimensions");
         Err(Violation::new(format!("/flow/{name}"), "conflict", detail, &json!(numbers), json!(format!("{D} numbers"))))
     };
+    let elsewhere = |name: &str, place: &str| {
+        let detail = format!("{name} lives in {place}, the scene has {D} dimensions");
+        let here = if D == 2 { "single_vortex" } else { "vortex_3d" };
+        Violation::new("/flow/type", "conflict", detail, &json!(name), json!([here, "rotation", "translation"]))
+    };
     match flow {
         Flow::SingleVortex { period } => {
             let vortex: Box<dyn geometry::Flow<2>> = Box::new(SingleVortex { period: *period });
-            in_dimension(vortex).ok_or_else(|| {
-                let detail = format!("the single vortex lives in the plane, the scene has {D} dimensions");
-                Violation::new(
-                    "/flow/type",
-                    "conflict",
-                    detail,
-                    &json!("single_vortex"),
-                    json!(["rotation", "translation"]),
-                )
-            })
+            in_dimension(vortex).ok_or_else(|| elsewhere("single_vortex", "plane"))
+        }
+        Flow::Vortex3d { period } => {
+            let vortex: Box<dyn geometry::Flow<3>> = Box::new(Vortex3d { period: *period });
+            in_dimension(vortex).ok_or_else(|| elsewhere("vortex_3d", "space"))
         }
         Flow::Rotation { center, angular_velocity } => {
             Ok(Box::new(Rotation { center: vector("center", center)?, angular_velocity: *angular_velocity }))

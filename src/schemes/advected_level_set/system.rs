@@ -143,6 +143,12 @@ impl<const D: usize> AdvectedSystem<D> {
         let normals = Some(self.particles.vector(self.columns.normal));
         let (surface, answers) = (&mut self.redistancing, &mut self.answers);
         redistance(surface, positions, psi, normals, self.half_band, answers, &self.interrupt, phases)?;
+        phases.measure("redistancing/store", || self.store());
+        Ok(())
+    }
+
+    /// Writes the answers, and the distances over ψ where the scene says so.
+    fn store(&mut self) {
         self.columns.store(&mut self.particles, self.psi, &self.answers, self.half_band);
         if self.field == FieldChoice::Overwrite {
             for i in 0..self.particles.len() {
@@ -152,7 +158,6 @@ impl<const D: usize> AdvectedSystem<D> {
                 }
             }
         }
-        Ok(())
     }
 
     /// A copy of the particles with the surface columns of the present moment, and its surface, for what is asked

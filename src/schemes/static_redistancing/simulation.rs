@@ -2,7 +2,7 @@
 
 use super::system::StaticSystem;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, rescued};
-use crate::schemes::measured_redistancing::redistance;
+use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::simulation::{
     CpuClock, ErrorEntry, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State,
     StepError,
@@ -60,14 +60,24 @@ impl<const D: usize> StaticRedistancing<D> {
                 norms[3].add(particles.scalar(system.columns.curvature)[i] - curvature);
             }
         }
+        let mut entries = Vec::new();
+        if let Some(remeshing) = self.system.remeshing.as_ref().filter(|_| self.step > 0) {
+            // The first interpolation is of the exact level; later ones are of distances that were computed.
+            let mut norms = ErrorNorms::default();
+            for (x, value) in remeshing.nodes().iter().zip(remeshing.values()) {
+                let distance = system.surface.signed_distance(x);
+                let exact = if self.step == 1 { system.initial.value(x, distance) } else { distance };
+                if distance.abs() <= system.half_band {
+                    norms.add(value - exact);
+                }
+            }
+            entries.extend(norms.entries("remeshed_level", self.clock().time, "exact level at the nodes"));
+        }
         let names = ["phi", "closest_point", "normal", "curvature"];
         let time = self.clock().time;
-        names
-            .iter()
-            .zip(&norms)
-            .filter(|(_, norms)| !norms.is_empty())
-            .flat_map(|(name, norms)| norms.entries(name, time, "exact surface"))
-            .collect()
+        let found = names.iter().zip(&norms).filter(|(_, norms)| !norms.is_empty());
+        entries.extend(found.flat_map(|(name, norms)| norms.entries(name, time, "exact surface")));
+        entries
     }
 }
 
@@ -80,26 +90,35 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         self.fixed.clock(self.fixed.steps)
     }
 
-    /// 1. Detection, regression and projection from the present level.
+    /// 1. Detection, regression and projection from the present level, or from what a grid gets of it.
     /// 2. Queries at every particle.
     /// 3. The distances become the level.
     fn step(&mut self) -> Result<(), StepError> {
         let system = &mut self.system;
         let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
         let (surface, answers) = (&mut system.redistancing, &mut system.answers);
-        let normals = (self.step > 0).then(|| system.particles.vector(system.columns.normal));
         let (interrupt, phases) = (&system.interrupt, &mut self.phases);
-        redistance(surface, positions, level, normals, f64::INFINITY, answers, interrupt, phases)?;
+        let (points, level, normals) = match &mut system.remeshing {
+            Some(remeshing) => {
+                phases.measure("remeshing", || remeshing.interpolate(positions, level, interrupt))?;
+                (remeshing.nodes(), remeshing.values(), None)
+            }
+            None => (positions, level, (self.step > 0).then(|| system.particles.vector(system.columns.normal))),
+        };
+        rebuild(surface, points, level, normals, interrupt, phases)?;
+        query(surface, positions, f64::INFINITY, answers, interrupt, phases)?;
         if surface.is_lost() {
             let Clock { step, time } = self.fixed.clock(self.step + 1);
             return Err(StepError::InterfaceLost { step, time });
         }
         // Particles beyond the band serve the fits and are redistanced like the others; the band's flags stay.
-        for (i, answer) in system.answers.iter() {
-            system.columns.write(&mut system.particles, system.level, i, answer);
-            let phi = system.particles.scalar(system.columns.phi)[i];
-            system.particles.scalar_mut(system.level)[i] = phi;
-        }
+        self.phases.measure("redistancing/store", || {
+            for (i, answer) in system.answers.iter() {
+                system.columns.write(&mut system.particles, system.level, i, answer);
+                let phi = system.particles.scalar(system.columns.phi)[i];
+                system.particles.scalar_mut(system.level)[i] = phi;
+            }
+        });
         self.check_finite()?;
         self.step += 1;
         Ok(())
@@ -133,6 +152,9 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let surface = &self.system.redistancing;
         state.push_counts("rescues", surface.counts().entries().iter().map(|e| e.1).collect());
         state.push_reals("worst_condition", &[surface.worst_condition()]);
+        if let Some(remeshing) = &self.system.remeshing {
+            state.push_reals("remeshed_level", remeshing.values());
+        }
         state
     }
 
@@ -144,6 +166,11 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let (rescues, condition) = (state.counts("rescues")?, state.reals("worst_condition")?);
         crate::simulation::state::check_length("rescues", rescues.len(), surface.counts().entries().len())?;
         crate::simulation::state::check_length("worst_condition", condition.len(), 1)?;
+        if let Some(remeshing) = &mut self.system.remeshing {
+            let values = state.reals("remeshed_level")?;
+            crate::simulation::state::check_length("remeshed_level", values.len(), remeshing.values().len())?;
+            remeshing.restore(values);
+        }
         state.pull_particles(&mut self.system.particles)?;
         surface.counts().restore(rescues);
         surface.restore_worst_condition(condition[0]);

@@ -1,0 +1,185 @@
+//! `verify`: runs the rows that scenes must show and compares figures. Runs are jobs of one thread in a directory of
+//! their own; those of this build that are already there are not repeated.
+
+mod figures;
+mod measure;
+mod table;
+
+pub use table::Outcome;
+
+use crate::body::{self, Allowance};
+use crate::observers::Control;
+use crate::order::Order;
+use crate::records::{Record, RecordSink, Usage, Verdict};
+use crate::{build, digest, process, worker};
+use meniscus::scene::SceneKind;
+use meniscus::scene::rows::{Figure, Row};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What to verify, and where.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Kinds of scenes; all when empty.
+    pub only: Vec<String>,
+    /// Whether long rows run too, and the results are written.
+    pub full: bool,
+    /// Where runs are kept.
+    pub runs: PathBuf,
+    /// Where the tables and pictures go when everything is run.
+    pub results: PathBuf,
+}
+
+/// Why a verification cannot begin or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// No such kind.
+    #[error("there is no kind of scene named {name}; there are {known}")]
+    UnknownKind {
+        /// As asked for.
+        name: String,
+        /// Those there are.
+        known: String,
+    },
+    /// A file.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+    /// A picture.
+    #[error("picture {name}: {cause}")]
+    Picture {
+        /// Which.
+        name: &'static str,
+        /// Why.
+        cause: String,
+    },
+}
+
+/// Runs the rows and hands each outcome to `shown` as it comes. Returns whether every row is met.
+///
+/// # Errors
+/// [`VerifyError`].
+pub fn verify(request: &Request, mut shown: impl FnMut(&Outcome) -> io::Result<()>) -> Result<bool, VerifyError> {
+    let known: Vec<&str> = meniscus::scenes::SCENES.iter().map(|kind| kind.kind).collect();
+    if let Some(name) = request.only.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(VerifyError::UnknownKind { name: name.clone(), known: known.join(", ") });
+    }
+    let is_wanted = |kind: &&&SceneKind| request.only.is_empty() || request.only.iter().any(|name| name == kind.kind);
+    let bench = Bench { runs: request.runs.join(build_key()) };
+    let mut all_met = true;
+    let mut documents: BTreeMap<&str, (Vec<Outcome>, Vec<Figure>)> = BTreeMap::new();
+    for kind in meniscus::scenes::SCENES.iter().filter(is_wanted) {
+        let rows = (kind.rows)();
+        let (outcomes, figures) = documents.entry(rows.document).or_default();
+        for row in rows.rows.iter().filter(|row| request.full || !row.is_long) {
+            let outcome = bench.outcome(kind.kind, row);
+            all_met &= outcome.is_met;
+            shown(&outcome)?;
+            outcomes.push(outcome);
+        }
+        figures.extend(rows.figures);
+    }
+    for (name, (outcomes, figures)) in documents.iter().filter(|_| request.full) {
+        fs::create_dir_all(&request.results)?;
+        for figure in figures {
+            let path = request.results.join(format!("{}.svg", figure.name));
+            figures::draw(&path, figure, &bench.lines(figure))
+                .map_err(|cause| VerifyError::Picture { name: figure.name, cause })?;
+        }
+        fs::write(request.results.join(format!("{name}.md")), table::document(outcomes, figures))?;
+    }
+    Ok(all_met)
+}
+
+/// A name for this build, so that runs of another one are not taken for its own.
+fn build_key() -> String {
+    let own = std::env::current_exe().ok().and_then(|path| digest::of_file(&path).ok());
+    own.map_or_else(build::name, |(digest, _)| digest[..16].to_owned())
+}
+
+/// Runs scenes and keeps what they report.
+struct Bench {
+    runs: PathBuf,
+}
+
+impl Bench {
+    fn outcome(&self, kind: &str, row: &Row) -> Outcome {
+        let mut reports = Vec::new();
+        let mut failure = None;
+        for scene in &row.runs {
+            match self.report(scene) {
+                Ok(report) => reports.push(report),
+                Err(cause) => failure = failure.or(Some(cause)),
+            }
+        }
+        let figure = if failure.is_none() { measure::measure(row.measure, &row.runs, &reports) } else { f64::NAN };
+        let cpu_s = reports.iter().filter_map(|report| report["cost"]["cpu_s"].as_f64()).sum();
+        Outcome::new(kind, row, figure, cpu_s, failure)
+    }
+
+    fn lines(&self, figure: &Figure) -> Vec<(String, Vec<figures::Point>)> {
+        let point = |scene: &Value| {
+            let report = self.report(scene).ok()?;
+            Some(figures::Point {
+                spacing: scene["spacing"].as_f64()?,
+                seconds: measure::seconds(&report, figure.phases),
+                error: measure::error(&report, figure.quantity)?,
+            })
+        };
+        figure.lines.iter().map(|(label, runs)| (label.clone(), runs.iter().filter_map(point).collect())).collect()
+    }
+
+    /// The report of a scene: of its earlier run with this build, or of one made now.
+    fn report(&self, scene: &Value) -> Result<Value, String> {
+        let directory = self.runs.join(&digest::of_bytes(scene.to_string().as_bytes())[..16]);
+        let read = || -> Option<Value> { serde_json::from_slice(&fs::read(directory.join("report.json")).ok()?).ok() };
+        if let Some(report) = read() {
+            return Ok(report);
+        }
+        run(scene, &directory)?;
+        read().ok_or_else(|| "the run left no report".to_owned())
+    }
+}
+
+/// One scene on one thread into an empty directory.
+fn run(scene: &Value, directory: &Path) -> Result<(), String> {
+    let system = |error: io::Error| error.to_string();
+    if directory.exists() {
+        fs::remove_dir_all(directory).map_err(system)?;
+    }
+    fs::create_dir_all(directory).map_err(system)?;
+    let allowance = Allowance { threads: 1, memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4 };
+    let body = body::parse(&json!({"scene": scene}), allowance, |_| None).map_err(|violations| {
+        violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
+    })?;
+    let order = Order {
+        job: "verify".to_owned(),
+        epoch: 1,
+        body: body.resolved,
+        attempts_directory: directory.to_owned(),
+        may_start_afresh: true,
+        checkpoints: Vec::new(),
+        usage: Usage::default(),
+    };
+    match worker::run_attempt(&order, directory, &Control::default(), &mut Silent) {
+        Verdict::Succeeded => {
+            // The report is what is wanted; frames of large runs would fill the disk.
+            for part in ["frames", "checkpoints"] {
+                let _ = fs::remove_dir_all(directory.join(part));
+            }
+            Ok(())
+        }
+        Verdict::Failed { message, .. } => Err(message),
+        other => Err(format!("ended as {other:?}")),
+    }
+}
+
+struct Silent;
+
+impl RecordSink for Silent {
+    fn put(&mut self, _record: &Record, _durable: bool) -> io::Result<()> {
+        Ok(())
+    }
+}
