@@ -41,7 +41,12 @@ fn steps_allocate_nothing_after_warm_up() {
     let bodies = [
         json!({"kind": "redistance", "spacing": 0.03125, "repeat": 12}),
         json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 12}),
+        json!({"kind": "redistance", "spacing": 0.03125, "repeat": 12, "method": "remesh"}),
         json!({"kind": "vortex", "spacing": 0.03125, "steps": 12, "end_time": 0.5}),
+        json!({
+            "kind": "vortex", "spacing": 0.03125, "steps": 12, "end_time": 0.1,
+            "redistance": {"type": "every", "steps": 1}, "flow": {"type": "translation", "velocity": [1, 1]}
+        }),
         json!({
             "kind": "vortex", "spacing": 0.03125, "steps": 12, "end_time": 0.1, "field": "overwrite",
             "flow": {"type": "translation", "velocity": [1, 1]}

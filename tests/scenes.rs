@@ -28,6 +28,17 @@ fn bodies() -> Vec<Value> {
         json!({"field": "overwrite", "redistance": {"type": "every", "steps": 5}, "integrator": "tvd_rk2"}),
     ));
     bodies.push(vortex(json!({"redistance": {"type": "every", "steps": 4}, "integrator": "dopri5", "jitter": 0.2})));
+    bodies.push(vortex(json!({"redistance": {"type": "every", "steps": 3}, "method": "pcp"})));
+    bodies.push(json!({
+        "kind": "vortex", "spacing": 0.05, "band_h": 6, "end_time": 0.5, "steps": 5, "flow": "vortex_3d",
+        "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15},
+        "redistance": {"type": "every", "steps": 2}
+    }));
+    for kernel in ["lambda44", "gaussian"] {
+        bodies.push(json!({
+            "kind": "redistance", "spacing": 0.05, "repeat": 3, "method": {"type": "remesh", "kernel": kernel}
+        }));
+    }
     bodies.push(vortex(json!({"flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3}})));
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({

@@ -93,7 +93,7 @@ pub fn rows() -> Rows {
     );
 
     let ellipsoid = json!({"kind": "redistance", "dimension": 3, "band_h": 12, "method": pcp(4, 2.4)});
-    let space = [8, 12, 16, 24, 32, 48];
+    let space = [16, 24, 32, 48, 64];
     for (name, paper, least) in
         [("phi", "4.9", 4.9), ("closest_point", "4.8", 4.9), ("normal", "3.8", 3.9), ("curvature", "3.0", 2.9)]
     {

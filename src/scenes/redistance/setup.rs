@@ -166,7 +166,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
     }
 
     fn estimate(&self) -> Estimate {
-        let reach = self.half_band.max(self.method.reach_h::<D>() * self.lattice.spacing);
+        let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
+        let reach = self.half_band.max(self.method.reach_h::<D>() * self.lattice.spacing) + beyond;
         let particles = shapes::surface::<D>(&self.shape, "/shape")
             .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing));
         Estimate {

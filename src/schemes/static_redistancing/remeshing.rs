@@ -74,7 +74,8 @@ pub fn grid_method() -> PcpMethod {
 
 /// The nodes of the grid and the interpolation to them.
 pub struct Remeshing<const D: usize> {
-    kernel: RemeshingKernel,
+    weighting: (bool, bool),
+    kernel: Box<dyn SmoothingKernel<D>>,
     spacing: f64,
     nodes: Vec<Vector<D>>,
     values: Vec<f64>,
@@ -97,7 +98,8 @@ impl<const D: usize> Remeshing<D> {
         let nodes = grid.points_near(low, high, reach, distance, interrupt);
         let values = vec![0.0; nodes.len()];
         let cells = CellList::new(Domain::unbounded());
-        Self { kernel, spacing, nodes, values, volumes: Vec::new(), cells }
+        let (weighting, kernel) = (kernel.weighting(), kernel.kernel::<D>(spacing));
+        Self { weighting, kernel, spacing, nodes, values, volumes: Vec::new(), cells }
     }
 
     /// The nodes.
@@ -127,8 +129,8 @@ impl<const D: usize> Remeshing<D> {
         level: &[f64],
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
-        let kernel = self.kernel.kernel::<D>(self.spacing);
-        let (by_volume, is_normalized) = self.kernel.weighting();
+        let kernel = &self.kernel;
+        let (by_volume, is_normalized) = self.weighting;
         let support = kernel.support();
         self.cells.rebuild(positions.iter().copied(), support);
         let cells = &self.cells;
