@@ -4,11 +4,13 @@
 //! the list of restart-safe fields all come from that declaration.
 
 pub mod check;
+pub mod cloud;
 pub mod json_schema;
 pub mod rows;
 pub mod schema;
 
 pub use check::{Violation, check};
+pub use cloud::{Cloud, CloudReference, Clouds};
 pub use rows::Rows;
 pub use schema::{Default as DefaultValue, Kind, Parameter, Variant};
 
@@ -47,7 +49,12 @@ pub trait Scene: Send + Sync {
     /// Fields that frames can show.
     fn field_names(&self) -> Vec<&'static str>;
 
-    /// Size of the run.
+    /// Points from outside that the scene needs to be built.
+    fn clouds(&self) -> Vec<CloudReference> {
+        Vec::new()
+    }
+
+    /// Size of the run; without the points that come from outside.
     fn estimate(&self) -> Estimate;
 
     /// The simulation at its start. Memory for particles is allocated here.
@@ -66,6 +73,8 @@ pub struct BuildContext {
     pub interrupt: Interrupt,
     /// Counter of CPU seconds.
     pub cpu_clock: CpuClock,
+    /// Points from outside, as [`Scene::clouds`] names them.
+    pub clouds: Clouds,
 }
 
 /// The size of a run, before it is made.

@@ -6,9 +6,11 @@
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
+use meniscus::parallel::Interrupt;
 use meniscus::scene::schema::{Default, Kind, Parameter};
+use meniscus::scene::{BuildContext, Cloud, Clouds};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::{OutputPlan, State};
+use meniscus::simulation::{CpuClock, OutputPlan, State};
 use serde_json::{Value, json};
 use support::{build, pool, scene};
 
@@ -157,10 +159,11 @@ fn a_state_of_another_scene_is_refused_and_nothing_changes() {
 
 #[test]
 fn an_interrupt_drops_the_step() {
-    let context = meniscus::scene::BuildContext {
+    let context = BuildContext {
         plan: PLAN,
-        interrupt: meniscus::parallel::Interrupt::default(),
-        cpu_clock: meniscus::simulation::CpuClock::still(),
+        interrupt: Interrupt::default(),
+        cpu_clock: CpuClock::still(),
+        clouds: Clouds::new(),
     };
     let mut simulation = scene(&json!({"kind": "redistance"})).build(context.clone()).unwrap();
     context.interrupt.raise();
@@ -237,4 +240,63 @@ fn estimates_of_particles_are_within_five_per_cent() {
         let made = build(&body, PLAN).particle_count() as f64;
         assert!((estimated / made - 1.0).abs() < 0.05, "{estimated} for {made}: {body}");
     }
+}
+
+#[test]
+fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
+    // Particles of a circle with a level that is no distance, as somebody else's program might write them.
+    let circle = |x: f64, y: f64| (x - 0.5).hypot(y - 0.5) - 0.25;
+    let mut cloud = Cloud { positions: Vec::new(), level: Some(Vec::new()) };
+    for k in 0..1600 {
+        let (x, y) = (f64::from(k % 40) * 0.025, f64::from(k / 40) * 0.025 + 0.001 * f64::from(k % 7));
+        cloud.positions.push([x, y, 0.0]);
+        let level = circle(x, y) * (1.3 + 0.4 * x);
+        // Whoever has no level knows nothing of the surface.
+        cloud.level.as_mut().unwrap().push(if level.abs() < 0.2 { level } else { f64::NAN });
+    }
+    let queries = Cloud { positions: vec![[0.5, 0.5, 0.0], [0.9, 0.5, 0.0], [0.5, 0.3, 0.0]], level: None };
+    let clouds = Clouds::from([("/shape", cloud), ("/queries", queries)]);
+    let points = json!({"type": "points", "file": "circle.vtkhdf"});
+    let with = |scene_json: Value| {
+        let context = BuildContext {
+            plan: PLAN,
+            interrupt: Interrupt::default(),
+            cpu_clock: CpuClock::still(),
+            clouds: clouds.clone(),
+        };
+        scene(&scene_json).build(context)
+    };
+    pool(2).install(|| {
+        let own = json!({"kind": "redistance", "spacing": 0.025, "shape": points.clone()});
+        let mut simulation = with(own.clone()).unwrap();
+        simulation.step().unwrap();
+        let state = simulation.state();
+        let (phi, places) = (state.reals("phi").unwrap(), state.reals("position").unwrap());
+        for (phi, x) in phi.iter().zip(places.chunks(2)) {
+            assert!((phi - circle(x[0], x[1])).abs() < 1e-5, "{phi} at {x:?}");
+        }
+        assert!(simulation.report().errors.is_empty(), "nobody knows the exact surface");
+        let mut asked = own.clone();
+        asked["queries"] = points.clone();
+        let mut simulation = with(asked).unwrap();
+        simulation.step().unwrap();
+        let phi = simulation.state().reals("phi").unwrap().to_vec();
+        for (phi, exact) in phi.iter().zip([-0.25, 0.15, -0.05]) {
+            assert!((phi - exact).abs() < 1e-5, "{phi} for {exact}");
+        }
+        let flow = json!({"type": "rotation", "center": [0, 0], "angular_velocity": 1});
+        let carried = json!({
+            "kind": "vortex", "spacing": 0.025, "shape": points.clone(), "flow": flow, "end_time": 1, "steps": 30
+        });
+        let mut simulation = with(carried).unwrap();
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+        }
+        assert!(simulation.health().volume_drift.unwrap().abs() < 1e-4);
+        // What does not fit is refused in words.
+        let mut wrong = own.clone();
+        wrong["spacing"] = json!(0.5);
+        let found = with(wrong).err().unwrap();
+        assert!(found[0].detail.contains("apart"), "{}", found[0].detail);
+    });
 }

@@ -52,6 +52,6 @@ impl Config {
     #[must_use]
     pub fn allowance(&self) -> Allowance {
         let memory = process::total_memory().unwrap_or(4 << 30);
-        Allowance { threads: self.threads as u64, memory_bytes: memory / 5 * 4 / self.slots as u64 }
+        Allowance { threads: self.threads as u64, memory_bytes: memory / 5 * 4 / self.slots as u64, local_files: false }
     }
 }

@@ -70,6 +70,7 @@ fn resolve(spec: &Value, threads: Option<usize>) -> Result<Value, RunError> {
     let allowance = Allowance {
         threads: threads.unwrap_or(cores) as u64,
         memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4,
+        local_files: true,
     };
     let body = body::parse(spec, allowance, |_| None).map_err(|violations| {
         let lines: Vec<String> = violations

@@ -19,6 +19,8 @@ pub struct Allowance {
     pub threads: u64,
     /// Memory a job may ask for; also the default.
     pub memory_bytes: u64,
+    /// Whether scenes may name files of this machine: the one who runs them in the foreground may read them anyway.
+    pub local_files: bool,
 }
 
 /// A job body with every default, and its scene.
@@ -159,6 +161,11 @@ pub fn parse(
     let scene = scene_json.and_then(|value| {
         understand(&value, SCENES).map_err(|found| errors.extend(found.into_iter().map(|v| v.under(prefix)))).ok()
     });
+    for cloud in scene.iter().flat_map(|scene| scene.clouds()).filter(|_| !allowance.local_files) {
+        let detail = "a local file is valid for `meniscus run` alone; this service takes no uploads yet";
+        let at = format!("{prefix}{}", cloud.pointer);
+        errors.push(Violation::new(at, "not_here", detail, &json!(cloud.file), Value::Null));
+    }
     let mut output = section(given, "output", OUTPUT, Some(&OUTPUT_FIELDS), &mut errors);
     let fields = output_fields(given, scene.as_deref(), &mut errors);
     output.insert("fields".into(), fields);
@@ -394,13 +401,22 @@ mod tests {
     use super::{Allowance, RestartSource, Wishes, parse};
     use serde_json::{Value, json};
 
-    const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30 };
+    const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30, local_files: false };
 
     fn errors(body: &Value) -> Vec<(String, String)> {
         match parse(body, ALLOWANCE, |_| None) {
             Ok(_) => Vec::new(),
             Err(found) => found.into_iter().map(|v| (v.pointer, v.code.to_owned())).collect(),
         }
+    }
+
+    #[test]
+    fn files_of_this_machine_are_for_the_foreground_alone() {
+        let spec = json!({"scene": {"kind": "redistance", "shape": {"type": "points", "file": "/etc/passwd"}}});
+        let found = parse(&spec, ALLOWANCE, |_| None).err().unwrap();
+        assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/shape", "not_here"));
+        let foreground = Allowance { local_files: true, ..ALLOWANCE };
+        assert!(parse(&spec, foreground, |_| None).is_ok());
     }
 
     #[test]

@@ -150,7 +150,8 @@ fn run(scene: &Value, directory: &Path) -> Result<(), String> {
         fs::remove_dir_all(directory).map_err(system)?;
     }
     fs::create_dir_all(directory).map_err(system)?;
-    let allowance = Allowance { threads: 1, memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4 };
+    let allowance =
+        Allowance { threads: 1, memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4, local_files: false };
     let body = body::parse(&json!({"scene": scene}), allowance, |_| None).map_err(|violations| {
         violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
     })?;

@@ -14,7 +14,7 @@ use crate::order::{Order, StartCheckpoint};
 use crate::process;
 use crate::records::{Record, RecordSink, Verdict};
 use crate::report;
-use meniscus::scene::{BuildContext, understand};
+use meniscus::scene::{BuildContext, CloudReference, Clouds, Scene, understand};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
 use meniscus::simulation::{CpuClock, RunError, Simulation, State, StepError, run};
@@ -99,6 +99,18 @@ fn storage_verdict(error: &(dyn std::error::Error + 'static), directory: &Path) 
     Verdict::Failed { reason: Reason::StorageIo, message: error.to_string() }
 }
 
+/// The points that a scene takes from files.
+fn read_clouds(scene: &dyn Scene) -> Result<Clouds, Failure> {
+    let read = |cloud: CloudReference| {
+        let found = vtkhdf::read_cloud(Path::new(&cloud.file));
+        let damaged = |cause: &dyn std::fmt::Display| {
+            Failure::Known(Reason::InputDamaged, format!("{} ({}): {cause}", cloud.pointer, cloud.file))
+        };
+        found.map(|points| (cloud.pointer, points)).map_err(|error| damaged(&error))
+    };
+    scene.clouds().into_iter().map(read).collect()
+}
+
 fn attempt(
     order: &Order,
     directory: &Path,
@@ -115,13 +127,16 @@ fn attempt(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
     log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
     pool.install(|| {
+        let clouds = read_clouds(scene.as_ref())?;
         let context = BuildContext {
+            clouds,
             plan: wishes.plan(),
             interrupt: control.interrupt().clone(),
             cpu_clock: CpuClock(process::cpu_seconds),
         };
         let mut simulation = scene.build(context).map_err(|found| {
-            Failure::Known(Reason::InputDamaged, found.first().map_or_else(String::new, |v| v.detail.clone()))
+            let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
+            Failure::Known(Reason::InputDamaged, cause)
         })?;
         if control.interrupt().is_raised() {
             return Err(Failure::Canceled);

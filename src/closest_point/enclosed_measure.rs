@@ -63,10 +63,6 @@ pub fn enclosed_measure<const D: usize>(surface: &LevelSurface<D>, interrupt: &I
     Ok(sums.iter().sum())
 }
 
-/// Distance from the surface, in spacings, beyond which the nearest particle tells the side and not the nearest foot:
-/// of a surface with gaps, a foot at the rim of a gap faces nowhere in particular.
-const FAR: f64 = 2.0;
-
 /// The inside part of one cubic cell.
 fn inside_of_cell<const D: usize>(surface: &LevelSurface<D>, corner: &Vector<D>, edge: f64, halvings: u32) -> f64 {
     let whole = edge.powi(D as i32);
@@ -74,9 +70,7 @@ fn inside_of_cell<const D: usize>(surface: &LevelSurface<D>, corner: &Vector<D>,
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();
     let Some(foot) = surface.query(&centre, f64::INFINITY) else { return 0.0 };
     if foot.distance >= half_diagonal {
-        let far = foot.distance > FAR * surface.spacing();
-        let is_inside = if far { surface.is_nearest_particle_inside(&centre) } else { !foot.is_outside };
-        return if is_inside { whole } else { 0.0 };
+        return if surface.is_inside(&centre, &foot) { whole } else { 0.0 };
     }
     if halvings == 0 {
         let signed = if foot.is_outside { foot.distance } else { -foot.distance };

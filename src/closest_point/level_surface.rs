@@ -17,6 +17,9 @@ pub enum LevelSurface<const D: usize> {
     Material(Box<MaterialSurface<D>>),
 }
 
+/// Distance from the surface, in spacings, beyond which the nearest particle tells the side and not the nearest foot.
+const FAR: f64 = 2.0;
+
 macro_rules! each {
     ($self:ident, $surface:ident => $value:expr) => {
         match $self {
@@ -98,6 +101,14 @@ impl<const D: usize> LevelSurface<D> {
     #[must_use]
     pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
         each!(self, surface => surface.is_nearest_particle_inside(x))
+    }
+
+    /// Whether a point lies inside, given its closest point. Away from the surface the nearest particle tells it: of a
+    /// surface with gaps, a foot at the rim of a gap faces nowhere in particular.
+    #[must_use]
+    pub fn is_inside(&self, x: &Vector<D>, foot: &ClosestPoint<D>) -> bool {
+        let is_far = foot.distance > FAR * self.spacing();
+        if is_far { self.is_nearest_particle_inside(x) } else { !foot.is_outside }
     }
 
     /// What did not go the plain way so far.

@@ -155,6 +155,8 @@ fn check_value(kind: &Kind, value: &Value, pointer: &str, violations: &mut Vec<V
                 _ => refuse(violations, pointer, "type", "a list of two or three numbers is needed", value, kind),
             }
         }
+        Kind::Text if value.as_str().is_some_and(|text| !text.is_empty()) => Some(value.clone()),
+        Kind::Text => refuse(violations, pointer, "type", "a text is needed", value, kind),
         Kind::Flag if value.is_boolean() => Some(value.clone()),
         Kind::Flag => refuse(violations, pointer, "type", "true or false is needed", value, kind),
         Kind::Word(words) => match value.as_str() {
@@ -270,6 +272,7 @@ pub fn describe(kind: &Kind) -> Value {
         Kind::Choices { variants, least } => {
             json!({"at_least": least, "each": variants().iter().map(|v| v.name).collect::<Vec<_>>()})
         }
+        Kind::Text => json!("a text"),
         Kind::Flag => json!([true, false]),
         Kind::Word(words) => json!(words),
     }

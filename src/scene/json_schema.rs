@@ -88,6 +88,7 @@ fn of_value(kind: &Kind) -> Map<String, Value> {
         Kind::Choices { variants, least } => {
             json!({"type": "array", "minItems": least, "items": choice(variants())})
         }
+        Kind::Text => json!({"type": "string", "minLength": 1}),
         Kind::Flag => json!({"type": "boolean"}),
         Kind::Word(words) => json!({"enum": words}),
     };

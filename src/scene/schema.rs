@@ -51,6 +51,8 @@ pub enum Kind {
     },
     /// True or false.
     Flag,
+    /// Text, such as the name of a file.
+    Text,
     /// Two or three numbers.
     Vector {
         /// Whether all must be positive.

@@ -33,7 +33,7 @@ const SIZE: Parameter =
     Parameter::new("size", "full edge lengths", Kind::Vector { positive: true }, DefaultValue::Required);
 
 macro_rules! plain_shapes {
-    ($($more:expr)?) => {
+    ($($more:expr),*) => {
         &[
             Variant { name: "circle", doc: "circle (2D)", parameters: BALL },
             Variant { name: "sphere", doc: "sphere (3D)", parameters: BALL },
@@ -74,13 +74,13 @@ macro_rules! plain_shapes {
                     positive("neck_radius", "radius of the neck, less than the balls'"),
                 ],
             },
-            $($more)?
+            $($more,)*
         ]
     };
 }
 
 static PLAIN: &[Variant] = plain_shapes!();
-static ALL: &[Variant] = plain_shapes!(Variant {
+const UNION: Variant = Variant {
     name: "union",
     doc: "separate shapes taken together",
     parameters: &[Parameter::new(
@@ -89,7 +89,16 @@ static ALL: &[Variant] = plain_shapes!(Variant {
         Kind::Choices { variants: || PLAIN, least: 1 },
         DefaultValue::Required,
     )],
-});
+};
+
+/// Points from a file: frames of earlier runs are such files.
+pub const POINTS: Variant = Variant {
+    name: "points",
+    doc: "points of a VTKHDF file (valid for `meniscus run` alone); as a shape with PointData/phi, which is their level",
+    parameters: &[Parameter::new("file", "path of the file", Kind::Text, DefaultValue::Required)],
+};
+
+static ALL: &[Variant] = plain_shapes!(UNION, POINTS);
 
 /// The variants of `shape`.
 #[must_use]

@@ -6,4 +6,4 @@ mod system;
 
 pub use reference::ExactMotion;
 pub use simulation::AdvectedLevelSet;
-pub use system::{AdvectedSystem, FieldChoice, RedistanceWhen};
+pub use system::{AdvectedParts, AdvectedSystem, FieldChoice, RedistanceWhen, Start};

@@ -7,4 +7,4 @@ mod system;
 
 pub use remeshing::{RemeshingKernel, grid_method};
 pub use simulation::StaticRedistancing;
-pub use system::{InitialLevel, StaticSystem};
+pub use system::{InitialLevel, StaticParts, StaticSystem};

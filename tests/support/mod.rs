@@ -1,7 +1,7 @@
 //! What the tests of the engine share: a scene from JSON, run to its end in a pool of its own.
 
 use meniscus::parallel::Interrupt;
-use meniscus::scene::{BuildContext, Scene, understand};
+use meniscus::scene::{BuildContext, Clouds, Scene, understand};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, OutputPlan, Report, Simulation};
 use serde_json::Value;
@@ -13,7 +13,8 @@ pub fn scene(value: &Value) -> Box<dyn Scene> {
 }
 
 pub fn build(value: &Value, plan: OutputPlan) -> Box<dyn Simulation> {
-    let context = BuildContext { plan, interrupt: Interrupt::default(), cpu_clock: CpuClock::still() };
+    let context =
+        BuildContext { plan, interrupt: Interrupt::default(), cpu_clock: CpuClock::still(), clouds: Clouds::new() };
     scene(value).build(context).unwrap()
 }
 

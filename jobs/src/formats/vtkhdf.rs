@@ -5,6 +5,7 @@
 use super::hdf5_file::write;
 use hdf5::types::FixedAscii;
 use hdf5::{File, Group};
+use meniscus::scene::Cloud;
 use meniscus::simulation::{FieldValues, Fields};
 use std::path::Path;
 
@@ -87,4 +88,36 @@ pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
         phi: phi.read_raw()?,
         surface,
     }))
+}
+
+/// Reads points, and `phi` where there is one, from a frame or any file that is laid out like one.
+///
+/// # Errors
+/// Whatever libhdf5 reports, and points that are no triples.
+pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
+    let root = File::open(path)?.group("VTKHDF")?;
+    let numbers: Vec<f64> = root.dataset("Points")?.read_raw()?;
+    let (positions, rest) = numbers.as_chunks::<3>();
+    if !rest.is_empty() {
+        return Err(CloudError::NotTriples { numbers: numbers.len() });
+    }
+    let level = match root.dataset("PointData/phi") {
+        Ok(phi) => Some(phi.read_raw()?),
+        Err(_) => None,
+    };
+    Ok(Cloud { positions: positions.to_vec(), level })
+}
+
+/// Why a file holds no points.
+#[derive(Debug, thiserror::Error)]
+pub enum CloudError {
+    /// HDF5.
+    #[error("{0}")]
+    Hdf5(#[from] hdf5::Error),
+    /// Coordinates.
+    #[error("/VTKHDF/Points holds {numbers} numbers, which are no triples")]
+    NotTriples {
+        /// How many.
+        numbers: usize,
+    },
 }

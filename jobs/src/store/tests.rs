@@ -18,7 +18,7 @@ fn store() -> (tempfile::TempDir, Store) {
 fn submit(store: &Store, extra: &serde_json::Value) -> JobRow {
     let mut spec = json!({"scene": {"kind": "redistance"}});
     spec.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
-    let allowance = Allowance { threads: 2, memory_bytes: 1 << 32 };
+    let allowance = Allowance { threads: 2, memory_bytes: 1 << 32, local_files: false };
     store.submit(&body::parse(&spec, allowance, |_| None).ok().unwrap()).unwrap()
 }
 

@@ -60,7 +60,8 @@ fn end_of(stand_in: StandIn, until: impl Fn(&JobRow) -> bool) -> JobRow {
     let directory = tempfile::tempdir().unwrap();
     let store = Arc::new(Store::open(directory.path()).unwrap());
     let spec = json!({"scene": {"kind": "redistance"}, "limits": {"memory_bytes": 64_000_000}});
-    let body = body::parse(&spec, Allowance { threads: 1, memory_bytes: 1 << 33 }, |_| None).ok().unwrap();
+    let body =
+        body::parse(&spec, Allowance { threads: 1, memory_bytes: 1 << 33, local_files: false }, |_| None).ok().unwrap();
     let id = store.submit(&body).unwrap().id;
     let supervisor = Supervisor::new(Arc::clone(&store), Box::new(stand_in), Settings::with_slots(1));
     let handle = supervisor.handle();

@@ -3,8 +3,8 @@
 use meniscus::scene::rows::Figure;
 use plotters::coord::Shift;
 use plotters::prelude::{
-    ChartBuilder, Circle, DrawingArea, IntoDrawingArea, IntoLogRange, Palette, Palette99, PathElement, SVGBackend,
-    SeriesLabelPosition, ShapeStyle, WHITE,
+    ChartBuilder, Circle, DrawingArea, IntoDrawingArea, IntoFont, IntoLogRange, Palette, Palette99, PathElement,
+    SVGBackend, ShapeStyle, Text, WHITE,
 };
 use plotters::style::{BLACK, Color};
 use std::ops::Range;
@@ -21,6 +21,11 @@ pub struct Point {
     pub error: f64,
 }
 
+/// The look of line k.
+fn style(k: usize) -> ShapeStyle {
+    ShapeStyle::from(&Palette99::pick(k).to_rgba()).stroke_width(2)
+}
+
 type Lines = [(String, Vec<Point>)];
 
 /// Draws both pictures side by side.
@@ -28,12 +33,19 @@ type Lines = [(String, Vec<Point>)];
 /// # Errors
 /// A message when the file cannot be written.
 pub fn draw(path: &Path, figure: &Figure, lines: &Lines) -> Result<(), String> {
-    let root = SVGBackend::new(path, (1240, 560)).into_drawing_area();
+    let root = SVGBackend::new(path, (1480, 560)).into_drawing_area();
     root.fill(&WHITE).map_err(|e| e.to_string())?;
     let root = root.titled(figure.title, ("sans-serif", 22)).map_err(|e| e.to_string())?;
-    let panels = root.split_evenly((1, 2));
-    panel(&panels[0], lines, "spacing h", |p| p.spacing, false)?;
-    panel(&panels[1], lines, "CPU seconds of redistancing", |p| p.seconds, true)?;
+    let (charts, legend) = root.split_horizontally(1200);
+    let panels = charts.split_evenly((1, 2));
+    panel(&panels[0], lines, "spacing h", |p| p.spacing)?;
+    panel(&panels[1], lines, "CPU seconds of redistancing", |p| p.seconds)?;
+    for (k, (label, _)) in lines.iter().enumerate() {
+        let y = 60 + 24 * k as i32;
+        legend.draw(&PathElement::new(vec![(8, y), (34, y)], style(k))).map_err(|e| e.to_string())?;
+        let font = ("sans-serif", 15).into_font();
+        legend.draw(&Text::new(label.clone(), (42, y - 8), font)).map_err(|e| e.to_string())?;
+    }
     root.present().map_err(|e| e.to_string())
 }
 
@@ -45,13 +57,7 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     if low <= high { low / 2.0..high * 2.0 } else { 0.1..10.0 }
 }
 
-fn panel(
-    area: &DrawingArea<SVGBackend, Shift>,
-    lines: &Lines,
-    axis: &str,
-    x: fn(&Point) -> f64,
-    with_legend: bool,
-) -> Result<(), String> {
+fn panel(area: &DrawingArea<SVGBackend, Shift>, lines: &Lines, axis: &str, x: fn(&Point) -> f64) -> Result<(), String> {
     let points = || lines.iter().flat_map(|(_, points)| points);
     let (across, up) = (range(points().map(x)), range(points().map(|p| p.error)));
     let mut chart = ChartBuilder::on(area)
@@ -63,32 +69,20 @@ fn panel(
     chart
         .configure_mesh()
         .x_desc(axis)
+        .x_labels(6)
+        .y_labels(10)
         .y_desc("error")
         .x_label_formatter(&|v| format!("{v:.0e}"))
         .y_label_formatter(&|v| format!("{v:.0e}"))
         .light_line_style(BLACK.mix(0.05))
         .draw()
         .map_err(|e| e.to_string())?;
-    for (k, (label, points)) in lines.iter().enumerate() {
-        let colour = Palette99::pick(k).to_rgba();
-        let style = ShapeStyle::from(&colour).stroke_width(2);
+    for (k, (_, points)) in lines.iter().enumerate() {
         let places: Vec<(f64, f64)> = points.iter().map(|p| (x(p), p.error)).collect();
-        chart
-            .draw_series(std::iter::once(PathElement::new(places.clone(), style)))
-            .map_err(|e| e.to_string())?
-            .label(label.clone())
-            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style));
-        let dots = places.iter().map(|place| Circle::new(*place, 4, style.filled()));
+        let line = PathElement::new(places.clone(), style(k));
+        chart.draw_series(std::iter::once(line)).map_err(|e| e.to_string())?;
+        let dots = places.iter().map(|place| Circle::new(*place, 4, style(k).filled()));
         chart.draw_series(dots).map_err(|e| e.to_string())?;
-    }
-    if with_legend {
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK.mix(0.3))
-            .draw()
-            .map_err(|e| e.to_string())?;
     }
     Ok(())
 }

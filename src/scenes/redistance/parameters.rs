@@ -52,7 +52,20 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         DefaultValue::Json("1"),
     ),
     Parameter::new("method", "the method", Kind::Choice(method_variants), DefaultValue::Json("\"pcp\"")),
+    Parameter::new(
+        "queries",
+        "where to ask for the distance; with points of a file frames show those",
+        Kind::Choice(query_variants),
+        DefaultValue::Json("\"particles\""),
+    ),
 ];
+
+static QUERIES: [Variant; 2] =
+    [Variant { name: "particles", doc: "the particles themselves", parameters: &[] }, shapes::POINTS];
+
+fn query_variants() -> &'static [Variant] {
+    &QUERIES
+}
 
 static INITIAL: &[Variant] = &[
     Variant { name: "quadric", doc: "√(Σ x²/A²) − 1 of an ellipse or ellipsoid", parameters: &[] },
@@ -140,4 +153,5 @@ pub(super) struct Written {
     pub band: Option<f64>,
     pub repeat: u64,
     pub method: Value,
+    pub queries: Value,
 }

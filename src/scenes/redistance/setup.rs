@@ -4,11 +4,12 @@ use super::parameters::Written;
 use crate::closest_point::PcpMethod;
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Surface, Vector};
+use crate::scene::cloud::{self, CloudReference};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
 use crate::schemes::static_redistancing::{
-    InitialLevel, RemeshingKernel, StaticRedistancing, StaticSystem, grid_method,
+    InitialLevel, RemeshingKernel, StaticParts, StaticRedistancing, StaticSystem, grid_method,
 };
 use crate::simulation::Simulation;
 use serde_json::{Value, json};
@@ -23,6 +24,7 @@ struct RedistanceScene<const D: usize> {
     initial: InitialLevel<D>,
     half_band: f64,
     repeats: u64,
+    clouds: Vec<CloudReference>,
 }
 
 pub(super) fn understand(parameters: &Value) -> Understood {
@@ -43,7 +45,20 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         json!({"type": "ellipsoid", "center": null, "semi_axes": [0.75, 0.5, 0.5]})
     };
     let shape = written.shape.clone().unwrap_or(default_shape);
-    let surface = shapes::surface::<D>(&shape, "/shape").map_err(|found| violations.extend(found)).ok();
+    let of_points = cloud::reference(&shape, "/shape");
+    let surface = match &of_points {
+        Some(_) => None,
+        None => shapes::surface::<D>(&shape, "/shape").map_err(|found| violations.extend(found)).ok(),
+    };
+    let asked = cloud::reference(&written.queries, "/queries");
+    if asked.is_some() && written.repeat > 1 {
+        let detail = "points that are only asked about have no level to be redistanced again";
+        violations.push(Violation::new("/repeat", "conflict", detail, &json!(written.repeat), json!(1)));
+    }
+    if written.method["type"] == "remesh" && (asked.is_some() || of_points.is_some()) {
+        let detail = "the remeshing baseline knows particles about a shape alone";
+        violations.push(Violation::new("/method", "conflict", detail, &json!("remesh"), json!(["pcp"])));
+    }
     // Overwritten every step: distances become the input of the next redistancing.
     let default_ratio = if written.repeat > 1 { 2.0 } else { 1.5 };
     let remeshing = (written.method["type"] == "remesh").then(|| {
@@ -74,7 +89,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         "distance" => InitialLevel::Distance,
         "scaled" => InitialLevel::Scaled,
         _ => {
-            if !is_ellipse {
+            if !is_ellipse && of_points.is_none() {
                 let detail = "the quadric belongs to circles, spheres, ellipses and ellipsoids";
                 violations.push(Violation::new(
                     "/initial",
@@ -87,6 +102,10 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
             quadric::<D>(&shape)
         }
     };
+    if let (Some(_), Some(given)) = (&of_points, &written.initial) {
+        let detail = "points come with their level";
+        violations.push(Violation::new("/initial", "conflict", detail, given, Value::Null));
+    }
     if written.band.is_some() && written.band_h.is_some() {
         let detail = "band_h is the band in multiples of h; give one of them";
         violations.push(Violation::new("/band", "conflict", detail, &json!(written.band), Value::Null));
@@ -121,6 +140,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         initial,
         half_band: 0.5 * band,
         repeats: written.repeat,
+        clouds: of_points.into_iter().chain(asked).collect(),
     }))
 }
 
@@ -165,6 +185,10 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         vec!["phi", "closest_point", "normal", "curvature", "particle_id"]
     }
 
+    fn clouds(&self) -> Vec<CloudReference> {
+        self.clouds.clone()
+    }
+
     fn estimate(&self) -> Estimate {
         let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
         let reach = self.half_band.max(self.method.reach_h::<D>() * self.lattice.spacing) + beyond;
@@ -180,19 +204,30 @@ impl<const D: usize> Scene for RedistanceScene<D> {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let surface = shapes::surface::<D>(&self.shape, "/shape")?;
         let name = if self.remeshing.is_some() { "remeshing to a grid, as given" } else { "pcp, as given" };
         let method = BTreeMap::from([("method", name.to_owned())]);
-        let system = StaticSystem::new(
-            surface,
-            &self.lattice,
-            self.method.clone(),
-            self.remeshing,
-            self.initial,
-            self.half_band,
-            self.repeats,
-            context.interrupt,
-        );
+        let parts = StaticParts {
+            spacing: self.lattice.spacing,
+            half_band: self.half_band,
+            repeats: self.repeats,
+            method: self.method.clone(),
+            remeshing: self.remeshing,
+        };
+        let clouds = &context.clouds;
+        let is_needed = |pointer: &str| self.clouds.iter().any(|cloud| cloud.pointer == pointer);
+        let mut system = if is_needed("/shape") {
+            let (points, levels) = cloud::points_with_levels::<D>(clouds, "/shape").map_err(|found| vec![found])?;
+            if let Some(found) = cloud::check_spacing(&points, parts.spacing) {
+                return Err(vec![found]);
+            }
+            StaticSystem::of_points(points, &levels, parts, context.interrupt)
+        } else {
+            let surface = shapes::surface::<D>(&self.shape, "/shape")?;
+            StaticSystem::about(surface, &self.lattice, self.initial, parts, context.interrupt)
+        };
+        if is_needed("/queries") {
+            system = system.asked_about(cloud::points::<D>(clouds, "/queries").map_err(|found| vec![found])?);
+        }
         Ok(Box::new(StaticRedistancing::new(system, context.cpu_clock, method)))
     }
 }

@@ -6,11 +6,14 @@ use crate::geometry::flows::{Rotation, SingleVortex, Translation, Vortex3d};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{self, Vector};
 use crate::scene::check;
+use crate::scene::cloud::{self, CloudReference};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::dimension::in_dimension;
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes};
-use crate::schemes::advected_level_set::{AdvectedLevelSet, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen};
+use crate::schemes::advected_level_set::{
+    AdvectedLevelSet, AdvectedParts, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen, Start,
+};
 use crate::simulation::Simulation;
 use crate::time::{FixedStep, PathIntegrator};
 use serde_json::{Map, Value, json};
@@ -29,6 +32,7 @@ struct VortexScene<const D: usize> {
     integrator: PathIntegrator,
     field: FieldChoice,
     when: RedistanceWhen,
+    clouds: Vec<CloudReference>,
 }
 
 /// Degree and neighbours of fits in initial positions, for a dual field: of the choices tried the least error at T/2
@@ -50,12 +54,15 @@ pub(super) fn understand(parameters: &Value) -> Understood {
 
 fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let mut violations = Vec::new();
-    match shapes::surface::<D>(&written.shape, "/shape") {
-        Ok(surface) => {
+    let of_points = cloud::reference(&written.shape, "/shape");
+    let surface = if of_points.is_some() { None } else { Some(shapes::surface::<D>(&written.shape, "/shape")) };
+    match surface {
+        None => {}
+        Some(Ok(surface)) => {
             let half_band = 0.5 * written.band_h * written.spacing;
             violations.extend(check_extent(surface.as_ref(), half_band, written.spacing));
         }
-        Err(found) => violations.extend(found),
+        Some(Err(found)) => violations.extend(found),
     }
     if let Err(found) = flow::<D>(&written.flow) {
         violations.push(found);
@@ -166,6 +173,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         },
         field,
         when,
+        clouds: of_points.into_iter().collect(),
     }))
 }
 
@@ -211,6 +219,10 @@ impl<const D: usize> Scene for VortexScene<D> {
         names
     }
 
+    fn clouds(&self) -> Vec<CloudReference> {
+        self.clouds.clone()
+    }
+
     fn estimate(&self) -> Estimate {
         let particles = shapes::surface::<D>(&self.shape, "/shape")
             .map_or(0, |surface| band_particles(surface.as_ref(), self.half_band, self.lattice.spacing));
@@ -224,18 +236,28 @@ impl<const D: usize> Scene for VortexScene<D> {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let surface = shapes::surface::<D>(&self.shape, "/shape")?;
         let flow = flow::<D>(&self.flow).map_err(|violation| vec![violation])?;
-        let system = AdvectedSystem::new(
-            ExactMotion::new(surface, flow),
-            &self.lattice,
-            self.method.clone(),
-            self.half_band,
-            self.integrator,
-            self.field,
-            self.when,
-            context.interrupt,
-        );
+        let parts = AdvectedParts {
+            spacing: self.lattice.spacing,
+            half_band: self.half_band,
+            integrator: self.integrator,
+            field: self.field,
+            when: self.when,
+            method: self.method.clone(),
+        };
+        let (start, surface) = if self.clouds.is_empty() {
+            let surface = shapes::surface::<D>(&self.shape, "/shape")?;
+            let start = Start::about(surface.as_ref(), &self.lattice, self.half_band, &context.interrupt);
+            (start, Some(surface))
+        } else {
+            let (positions, level) =
+                cloud::points_with_levels::<D>(&context.clouds, "/shape").map_err(|found| vec![found])?;
+            if let Some(found) = cloud::check_spacing(&positions, parts.spacing) {
+                return Err(vec![found]);
+            }
+            (Start { positions, level }, None)
+        };
+        let system = AdvectedSystem::new(ExactMotion::new(surface, flow), start, parts, context.interrupt);
         Ok(Box::new(AdvectedLevelSet::new(system, self.fixed, context.plan, context.cpu_clock, self.chosen.clone())))
     }
 }

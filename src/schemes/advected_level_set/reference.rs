@@ -8,13 +8,14 @@ use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
 /// A surface and the flow that moves it.
 pub struct ExactMotion<const D: usize> {
-    surface: Box<dyn Surface<D>>,
+    surface: Option<Box<dyn Surface<D>>>,
     flow: Box<dyn Flow<D>>,
 }
 
 /// The exact surface at one time.
 pub struct ExactFront<'a, const D: usize> {
     motion: &'a ExactMotion<D>,
+    surface: &'a dyn Surface<D>,
     time: f64,
     /// None where the surface at this time is known by its formula (at the start, after a return, in rigid motion).
     advected: Option<AdvectedFront<D>>,
@@ -40,16 +41,16 @@ const MOST_POINTS: f64 = 2e5;
 const POINTS_PER_SPACING: f64 = 200.0;
 
 impl<const D: usize> ExactMotion<D> {
-    /// A surface at time 0 and its flow.
+    /// A surface at time 0, where it is known, and its flow.
     #[must_use]
-    pub fn new(surface: Box<dyn Surface<D>>, flow: Box<dyn Flow<D>>) -> Self {
+    pub fn new(surface: Option<Box<dyn Surface<D>>>, flow: Box<dyn Flow<D>>) -> Self {
         Self { surface, flow }
     }
 
-    /// The surface at time 0.
+    /// The surface at time 0, where it is known.
     #[must_use]
-    pub fn surface(&self) -> &dyn Surface<D> {
-        self.surface.as_ref()
+    pub fn surface(&self) -> Option<&dyn Surface<D>> {
+        self.surface.as_deref()
     }
 
     /// The flow.
@@ -61,17 +62,18 @@ impl<const D: usize> ExactMotion<D> {
     /// The surface at a time, resolved for particles of a spacing; None where it is not known.
     #[must_use]
     pub fn front(&self, time: f64, spacing: f64) -> Option<ExactFront<'_, D>> {
+        let surface = self.surface()?;
         let returned = self.flow.return_time().is_some_and(|period| {
             let turns = time / period;
             (turns - turns.round()).abs() < 1e-9
         });
         let by_formula = time == 0.0 || returned || self.flow.is_rigid();
         if by_formula {
-            return Some(ExactFront { motion: self, time, advected: None });
+            return Some(ExactFront { motion: self, surface, time, advected: None });
         }
-        let (low, high) = self.surface.bounding_box();
+        let (low, high) = surface.bounding_box();
         let perimeter = 4.0 * (high - low).max();
-        let outline = self.surface.outline((spacing / POINTS_PER_SPACING).max(perimeter / MOST_POINTS));
+        let outline = surface.outline((spacing / POINTS_PER_SPACING).max(perimeter / MOST_POINTS));
         if outline.is_empty() {
             return None;
         }
@@ -84,7 +86,7 @@ impl<const D: usize> ExactMotion<D> {
             starts.par_iter().map(|x| TOLERANCE.advance(self.flow.as_ref(), x, 0.0, time)).collect();
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(points.iter().copied(), 0.25 * spacing);
-        Some(ExactFront { motion: self, time, advected: Some(AdvectedFront { points, joined, cells }) })
+        Some(ExactFront { motion: self, surface, time, advected: Some(AdvectedFront { points, joined, cells }) })
     }
 }
 
@@ -97,11 +99,11 @@ impl<const D: usize> ExactFront<'_, D> {
             // A rigid motion keeps distances; whatever else has no front of its own is back at its start.
             None => {
                 let start = flow.rigid_path(x, -self.time).unwrap_or(*x);
-                self.motion.surface.signed_distance(&start)
+                self.surface.signed_distance(&start)
             }
             Some(front) => {
                 let start_distance = |integrator: PathIntegrator| {
-                    self.motion.surface.signed_distance(&integrator.advance(flow, x, self.time, -self.time))
+                    self.surface.signed_distance(&integrator.advance(flow, x, self.time, -self.time))
                 };
                 // Only the side is wanted: far from the surface a rough path tells it.
                 let rough = start_distance(ROUGH);
@@ -141,8 +143,8 @@ mod tests {
     use crate::geometry::flows::{Rotation, SingleVortex};
     use crate::geometry::surfaces::Ball;
 
-    fn ball() -> Box<Ball<2>> {
-        Box::new(Ball { center: Vector::<2>::new(0.5, 0.75), radius: 0.15 })
+    fn ball() -> Option<Box<dyn crate::geometry::Surface<2>>> {
+        Some(Box::new(Ball { center: Vector::<2>::new(0.5, 0.75), radius: 0.15 }))
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub struct AdvectedLevelSet<const D: usize> {
     /// Enclosed measure at the last redistancing that was asked for it, and the step of that.
     measure: f64,
     measured: u64,
+    /// Enclosed measure at time 0.
+    initial_measure: f64,
     max_cfl: f64,
     errors: Vec<MeasuredErrors>,
     phases: Phases,
@@ -77,14 +79,25 @@ impl<const D: usize> AdvectedLevelSet<D> {
         cpu_clock: CpuClock,
         method: BTreeMap<&'static str, String>,
     ) -> Self {
-        let measure = system.motion.surface().measure();
+        // Of a surface that is known by its particles alone, the first quadrature says what is to be kept.
+        let measure = system.motion.surface().map_or_else(
+            || {
+                let never = Interrupt::default();
+                let copy = system.redistanced_copy(&never);
+                copy.and_then(|(_, surface)| enclosed_measure(&surface, &never)).unwrap_or(f64::NAN)
+            },
+            crate::geometry::Surface::measure,
+        );
         let phases = Phases::new(cpu_clock);
+        // What points from elsewhere bring is a level, and no distance yet.
+        let redistanced = if system.motion.surface().is_some() { 0 } else { u64::MAX };
         Self {
             system,
             fixed,
             plan,
             step: 0,
-            redistanced: 0,
+            redistanced,
+            initial_measure: measure,
             measure,
             measured: 0,
             max_cfl: 0.0,
@@ -144,7 +157,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
             norms.add(difference);
         }
         let (samples_mean, samples_max) = surface.over_samples(|x| front.signed_distance(x).abs());
-        let exact = system.motion.surface().measure();
+        let exact = self.initial_measure;
         Some(MeasuredErrors {
             time,
             phi_rms: norms.rms(),
@@ -216,7 +229,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     }
 
     fn observables(&self) -> Observables {
-        let exact = self.system.motion.surface().measure();
+        let exact = self.initial_measure;
         let band = self.system.particles.flag(self.system.columns.in_band);
         // Between redistancings nobody knows the surface, and a stale number would look like knowledge.
         let known = |fresh: bool, value: f64| if fresh { value } else { f64::NAN };
@@ -304,7 +317,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     }
 
     fn health(&self) -> Health {
-        let exact = self.system.motion.surface().measure();
+        let exact = self.initial_measure;
         Health {
             finite: self.system.particles.positions().iter().all(|x| x.iter().all(|c| c.is_finite())),
             max_cfl: self.max_cfl,

@@ -4,7 +4,7 @@ use super::reference::ExactMotion;
 use crate::closest_point::method::NeighborhoodChoice;
 use crate::closest_point::{Answers, LevelSurface, MaterialSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
-use crate::geometry::{Domain, Vector};
+use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
 use crate::particles::{Particles, ScalarKey};
 use crate::schemes::measured_redistancing::redistance;
@@ -54,37 +54,63 @@ pub struct AdvectedSystem<const D: usize> {
     pub(super) interrupt: Interrupt,
 }
 
-impl<const D: usize> AdvectedSystem<D> {
-    /// Particles on the lattice inside the band, with the exact distance as level set.
+/// Particles at time 0.
+#[derive(Debug, Clone)]
+pub struct Start<const D: usize> {
+    /// Where they are.
+    pub positions: Vec<Vector<D>>,
+    /// Their level.
+    pub level: Vec<f64>,
+}
+
+impl<const D: usize> Start<D> {
+    /// On a lattice within `half_band` of a surface, with the exact distance as level.
     #[must_use]
-    #[expect(clippy::too_many_arguments, reason = "the parts of a scene, named one by one")]
-    pub fn new(
-        motion: ExactMotion<D>,
-        lattice: &Lattice,
-        method: PcpMethod,
-        half_band: f64,
-        integrator: PathIntegrator,
-        field: FieldChoice,
-        when: RedistanceWhen,
-        interrupt: Interrupt,
-    ) -> Self {
-        let spacing = lattice.spacing;
-        let surface = motion.surface();
+    pub fn about(surface: &dyn Surface<D>, lattice: &Lattice, half_band: f64, interrupt: &Interrupt) -> Self {
         let (low, high) = surface.bounding_box();
-        let margin = half_band + spacing;
+        let margin = half_band + lattice.spacing;
         let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
-        let positions = lattice.points_near(&low, &high, half_band, |x| surface.signed_distance(x), &interrupt);
-        let mut particles = Particles::new(positions);
+        let positions = lattice.points_near(&low, &high, half_band, |x| surface.signed_distance(x), interrupt);
+        let level = positions.iter().map(|x| surface.signed_distance(x)).collect();
+        Self { positions, level }
+    }
+}
+
+/// What a run in a flow is made of, beside particles and flow.
+#[derive(Debug, Clone)]
+pub struct AdvectedParts {
+    /// h.
+    pub spacing: f64,
+    /// w/2.
+    pub half_band: f64,
+    /// Path integrator.
+    pub integrator: PathIntegrator,
+    /// What is transported.
+    pub field: FieldChoice,
+    /// When to redistance.
+    pub when: RedistanceWhen,
+    /// The method.
+    pub method: PcpMethod,
+}
+
+impl<const D: usize> AdvectedSystem<D> {
+    /// Particles with a level, in a flow. Where the surface is known, columns start with the exact answers.
+    #[must_use]
+    pub fn new(motion: ExactMotion<D>, start: Start<D>, parts: AdvectedParts, interrupt: Interrupt) -> Self {
+        let AdvectedParts { spacing, half_band, integrator, field, when, method } = parts;
+        let mut particles = Particles::new(start.positions);
         let psi = particles.add_scalar("psi", 0.0);
         let columns = SurfaceColumns::add(&mut particles);
-        for i in 0..particles.len() {
-            let exact = surface.nearest(&particles.positions()[i]);
-            particles.scalar_mut(psi)[i] = exact.distance;
-            particles.scalar_mut(columns.phi)[i] = exact.distance;
-            particles.vector_mut(columns.closest_point)[i] = exact.point;
-            particles.vector_mut(columns.normal)[i] = exact.normal.unwrap_or_else(Vector::<D>::zeros);
-            particles.scalar_mut(columns.curvature)[i] = exact.curvature.unwrap_or(0.0);
-            particles.flag_mut(columns.in_band)[i] = 1;
+        particles.scalar_mut(psi).copy_from_slice(&start.level);
+        particles.scalar_mut(columns.phi).copy_from_slice(&start.level);
+        particles.flag_mut(columns.in_band).fill(1);
+        if let Some(surface) = motion.surface() {
+            for i in 0..particles.len() {
+                let exact = surface.nearest(&particles.positions()[i]);
+                particles.vector_mut(columns.closest_point)[i] = exact.point;
+                particles.vector_mut(columns.normal)[i] = exact.normal.unwrap_or_else(Vector::<D>::zeros);
+                particles.scalar_mut(columns.curvature)[i] = exact.curvature.unwrap_or(0.0);
+            }
         }
         let answers = Answers::default();
         let redistancing = if let NeighborhoodChoice::Material { .. } = method.neighborhood {

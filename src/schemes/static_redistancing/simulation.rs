@@ -1,6 +1,6 @@
 //! One step a redistancing: the distances of one are the input of the next.
 
-use super::system::StaticSystem;
+use super::system::{Source, StaticSystem};
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, rescued};
 use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::simulation::{
@@ -36,20 +36,22 @@ impl<const D: usize> StaticRedistancing<D> {
         }
     }
 
-    /// Errors against the exact surface over the band.
+    /// Errors against the exact surface over the band; none where it is not known.
     fn errors(&self) -> Vec<ErrorEntry> {
         let system = &self.system;
         let particles = &system.particles;
+        let mut entries = Vec::new();
+        let Some(surface) = &system.surface else { return entries };
         let mut norms = [ErrorNorms::default(); 4];
         for i in 0..particles.len() {
             if particles.flag(system.columns.in_band)[i] == 0 {
                 continue;
             }
             let x = particles.positions()[i];
-            let exact = system.surface.nearest(&x);
+            let exact = surface.nearest(&x);
             norms[0].add(particles.scalar(system.columns.phi)[i] - exact.distance);
             // Where two points of the surface are nearly as close, another choice is no error.
-            if self.step == 0 || system.surface.near_medial_axis(&x, system.spacing) {
+            if self.step == 0 || surface.near_medial_axis(&x, system.spacing) {
                 continue;
             }
             norms[1].add((particles.vector(system.columns.closest_point)[i] - exact.point).norm());
@@ -60,12 +62,13 @@ impl<const D: usize> StaticRedistancing<D> {
                 norms[3].add(particles.scalar(system.columns.curvature)[i] - curvature);
             }
         }
-        let mut entries = Vec::new();
-        if let Some(remeshing) = self.system.remeshing.as_ref().filter(|_| self.step > 0) {
+        if let Source::Grid(remeshing) = &system.source
+            && self.step > 0
+        {
             // The first interpolation is of the exact level; later ones are of distances that were computed.
             let mut norms = ErrorNorms::default();
             for (x, value) in remeshing.nodes().iter().zip(remeshing.values()) {
-                let distance = system.surface.signed_distance(x);
+                let distance = surface.signed_distance(x);
                 let exact = if self.step == 1 { system.initial.value(x, distance) } else { distance };
                 if distance.abs() <= system.half_band {
                     norms.add(value - exact);
@@ -98,12 +101,15 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
         let (surface, answers) = (&mut system.redistancing, &mut system.answers);
         let (interrupt, phases) = (&system.interrupt, &mut self.phases);
-        let (points, level, normals) = match &mut system.remeshing {
-            Some(remeshing) => {
+        let (points, level, normals) = match &mut system.source {
+            Source::Grid(remeshing) => {
                 phases.measure("remeshing", || remeshing.interpolate(positions, level, interrupt))?;
                 (remeshing.nodes(), remeshing.values(), None)
             }
-            None => (positions, level, (self.step > 0).then(|| system.particles.vector(system.columns.normal))),
+            Source::Others { positions, level } => (positions.as_slice(), level.as_slice(), None),
+            Source::Particles => {
+                (positions, level, (self.step > 0).then(|| system.particles.vector(system.columns.normal)))
+            }
         };
         rebuild(surface, points, level, normals, interrupt, phases)?;
         query(surface, positions, f64::INFINITY, answers, interrupt, phases)?;
@@ -112,6 +118,15 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
             return Err(StepError::InterfaceLost { step, time });
         }
         // Particles beyond the band serve the fits and are redistanced like the others; the band's flags stay.
+        if let Source::Others { .. } = system.source {
+            // Points of no level of their own learn their side from the surface.
+            for (i, answer) in system.answers.iter() {
+                let x = system.particles.positions()[i];
+                let is_inside = system.redistancing.is_inside(&x, answer);
+                system.particles.scalar_mut(system.level)[i] = if is_inside { -1.0 } else { 1.0 };
+                system.particles.flag_mut(system.columns.in_band)[i] = 1;
+            }
+        }
         self.phases.measure("redistancing/store", || {
             for (i, answer) in system.answers.iter() {
                 system.columns.write(&mut system.particles, system.level, i, answer);
@@ -128,7 +143,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let counts = self.system.redistancing.counts();
         let errors = self.errors();
         let of_phi =
-            |norm: &str| errors.iter().find(|e| e.quantity == "phi" && e.norm == norm).map_or(0.0, |e| e.value);
+            |norm: &str| errors.iter().find(|e| e.quantity == "phi" && e.norm == norm).map_or(f64::NAN, |e| e.value);
         vec![
             ("time", self.clock().time),
             ("phi_error_rms", of_phi("rms")),
@@ -152,7 +167,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let surface = &self.system.redistancing;
         state.push_counts("rescues", surface.counts().entries().iter().map(|e| e.1).collect());
         state.push_reals("worst_condition", &[surface.worst_condition()]);
-        if let Some(remeshing) = &self.system.remeshing {
+        if let Source::Grid(remeshing) = &self.system.source {
             state.push_reals("remeshed_level", remeshing.values());
         }
         state
@@ -166,7 +181,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let (rescues, condition) = (state.counts("rescues")?, state.reals("worst_condition")?);
         crate::simulation::state::check_length("rescues", rescues.len(), surface.counts().entries().len())?;
         crate::simulation::state::check_length("worst_condition", condition.len(), 1)?;
-        if let Some(remeshing) = &mut self.system.remeshing {
+        if let Source::Grid(remeshing) = &mut self.system.source {
             let values = state.reals("remeshed_level")?;
             crate::simulation::state::check_length("remeshed_level", values.len(), remeshing.values().len())?;
             remeshing.restore(values);

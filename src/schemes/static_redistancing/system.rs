@@ -25,22 +25,53 @@ pub enum InitialLevel<const D: usize> {
 
 /// Resting particles about a surface.
 pub struct StaticSystem<const D: usize> {
-    /// The surface, for errors.
-    pub surface: Box<dyn Surface<D>>,
+    /// The surface, for errors; None where it is known by its particles alone.
+    pub surface: Option<Box<dyn Surface<D>>>,
     /// h.
     pub spacing: f64,
     /// How often to redistance.
     pub repeats: u64,
     pub(super) half_band: f64,
+    /// The particles, or the points that are asked about.
     pub(super) particles: Particles<D>,
     pub(super) level: ScalarKey,
     pub(super) columns: SurfaceColumns,
     /// Where the surface comes from, if not from the particles' own level.
-    pub(super) remeshing: Option<Remeshing<D>>,
+    pub(super) source: Source<D>,
     pub(super) initial: InitialLevel<D>,
     pub(super) redistancing: LevelSurface<D>,
     pub(super) answers: Answers<D>,
     pub(super) interrupt: Interrupt,
+}
+
+/// Where the surface comes from.
+pub enum Source<const D: usize> {
+    /// The particles' own level.
+    Particles,
+    /// The nodes of a grid that their level is interpolated to.
+    Grid(Remeshing<D>),
+    /// Other points, which stay as they are.
+    Others {
+        /// Where they are.
+        positions: Vec<Vector<D>>,
+        /// Their level.
+        level: Vec<f64>,
+    },
+}
+
+/// What all static set-ups have in common.
+#[derive(Debug, Clone)]
+pub struct StaticParts {
+    /// h.
+    pub spacing: f64,
+    /// w/2.
+    pub half_band: f64,
+    /// How often to redistance.
+    pub repeats: u64,
+    /// The method.
+    pub method: PcpMethod,
+    /// Interpolation to a grid first, if any.
+    pub remeshing: Option<RemeshingKernel>,
 }
 
 impl<const D: usize> InitialLevel<D> {
@@ -56,42 +87,55 @@ impl<const D: usize> InitialLevel<D> {
 }
 
 impl<const D: usize> StaticSystem<D> {
-    /// Makes the particles: those in the band, and beyond it those that fits or interpolation reach.
+    /// Makes the particles about a surface: those in the band, and beyond it those that fits or interpolation reach.
     #[must_use]
-    #[expect(clippy::too_many_arguments, reason = "the parts of a scene, named one by one")]
-    pub fn new(
+    pub fn about(
         surface: Box<dyn Surface<D>>,
         lattice: &Lattice,
-        method: PcpMethod,
-        remeshing: Option<RemeshingKernel>,
         initial: InitialLevel<D>,
-        half_band: f64,
-        repeats: u64,
+        parts: StaticParts,
         interrupt: Interrupt,
     ) -> Self {
-        let spacing = lattice.spacing;
+        let StaticParts { spacing, half_band, ref method, remeshing, .. } = parts;
         let of_nodes = half_band.max(method.reach_h::<D>() * spacing);
         let reach = of_nodes + remeshing.map_or(0.0, |kernel| kernel.reach_h::<D>() * spacing);
         let (low, high) = surface.bounding_box();
         let margin = reach + spacing;
         let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
         let positions = lattice.points_near(&low, &high, reach, |x| surface.signed_distance(x), &interrupt);
-        let remeshing = remeshing.map(|kernel| {
-            Remeshing::new(kernel, spacing, (&low, &high), of_nodes, |x| surface.signed_distance(x), &interrupt)
+        let source = remeshing.map_or(Source::Particles, |kernel| {
+            let distance = |x: &Vector<D>| surface.signed_distance(x);
+            Source::Grid(Remeshing::new(kernel, spacing, (&low, &high), of_nodes, distance, &interrupt))
         });
-        let mut particles = Particles::new(positions);
+        let distances: Vec<f64> = positions.iter().map(|x| surface.signed_distance(x)).collect();
+        let levels: Vec<f64> =
+            positions.iter().zip(&distances).map(|(x, distance)| initial.value(x, *distance)).collect();
+        let in_band = distances.iter().map(|distance| distance.abs() <= half_band).collect();
+        let mut system = Self::assemble(positions, &levels, in_band, source, parts, interrupt);
+        system.surface = Some(surface);
+        system.initial = initial;
+        system
+    }
+
+    /// Particles with their level from elsewhere: all of them are the band.
+    #[must_use]
+    pub fn of_points(positions: Vec<Vector<D>>, levels: &[f64], parts: StaticParts, interrupt: Interrupt) -> Self {
+        let in_band = vec![true; positions.len()];
+        Self::assemble(positions, levels, in_band, Source::Particles, parts, interrupt)
+    }
+
+    /// Asks about other points instead; the particles become the source of the surface.
+    #[must_use]
+    pub fn asked_about(self, points: Vec<Vector<D>>) -> Self {
+        let source = Source::Others {
+            positions: self.particles.positions().to_vec(),
+            level: self.particles.scalar(self.level).to_vec(),
+        };
+        let Self { surface, spacing, repeats, half_band, redistancing, interrupt, initial, .. } = self;
+        let mut particles = Particles::new(points);
         let level = particles.add_scalar("level", 0.0);
         let columns = SurfaceColumns::add(&mut particles);
-        for i in 0..particles.len() {
-            let x = particles.positions()[i];
-            let distance = surface.signed_distance(&x);
-            particles.scalar_mut(level)[i] = initial.value(&x, distance);
-            // Before the first redistancing a frame shows what the particles came with.
-            particles.scalar_mut(columns.phi)[i] = particles.scalar(level)[i];
-            particles.flag_mut(columns.in_band)[i] = u8::from(distance.abs() <= half_band);
-        }
         let answers = Answers::default();
-        let redistancing = LevelSurface::Spatial(Box::new(Redistancing::new(method, Domain::unbounded(), spacing)));
         Self {
             surface,
             spacing,
@@ -100,10 +144,45 @@ impl<const D: usize> StaticSystem<D> {
             particles,
             level,
             columns,
-            remeshing,
+            source,
             initial,
             redistancing,
             answers,
+            interrupt,
+        }
+    }
+
+    fn assemble(
+        positions: Vec<Vector<D>>,
+        levels: &[f64],
+        in_band: Vec<bool>,
+        source: Source<D>,
+        parts: StaticParts,
+        interrupt: Interrupt,
+    ) -> Self {
+        let StaticParts { spacing, half_band, repeats, method, .. } = parts;
+        let mut particles = Particles::new(positions);
+        let level = particles.add_scalar("level", 0.0);
+        let columns = SurfaceColumns::add(&mut particles);
+        particles.scalar_mut(level).copy_from_slice(levels);
+        // Before the first redistancing a frame shows what the particles came with.
+        particles.scalar_mut(columns.phi).copy_from_slice(levels);
+        for (flag, in_band) in particles.flag_mut(columns.in_band).iter_mut().zip(in_band) {
+            *flag = u8::from(in_band);
+        }
+        let redistancing = LevelSurface::Spatial(Box::new(Redistancing::new(method, Domain::unbounded(), spacing)));
+        Self {
+            surface: None,
+            spacing,
+            repeats,
+            half_band,
+            particles,
+            level,
+            columns,
+            source,
+            initial: InitialLevel::Distance,
+            redistancing,
+            answers: Answers::default(),
             interrupt,
         }
     }

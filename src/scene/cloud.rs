@@ -1,0 +1,117 @@
+//! Points that a scene takes from outside: a shape made of particles with their level, or places to ask about.
+//!
+//! The engine opens nothing. A scene says by pointer what it needs, whoever builds it hands over the arrays.
+
+use crate::geometry::Vector;
+use crate::scene::Violation;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// Points, with a level where they have one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cloud {
+    /// x, y, z; z is 0 for points of the plane.
+    pub positions: Vec<[f64; 3]>,
+    /// φ, one number a point.
+    pub level: Option<Vec<f64>>,
+}
+
+/// What stands at a pointer of a scene.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CloudReference {
+    /// Where in the scene.
+    pub pointer: &'static str,
+    /// The local file that is named there.
+    pub file: String,
+}
+
+/// Clouds by the pointers that name them.
+pub type Clouds = BTreeMap<&'static str, Cloud>;
+
+/// The file that a checked choice names, if it is `points`.
+#[must_use]
+pub fn reference(choice: &Value, pointer: &'static str) -> Option<CloudReference> {
+    let file = choice["file"].as_str().filter(|_| choice["type"] == "points")?;
+    Some(CloudReference { pointer, file: file.to_owned() })
+}
+
+/// The points of a cloud in `D` dimensions.
+///
+/// # Errors
+/// No cloud, no points, numbers that are none, or a z in the plane.
+pub fn points<const D: usize>(clouds: &Clouds, pointer: &'static str) -> Result<Vec<Vector<D>>, Violation> {
+    let refuse = |detail: String| Violation::new(pointer, "data", detail, &Value::Null, Value::Null);
+    let Some(cloud) = clouds.get(pointer) else {
+        return Err(refuse("the points were not handed over".to_owned()));
+    };
+    if cloud.positions.is_empty() {
+        return Err(refuse("there are no points".to_owned()));
+    }
+    if let Some(place) = cloud.positions.iter().position(|x| x.iter().any(|c| !c.is_finite())) {
+        return Err(refuse(format!("the position of point {place} is not finite")));
+    }
+    if D == 2
+        && let Some(place) = cloud.positions.iter().position(|x| x[2] != 0.0)
+    {
+        let z = cloud.positions[place][2];
+        return Err(refuse(format!("point {place} has z = {z} in a scene of 2 dimensions; give \"dimension\": 3")));
+    }
+    Ok(cloud.positions.iter().map(|x| Vector::<D>::from_fn(|d, _| x[d])).collect())
+}
+
+/// The points of a cloud that have a level, with it. Frames hold NaN for particles outside their band: those know
+/// nothing of the surface and are left out.
+///
+/// # Errors
+/// As [`points`], and no levels or another number of them.
+pub fn points_with_levels<const D: usize>(
+    clouds: &Clouds,
+    pointer: &'static str,
+) -> Result<(Vec<Vector<D>>, Vec<f64>), Violation> {
+    let refuse = |detail: String| Violation::new(pointer, "data", detail, &Value::Null, json!("PointData/phi"));
+    let points = points::<D>(clouds, pointer)?;
+    let Some(level) = clouds.get(pointer).and_then(|cloud| cloud.level.as_ref()) else {
+        return Err(refuse("the points have no phi".to_owned()));
+    };
+    if level.len() != points.len() {
+        return Err(refuse(format!("{} values of phi for {} points", level.len(), points.len())));
+    }
+    if let Some(place) = level.iter().position(|l| l.is_infinite()) {
+        return Err(refuse(format!("phi of point {place} is infinite")));
+    }
+    let known = points.into_iter().zip(level).filter(|(_, level)| !level.is_nan());
+    let (points, level): (Vec<_>, Vec<_>) = known.map(|(x, level)| (x, *level)).unzip();
+    if points.is_empty() { Err(refuse("no point has a phi that is a number".to_owned())) } else { Ok((points, level)) }
+}
+
+/// A violation where the spacing of a scene is not that of its points: the median distance to the nearest other point
+/// must lie between a third and three times it.
+#[must_use]
+pub fn check_spacing<const D: usize>(points: &[Vector<D>], spacing: f64) -> Option<Violation> {
+    let mut cells = crate::neighbors::CellList::new(crate::geometry::Domain::unbounded());
+    cells.rebuild(points.iter().copied(), spacing);
+    // A few hundred points tell the median.
+    let stride = points.len().div_ceil(500);
+    let nearest = |k: usize| {
+        let mut least = f64::INFINITY;
+        let mut radius = spacing;
+        for _ in 0..12 {
+            let found = &mut Vec::new();
+            crate::neighbors::NeighborSearch::gather(&cells, &points[k], radius, found);
+            least = found.iter().filter(|n| n.index != k && n.r2 > 0.0).map(|n| n.r2.sqrt()).fold(least, f64::min);
+            if least.is_finite() {
+                break;
+            }
+            radius *= 2.0;
+        }
+        least
+    };
+    let mut distances: Vec<f64> = (0..points.len()).step_by(stride).map(nearest).collect();
+    distances.sort_by(f64::total_cmp);
+    let median = distances[distances.len() / 2];
+    if (spacing / 3.0..=spacing * 3.0).contains(&median) {
+        return None;
+    }
+    let detail = format!("the points lie {median:.3e} apart (median distance to the nearest other one)");
+    Some(Violation::new("/spacing", "conflict", detail, &json!(spacing), json!(median)))
+}
