@@ -268,6 +268,7 @@ fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
     };
     pool(2).install(|| {
         let own = json!({"kind": "redistance", "spacing": 0.025, "shape": points.clone()});
+        assert_eq!(scene(&own).resolved(), scene(&scene(&own).resolved()).resolved());
         let mut simulation = with(own.clone()).unwrap();
         simulation.step().unwrap();
         let state = simulation.state();

@@ -125,7 +125,8 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     };
     resolved["dimension"] = json!(D);
     resolved["shape"] = shape.clone();
-    resolved["initial"] = json!({"type": initial_name});
+    // Points come with their level: there is nothing to choose.
+    resolved["initial"] = if of_points.is_some() { Value::Null } else { json!({"type": initial_name}) };
     resolved["band"] = json!(band);
     if let Some(map) = resolved.as_object_mut() {
         map.shift_remove("band_h");
