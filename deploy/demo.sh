@@ -21,45 +21,58 @@ url=${announcement#listening on }
 echo "service at $url"
 until curl -sf "$url/readyz" > /dev/null; do sleep 0.05; done
 
-body='{
-  "name": "spiraling vortex, h = 1/64",
-  "scene": {"kind": "vortex", "preset": "paper", "spacing": 0.015625},
-  "output": {"every_time": 4}
-}'
-echo "curl -X POST $url/v1/jobs -d '$body'"
-job=$(curl -sf -X POST "$url/v1/jobs" -H 'content-type: application/json' -d "$body" | jq -r .id)
-echo "job $job"
+# Submits one scene, watches it to its end and fetches everything into a directory of its own.
+run() {
+    local name=$1 scene=$2
+    local body="{\"name\": \"single vortex, $name\", \"scene\": $scene, \"output\": {\"every_time\": 4}}"
+    echo "curl -X POST $url/v1/jobs -d '$body'"
+    local job status state fraction eta filled bar
+    job=$(curl -sf -X POST "$url/v1/jobs" -H 'content-type: application/json' -d "$body" | jq -r .id)
+    while :; do
+        status=$(curl -sf "$url/v1/jobs/$job")
+        read -r state fraction eta < <(jq -r '[.state, .progress.fraction, (.progress.eta_s // "?")] | @tsv' <<< "$status")
+        filled=$(awk -v f="$fraction" 'BEGIN { printf "%d", 40 * f }')
+        bar=$(printf '%*s' "$filled" '' | tr ' ' '#')
+        [ "$eta" = "?" ] || eta=$(awk -v e="$eta" 'BEGIN { printf "%.0f s", e }')
+        printf '\r[%-40s] %3.0f %%  %-10s ETA %-8s' \
+            "$bar" "$(awk -v f="$fraction" 'BEGIN { print 100 * f }')" "$state" "$eta"
+        case $state in
+            succeeded) echo && break ;;
+            failed | canceled | paused) echo && jq '{state, reason, hint, message}' <<< "$status" && exit 1 ;;
+        esac
+        sleep 0.3
+    done
+    # Everything at once, and the proof that it arrived whole.
+    mkdir -p "$out/$name"
+    curl -sf "$url/v1/jobs/$job/files.tar" | tar -x -C "$out/$name" --strip-components 1
+    (cd "$out/$name" && sha256sum --quiet -c SHA256SUMS)
+}
 
-while :; do
-    status=$(curl -sf "$url/v1/jobs/$job")
-    read -r state fraction eta < <(jq -r '[.state, .progress.fraction, (.progress.eta_s // "?")] | @tsv' <<< "$status")
-    filled=$(awk -v f="$fraction" 'BEGIN { printf "%d", 40 * f }')
-    bar=$(printf '%*s' "$filled" '' | tr ' ' '#')
-    [ "$eta" = "?" ] || eta=$(awk -v e="$eta" 'BEGIN { printf "%.0f s", e }')
-    printf '\r[%-40s] %3.0f %%  %-10s ETA %-8s' "$bar" "$(awk -v f="$fraction" 'BEGIN { print 100 * f }')" "$state" "$eta"
-    case $state in
-        succeeded) echo && break ;;
-        failed | canceled | paused) echo && jq '{state, reason, hint, message}' <<< "$status" && exit 1 ;;
-    esac
-    sleep 0.3
-done
-
-# Everything at once, and the proof that it arrived whole.
-curl -sf "$url/v1/jobs/$job/files.tar" | tar -x -C "$out" --strip-components 1
-(cd "$out" && sha256sum --quiet -c SHA256SUMS)
+run best '{"kind": "vortex", "spacing": 0.015625}'
+run paper '{"kind": "vortex", "preset": "paper", "spacing": 0.015625}'
 
 value() {
-    jq -r --arg q "$1" --arg n "$2" --argjson t "$3" \
-        '.errors[] | select(.quantity == $q and .norm == $n and ((.time - $t) | fabs) < 1e-6) | .value' "$out/report.json"
+    jq -r --arg q "$2" --arg n "$3" --argjson t "$4" \
+        '.errors[] | select(.quantity == $q and .norm == $n and ((.time - $t) | fabs) < 1e-6) | .value' "$out/$1/report.json"
 }
-printf '\n%-32s %12s %12s\n' "h = 1/64" "here" "paper, table 2"
-printf '%-32s %12.3e %12s\n' "RMS of the distance, t = 8" "$(value phi rms 8)" "1.42e-02"
-printf '%-32s %12.3e %12s\n' "maximum of the distance, t = 8" "$(value phi max 8)" "2.4e-02"
-printf '%-32s %12.3e %12s\n' "relative area, t = 8" "$(value area relative 8)" "3.83e-02"
-printf '%-32s %12.3e %12s\n' "RMS of the distance, t = 4" "$(value phi rms 4)" "-"
-jq -r '"\nwall \(.cost.wall_s * 100 | round / 100) s, CPU \(.cost.cpu_s * 100 | round / 100) s, \(.cost.steps) steps"' "$out/report.json"
+seconds() {
+    jq -r --arg p "$2" '[.cost.phases | to_entries[] | select(.key | startswith($p)) | .value] | add' "$out/$1/report.json"
+}
+row() {
+    printf '%-34s %12.3e %18.3e %16s\n' "$1" "$(value best $2)" "$(value paper $2)" "$3"
+}
+printf '\n%-34s %12s %18s %16s\n' "single vortex, h = 1/64" "best method" "paper's method" "paper, table 2"
+row "RMS of the distance, t = 8" "phi rms 8" "1.42e-02"
+row "maximum of the distance, t = 8" "phi max 8" "2.4e-02"
+row "relative area, t = 8" "area relative 8" "3.83e-02"
+row "RMS of the distance, t = 4" "phi rms 4" "-"
+printf '%-34s %10.3f s %16.3f s\n' "CPU time of redistancing" "$(seconds best redistancing)" "$(seconds paper redistancing)"
+printf '%-34s %10.3f s %16.3f s\n' "CPU time, references included" \
+    "$(jq -r .cost.cpu_s "$out/best/report.json")" "$(jq -r .cost.cpu_s "$out/paper/report.json")"
+jq -r '"\nbest method: \(.method.method)"' "$out/best/report.json"
 echo
-echo "frames    $out/frames.vtkhdf.series (open it in ParaView)"
-echo "picture   $out/picture.svg (particles by distance, zero level, t = 0, 4, 8)"
-echo "report    $out/report.json"
-echo "series    $out/series.csv"
+echo "in $out/best and $out/paper:"
+echo "frames    frames.vtkhdf.series (open it in ParaView)"
+echo "picture   picture.svg (particles by distance, zero level, t = 0, 4, 8)"
+echo "report    report.json"
+echo "series    series.csv"

@@ -13,6 +13,10 @@ use serde_json::{Value, json};
 /// Beyond this the outer neighbours weigh nothing and fits starve.
 const WEIGHT: Kind = Kind::Number { above: None, least: Some(0.0), below: None, most: Some(50.0) };
 
+/// A resolved scene says in it what `auto` chose, so that the report of a run that starts from it still knows.
+pub const CHOSEN: Parameter =
+    Parameter::new("chosen", "why this was chosen, where `auto` chose it", Kind::Text, DefaultValue::Absent);
+
 /// Parameters of `pcp`.
 pub static PARAMETERS: &[Parameter] = &[
     Parameter::new(
@@ -66,6 +70,7 @@ pub static PARAMETERS: &[Parameter] = &[
         POSITIVE,
         DefaultValue::Json("1e-14"),
     ),
+    CHOSEN,
     Parameter::new(
         "max_iterations",
         "most iterations of a solve",

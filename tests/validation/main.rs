@@ -7,7 +7,7 @@ mod hard_cases;
 mod support;
 
 use serde_json::{Value, json};
-use support::{PLAN, build, error, pool, run};
+use support::{PLAN, build, error, pool, run, scene};
 
 #[test]
 fn spiraling_vortex_of_the_paper() {
@@ -59,6 +59,17 @@ fn remeshing_first_costs_the_order() {
     for kernel in ["lambda44", "lambda44_normalized", "wendland_c2", "gaussian"] {
         let order = (at(kernel, 1.0 / 32.0) / at(kernel, 1.0 / 128.0)).log2() / 2.0;
         assert!((0.6..1.7).contains(&order), "{kernel}: order {order}");
+    }
+}
+
+#[test]
+fn the_report_says_what_auto_chose_also_when_a_run_starts_from_the_resolved_scene() {
+    for field in ["dual", "overwrite"] {
+        let body = json!({"kind": "vortex", "spacing": 0.1, "steps": 2, "field": field});
+        let report = run(&scene(&body).resolved());
+        assert_eq!(report.method, run(&body).method);
+        assert!(report.method["method"].starts_with("pcp, degree"), "{:?}", report.method);
+        assert!(report.method.contains_key("redistance"));
     }
 }
 

@@ -120,9 +120,13 @@ static REDISTANCE: &[Variant] = &[
     Variant {
         name: "every",
         doc: "after every so many steps",
-        parameters: &[Parameter::new("steps", "how many", STEPS, DefaultValue::Json("1"))],
+        parameters: &[Parameter::new("steps", "how many", STEPS, DefaultValue::Json("1")), pcp_parameters::CHOSEN],
     },
-    Variant { name: "for_output", doc: "when a frame, an error or the end needs it", parameters: &[] },
+    Variant {
+        name: "for_output",
+        doc: "when a frame, an error or the end needs it",
+        parameters: &[pcp_parameters::CHOSEN],
+    },
 ];
 
 fn redistance_variants() -> &'static [Variant] {
@@ -210,12 +214,12 @@ pub(super) enum Integrator {
     Dopri5 { tolerance: f64 },
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub(super) enum Redistance {
     Auto,
-    Every { steps: u64 },
-    ForOutput,
+    Every { steps: u64, chosen: Option<String> },
+    ForOutput { chosen: Option<String> },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

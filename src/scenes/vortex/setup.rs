@@ -91,11 +91,11 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         let mut method =
             check(pcp_parameters::PARAMETERS, choice.as_object().unwrap_or(&Map::new()), "/method", &mut violations);
         method.shift_insert(0, "type".into(), json!("pcp"));
+        method.insert("chosen".into(), format!("pcp, degree {degree}, {neighborhood} {count}: {why}").into());
         method_json = Value::Object(method);
-        chosen.insert("method", format!("pcp, degree {degree}, {neighborhood} {count}: {why}"));
-    } else {
-        chosen.insert("method", "pcp, as given".to_owned());
     }
+    let why = method_json["chosen"].as_str().unwrap_or("pcp, as given").to_owned();
+    chosen.insert("method", why);
     let default_ratio = if written.field == Field::Overwrite { 2.0 } else { 1.5 };
     let method = match pcp_parameters::understand(&method_json, "/method", D, default_ratio) {
         Ok((method, full)) => {
@@ -136,21 +136,22 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         Field::Dual => FieldChoice::Dual,
         Field::Overwrite => FieldChoice::Overwrite,
     };
-    let when = match (written.redistance, written.field) {
-        (Redistance::Every { steps }, _) => RedistanceWhen::Every(steps),
-        (Redistance::ForOutput, _) => RedistanceWhen::ForOutput,
+    let (when, why) = match (&written.redistance, written.field) {
+        (Redistance::Every { steps, chosen }, _) => (RedistanceWhen::Every(*steps), chosen.clone()),
+        (Redistance::ForOutput { chosen }, _) => (RedistanceWhen::ForOutput, chosen.clone()),
         (Redistance::Auto, Field::Dual) => {
-            chosen.insert("redistance", "for_output: a dual field needs no distance in between".to_owned());
-            resolved["redistance"] = json!({"type": "for_output"});
-            RedistanceWhen::ForOutput
+            let why = "for_output: a dual field needs no distance in between".to_owned();
+            resolved["redistance"] = json!({"type": "for_output", "chosen": why});
+            (RedistanceWhen::ForOutput, Some(why))
         }
         (Redistance::Auto, Field::Overwrite) => {
             let why = "an overwritten level must stay a distance, and every overwriting costs accuracy";
-            chosen.insert("redistance", format!("every {AUTO_EVERY} steps: {why}"));
-            resolved["redistance"] = json!({"type": "every", "steps": AUTO_EVERY});
-            RedistanceWhen::Every(AUTO_EVERY)
+            let why = format!("every {AUTO_EVERY} steps: {why}");
+            resolved["redistance"] = json!({"type": "every", "steps": AUTO_EVERY, "chosen": why});
+            (RedistanceWhen::Every(AUTO_EVERY), Some(why))
         }
     };
+    chosen.extend(why.map(|why| ("redistance", why)));
     resolved["dimension"] = json!(D);
     resolved["time_step"] = json!(fixed.time_step);
     if let Some(map) = resolved.as_object_mut() {
