@@ -88,7 +88,12 @@ pub fn verify(request: &Request, mut shown: impl FnMut(&Outcome) -> io::Result<(
             figures::draw(&path, figure, &bench.lines(figure))
                 .map_err(|cause| VerifyError::Picture { name: figure.name, cause })?;
         }
-        fs::write(request.results.join(format!("{name}.md")), table::document(outcomes, figures))?;
+        // A document that several kinds share is not replaced by the table of one.
+        let sharing = meniscus::scenes::SCENES.iter().filter(|kind| (kind.rows)().document == *name);
+        let is_whole = sharing.clone().all(|kind| is_wanted(&kind));
+        let part: Vec<&str> = sharing.filter(|kind| !is_whole && is_wanted(kind)).map(|kind| kind.kind).collect();
+        let file = std::iter::once(*name).chain(part).collect::<Vec<_>>().join("-");
+        fs::write(request.results.join(format!("{file}.md")), table::document(outcomes, figures))?;
     }
     Ok(all_met)
 }

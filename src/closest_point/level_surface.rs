@@ -128,6 +128,12 @@ impl<const D: usize> LevelSurface<D> {
         each!(self, surface => surface.restore_worst_condition(condition));
     }
 
+    /// Adds what another surface of the same particles could not do the plain way.
+    pub fn take_over(&mut self, other: &Self) {
+        self.counts().add(other.counts());
+        self.restore_worst_condition(self.worst_condition().max(other.worst_condition()));
+    }
+
     /// Mean and maximum of a measure over the points of the surface, in their order; (0, 0) without any.
     pub fn over_samples(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
         let values: Vec<f64> = self.sample_points().par_iter().map(&measure).collect();

@@ -11,7 +11,7 @@
 
 use super::detection::Detection;
 use super::method::PcpMethod;
-use super::newton::{ACCEPTED, LONGEST_STEP, is_last_step, newton_step, tangents};
+use super::newton::{ACCEPTED, LONGEST_STEP, Progress, is_last_step, newton_step, tangents};
 use super::queries::{Answers, QUERIES};
 use super::redistancing::{ClosestPoint, Tally, count_fit};
 use super::rescue::{RescueCounts, add};
@@ -284,13 +284,21 @@ impl<const D: usize> MaterialSurface<D> {
         let along = first.spot.inverse * Vector::<D>::from(s) * self.spacing;
         let across = first.spot.inverse * Vector::<D>::from(t) * self.spacing;
         let reach = SEED_REACH * self.spacing;
-        let most = |way: &Vector<D>| ((reach / way.norm()) as i32).min(MOST_SEEDS);
+        let most = |way: &Vector<D>| {
+            let wanted = reach / way.norm();
+            // A stretch beyond what seeds can cover leaves gaps.
+            add(&self.counts.unprojected, u64::from(wanted > f64::from(MOST_SEEDS)));
+            (wanted as i32).min(MOST_SEEDS)
+        };
         let (i_most, j_most) = (most(&along), if D == 3 { most(&across) } else { 0 });
         for j in -j_most..=j_most {
             for i in -i_most..=i_most {
                 if i != 0 || j != 0 {
                     let start = first.material + along * f64::from(i) + across * f64::from(j);
-                    seeds.extend(self.project(patch, fit, &start));
+                    match self.project(patch, fit, &start) {
+                        Some(seed) => seeds.push(seed),
+                        None => add(&self.counts.unprojected, 1),
+                    }
                 }
             }
         }
@@ -311,7 +319,7 @@ impl<const D: usize> MaterialSurface<D> {
         for hop in 0..=MOST_HOPS {
             match self.newton(&self.seeds[current], x, tally) {
                 Ok(answer) => {
-                    let slack = self.method.tolerance.max(16.0 * f64::EPSILON * x.amax());
+                    let slack = self.method.slack(x);
                     if answer.distance <= distance * (1.0 + 1e-9) + slack {
                         tally.hopped += u64::from(hop > 0);
                         return answer;
@@ -337,6 +345,7 @@ impl<const D: usize> MaterialSurface<D> {
         let mut spot = seed.spot;
         let mut last = f64::INFINITY;
         let mut left = false;
+        let mut progress = Progress::default();
         for _ in 0..self.method.max_iterations {
             tally.iterations += 1;
             let offset: [f64; D] = (x - spot.point).into();
@@ -349,6 +358,9 @@ impl<const D: usize> MaterialSurface<D> {
             if is_last_step(&self.method, length, last, fit.radius, material.amax()) {
                 let foot = spot.point + Vector::<D>::from(step);
                 return Ok(answer(x, &foot, &spot.jet.moved(&step)));
+            }
+            if progress.is_stuck(length) {
+                return Err(None);
             }
             let most = LONGEST_STEP * fit.radius;
             if length > most {

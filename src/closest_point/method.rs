@@ -77,9 +77,22 @@ impl PcpMethod {
         self.sample_threshold_h + 1.5 * cutoff.max(by_count(self.minimum_ratio * terms)) + 1.0
     }
 
-    /// Whether two positions count as the same place for the iterations.
+    /// How far from the surface the particles of evenly filled neighbourhoods lie, in multiples of h.
     #[must_use]
-    pub fn is_converged<const D: usize>(&self, step: &Vector<D>) -> bool {
-        step.norm_squared() <= self.tolerance * self.tolerance
+    pub fn even_reach_h<const D: usize>(&self) -> f64 {
+        let cutoff = match self.neighborhood {
+            NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,
+            NeighborhoodChoice::Nearest { count } | NeighborhoodChoice::Material { count } => {
+                radius_of_count::<D>(count as f64)
+            }
+        };
+        let terms = term_count::<D>(self.degree) as f64;
+        self.sample_threshold_h + cutoff.max(radius_of_count::<D>(self.minimum_ratio * terms))
+    }
+
+    /// How much farther than the sample a foot may seem from rounding and an early end, for a query at `x`.
+    #[must_use]
+    pub fn slack<const D: usize>(&self, x: &Vector<D>) -> f64 {
+        self.tolerance.max(16.0 * f64::EPSILON * x.amax())
     }
 }

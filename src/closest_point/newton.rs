@@ -60,6 +60,32 @@ const QUADRATIC: f64 = 3e-8;
 /// See [`QUADRATIC`].
 const QUADRATIC_RATIO: f64 = 1e-2;
 
+/// Watches whether steps still become shorter: an iteration that runs in a circle would burn all that are allowed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Progress {
+    shortest: f64,
+    since: u32,
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        Self { shortest: f64::INFINITY, since: 0 }
+    }
+}
+
+/// Iterations without a shorter step than before that are too many.
+const STAGNANT: u32 = 30;
+
+impl Progress {
+    /// Takes the length of a step into account.
+    #[inline(always)]
+    pub(super) fn is_stuck(&mut self, length: f64) -> bool {
+        self.since = if length < self.shortest { 0 } else { self.since + 1 };
+        self.shortest = self.shortest.min(length);
+        self.since > STAGNANT
+    }
+}
+
 /// Whether the iteration ends with a step of this length.
 #[inline(always)]
 pub(super) fn is_last_step(method: &PcpMethod, length: f64, last: f64, radius: f64, largest_coordinate: f64) -> bool {
@@ -104,6 +130,7 @@ pub fn closest_points<const D: usize>(
     let most = Lanes::splat(LONGEST_STEP * fit.radius);
     let limit = fit.radius * fit.radius;
     let mut last = [f64::INFINITY; LANES];
+    let mut progress = [Progress::default(); LANES];
     let mut iterations = 0;
     for iteration in 1..=method.max_iterations {
         let offset = difference(&query, &x);
@@ -133,6 +160,8 @@ pub fn closest_points<const D: usize>(
             } else if is_last_step(method, lengths[lane], last[lane], fit.radius, largest[lane]) {
                 done[lane] = true;
                 any_done = true;
+                active[lane] = false;
+            } else if progress[lane].is_stuck(lengths[lane]) {
                 active[lane] = false;
             } else if away[lane] > limit {
                 ends[lane] = NewtonEnd::LeftSupport(Vector::<D>::from_fn(|d, _| next[d].to_array()[lane]));

@@ -261,7 +261,7 @@ impl<const D: usize> Redistancing<D> {
         let offset = query - foot.point;
         let distance = offset.norm();
         // Equal up to the tolerance and the last bits of the coordinates counts as not farther.
-        let slack = self.method.tolerance.max(16.0 * f64::EPSILON * query.amax());
+        let slack = self.method.slack(query);
         (distance <= sample_distance * (1.0 + 1e-9) + slack).then(|| ClosestPoint {
             point: self.domain.wrap(foot.point),
             distance,

@@ -17,6 +17,11 @@ macro_rules! counters {
                 vec![$(($label, self.$name.load(Ordering::Relaxed)),)*]
             }
 
+            /// Adds those of another.
+            pub fn add(&self, other: &Self) {
+                $(add(&self.$name, get(&other.$name));)*
+            }
+
             /// Takes the counts of an earlier [`Self::entries`] in the same order.
             pub fn restore(&self, counts: &[u64]) {
                 let slots = [$(&self.$name,)*];
@@ -31,15 +36,17 @@ macro_rules! counters {
 counters! {
     /// Regressions solved.
     fits => "fits",
-    /// Fits whose radius had to grow.
+    /// Fits whose radius or count had to grow.
     enlarged => "fits.larger_radius",
     /// Fits of a lower degree than asked.
     lowered => "fits.lower_degree",
-    /// Fits whose moments were too ill-conditioned, solved by orthogonal decomposition instead.
+    /// Fits that moments were asked for and could not do (too few neighbours, too small a pivot, values that are no
+    /// numbers), left to orthogonal decomposition.
     decomposed => "fits.orthogonal",
     /// Near-surface particles without any fit.
     unfitted => "fits.none",
-    /// Fits whose zero could not be reached: no sample particle.
+    /// Fits whose zero could not be reached: no sample particle; in initial positions also points of a stretched patch
+    /// that could not be reached, or were too many.
     unprojected => "samples.not_projected",
     /// Queries solved, the rescued ones included.
     queries => "queries",

@@ -30,6 +30,8 @@ pub struct Extent {
 
 /// Factor of one enlargement.
 pub const GROWTH: f64 = 1.06;
+/// The nearest particles reach so much farther than evenly spread ones where many are missing.
+const WIDE: f64 = 1.5;
 /// Most enlargements: 1.06⁴⁰ ≈ 10.
 const MOST_ENLARGEMENTS: u32 = 40;
 /// Enlargements that one search looks ahead.
@@ -68,7 +70,10 @@ impl Neighborhood {
     ) -> Extent {
         match self {
             Self::Radius { cutoff } => by_radius(cutoff, search, x, needed, spacing, admit, neighbors),
-            Self::Nearest { count } => by_count(count.max(needed), search, x, spacing, admit, neighbors),
+            Self::Nearest { count } => {
+                let extent = by_count(count.max(needed), search, x, spacing, admit, neighbors);
+                Extent { enlargements: extent.enlargements + u32::from(count < needed), ..extent }
+            }
         }
     }
 }
@@ -95,6 +100,7 @@ fn by_radius<const D: usize>(
     let mut found = within(neighbors, radius);
     if found < needed {
         // Far below what an even distribution needs, small steps would only be slow.
+        enlargements += u32::from(radius < 0.8 * expected);
         radius = radius.max(0.8 * expected);
         found = within(neighbors, radius);
     }
@@ -123,7 +129,8 @@ fn by_count<const D: usize>(
     neighbors: &mut Vec<Neighbor<D>>,
 ) -> Extent {
     // A quarter more than an even distribution needs: one search mostly does.
-    let mut radius = 1.12 * spacing * radius_of_count::<D>(count as f64);
+    let expected = spacing * radius_of_count::<D>(count as f64);
+    let mut radius = 1.12 * expected;
     let mut tries = 0;
     gather(search, x, radius, admit, neighbors);
     while neighbors.len() < count && tries < MOST_ENLARGEMENTS {
@@ -138,5 +145,6 @@ fn by_count<const D: usize>(
         neighbors.sort_unstable_by_key(|n| n.index);
     }
     let farthest = neighbors.iter().map(|n| n.r2).fold(0.0, f64::max).sqrt();
-    Extent { radius: farthest.max(spacing * 1e-3), enlargements: 0 }
+    // A neighbourhood far wider than an even one says that particles are missing.
+    Extent { radius: farthest.max(spacing * 1e-3), enlargements: u32::from(farthest > WIDE * expected) }
 }

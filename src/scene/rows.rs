@@ -50,8 +50,8 @@ impl Quantity {
 pub enum Measure {
     /// The error of the last run.
     Error(Quantity),
-    /// The same in multiples of its spacing.
-    ErrorInSpacings(Quantity),
+    /// The largest error of all runs, each in multiples of its spacing.
+    WorstInSpacings(Quantity),
     /// The slope of the least-squares line through log error over log spacing; errors below `floor` are round-off and
     /// left out.
     Order {

@@ -1,5 +1,7 @@
 //! How many particles a band will hold and what memory they take, before they are made.
 
+use crate::closest_point::PcpMethod;
+use crate::closest_point::method::NeighborhoodChoice;
 use crate::geometry::{Surface, Vector};
 use crate::polynomials::multi_index::term_count;
 use crate::scene::Violation;
@@ -61,11 +63,16 @@ pub fn band_particles<const D: usize>(surface: &dyn Surface<D>, reach: f64, spac
 /// Resident memory of a closest-point level set of so many particles: columns, search structures, answers, a frame
 /// and a checkpoint in the making, and the fits of up to half of the particles.
 #[must_use]
-pub fn memory_bytes<const D: usize>(particles: u64, degree: usize) -> u64 {
-    let terms = term_count::<D>(degree);
+pub fn memory_bytes<const D: usize>(particles: u64, method: &PcpMethod) -> u64 {
+    let terms = term_count::<D>(method.degree);
     let columns = 8 * (3 * D + 4);
     let search = 8 * (D + 4);
     let output = 8 * (3 * D + 10);
-    let fits = 8 * (terms + 4 * D + 12) / 2;
+    let geometry = 8 * (D * D + 8 * D + 16);
+    let fits = match method.neighborhood {
+        // ψ and each coordinate, several points of the surface a fit, and the initial positions.
+        NeighborhoodChoice::Material { .. } => 8 * (1 + D) * terms + 4 * geometry + 2 * search,
+        _ => (8 * terms + 2 * geometry) / 2,
+    };
     particles.saturating_mul((3 * columns + search + output + fits) as u64)
 }

@@ -54,7 +54,8 @@ pub static PARAMETERS: &[Parameter] = &[
     Parameter::new("weight", "k in the weight exp(−k r²/r_c²)", WEIGHT, DefaultValue::Json("2")),
     Parameter::new(
         "minimum_ratio",
-        "neighbours per coefficient up to which the radius grows; 2 when the field is overwritten every step, else 1.5",
+        "neighbours per coefficient up to which the radius grows; when not given, 1 where a count of neighbours is given, \
+         else 2 for a level that is overwritten and 1.5 for others",
         Kind::Number { above: None, least: Some(1.0), below: None, most: Some(20.0) },
         DefaultValue::Absent,
     ),
@@ -67,7 +68,8 @@ pub static PARAMETERS: &[Parameter] = &[
     Parameter::new(
         "tolerance",
         "error of a closest point at which iterations end",
-        POSITIVE,
+        // A looser one would take points off the surface for points of it.
+        Kind::Number { above: Some(0.0), least: None, below: None, most: Some(1e-6) },
         DefaultValue::Json("1e-14"),
     ),
     CHOSEN,
@@ -177,7 +179,8 @@ pub fn understand(
         },
         neighborhood,
         solver: if parsed.solver == "orthogonal" { Solver::Orthogonal } else { Solver::Moments },
-        same_branch: parsed.same_branch,
+        // In initial positions branches are apart by themselves.
+        same_branch: parsed.same_branch && !matches!(neighborhood, NeighborhoodChoice::Material { .. }),
         weight: parsed.weight,
         minimum_ratio: match neighborhood {
             // A count that is given is meant.
@@ -197,6 +200,7 @@ pub fn understand(
         NeighborhoodChoice::Material { count } => json!({"type": "material", "count": count}),
     };
     resolved["minimum_ratio"] = json!(method.minimum_ratio);
+    resolved["same_branch"] = json!(method.same_branch);
     if let Some(map) = resolved.as_object_mut() {
         map.shift_remove("cutoff_h");
     }

@@ -68,8 +68,8 @@ mod tests {
                 let moment: f64 =
                     (-4..=4).map(|k| f64::from(k) + shift).map(|x| x.powi(power) * piecewise(x.abs())).sum();
                 let expected = if power == 0 { 1.0 } else { 0.0 };
-                // Coefficients of 3e5 leave eleven digits less than those of double precision.
-                assert!((moment - expected).abs() < 1e-8, "moment {power} at {shift}: {moment}");
+                // Coefficients of 3e5 cost that many digits, and the fourth powers of 4 some more.
+                assert!((moment - expected).abs() < 1e-7, "moment {power} at {shift}: {moment}");
             }
         }
     }

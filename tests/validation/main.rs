@@ -63,6 +63,64 @@ fn remeshing_first_costs_the_order() {
 }
 
 #[test]
+fn frames_are_looked_at_and_change_nothing() {
+    // Whatever is redistanced when: the errors at the end are those of a run without frames, to the last bit.
+    let every = json!({"type": "every", "steps": 4});
+    let nearest = json!({"type": "pcp", "degree": 3, "neighborhood": {"type": "nearest", "count": 30}});
+    for extra in [
+        json!({}),
+        json!({"method": nearest.clone()}),
+        json!({"method": nearest.clone(), "redistance": every.clone()}),
+        json!({"method": nearest, "redistance": every, "field": "overwrite"}),
+    ] {
+        let mut body = json!({
+            "kind": "vortex", "spacing": 0.03125, "steps": 45, "end_time": 2,
+            "flow": {"type": "single_vortex", "period": 2}
+        });
+        body.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+        let errors = |every_time: Option<f64>| {
+            pool(2).install(|| {
+                let plan = meniscus::simulation::OutputPlan { every_time, ..PLAN };
+                let mut simulation = build(&body, plan);
+                while !simulation.is_finished() {
+                    simulation.step().unwrap();
+                }
+                simulation.report().errors
+            })
+        };
+        assert_eq!(errors(None), errors(Some(0.1)), "{body}");
+    }
+}
+
+#[test]
+fn a_thin_band_has_the_particles_that_fits_need() {
+    let report = run(&json!({"kind": "vortex", "spacing": 0.03125, "band_h": 2, "end_time": 1, "steps": 30}));
+    assert!(error(&report, "phi", "max", None) < 0.2 * 0.03125);
+}
+
+#[test]
+fn what_does_not_go_together_is_refused() {
+    let refused = |body: Value, pointer: &str| {
+        let found = meniscus::scene::understand(&body, meniscus::scenes::SCENES).err().unwrap();
+        assert!(found.iter().any(|v| v.pointer == pointer), "{body}: {found:?}");
+    };
+    let material = json!({"type": "pcp", "neighborhood": "material"});
+    let vortex = |extra: Value| {
+        let mut body = json!({"kind": "vortex"});
+        body.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
+        body
+    };
+    refused(vortex(json!({"field": "overwrite", "redistance": "for_output"})), "/redistance/type");
+    refused(vortex(json!({"field": "overwrite", "method": material.clone()})), "/method/neighborhood/type");
+    refused(json!({"kind": "redistance", "method": material}), "/method/neighborhood/type");
+    refused(vortex(json!({"flow": "vortex_3d"})), "/flow/type");
+    refused(vortex(json!({"method": {"type": "pcp", "tolerance": 1}})), "/method/tolerance");
+    let asked = json!({"type": "points", "file": "x"});
+    refused(json!({"kind": "redistance", "repeat": 2, "queries": asked.clone()}), "/repeat");
+    refused(json!({"kind": "redistance", "method": "remesh", "queries": asked}), "/method");
+}
+
+#[test]
 fn the_report_says_what_auto_chose_also_when_a_run_starts_from_the_resolved_scene() {
     for field in ["dual", "overwrite"] {
         let body = json!({"kind": "vortex", "spacing": 0.1, "steps": 2, "field": field});

@@ -32,7 +32,12 @@ pub fn measure(measure: Measure, scenes: &[Value], reports: &[Value]) -> f64 {
     let spacing = |scene: Option<&Value>| scene.and_then(|s| s["spacing"].as_f64()).unwrap_or(f64::NAN);
     match measure {
         Measure::Error(of) => error(last, of).unwrap_or(f64::NAN),
-        Measure::ErrorInSpacings(of) => error(last, of).unwrap_or(f64::NAN) / spacing(scenes.last()),
+        Measure::WorstInSpacings(of) => {
+            let ratio =
+                |(scene, report): (&Value, &Value)| error(report, of).unwrap_or(f64::NAN) / spacing(Some(scene));
+            // A NaN must not be lost in the maximum.
+            scenes.iter().zip(reports).map(ratio).fold(0.0, |worst, r| if r <= worst { worst } else { r })
+        }
         Measure::Order { of, floor } => {
             let points: Vec<(f64, f64)> = scenes
                 .iter()

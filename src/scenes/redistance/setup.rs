@@ -200,7 +200,7 @@ impl<const D: usize> Scene for RedistanceScene<D> {
             steps: self.repeats,
             time_step: 1.0,
             end_time: self.repeats as f64,
-            memory_bytes: memory_bytes::<D>(particles, self.method.degree),
+            memory_bytes: memory_bytes::<D>(particles, &self.method),
         }
     }
 

@@ -111,6 +111,16 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
             None
         }
     };
+    if let (Redistance::ForOutput { .. }, Field::Overwrite) = (&written.redistance, written.field) {
+        let detail = "overwriting when output asks would make output part of the physics; give a schedule";
+        violations.push(Violation::new(
+            "/redistance/type",
+            "conflict",
+            detail,
+            &json!("for_output"),
+            json!(["auto", "every"]),
+        ));
+    }
     if let (Some(step), Some(_)) = (written.time_step, written.steps) {
         let detail = "steps are given instead of a time step; give one of them";
         violations.push(Violation::new("/time_step", "conflict", detail, &json!(step), Value::Null));
@@ -207,6 +217,13 @@ fn flow<const D: usize>(flow: &Flow) -> Result<Box<dyn geometry::Flow<D>>, Viola
     }
 }
 
+impl<const D: usize> VortexScene<D> {
+    /// How far from the surface particles are made: over the band, and beyond a thin one what fits need.
+    fn reach(&self) -> f64 {
+        self.half_band.max(self.method.even_reach_h::<D>() * self.lattice.spacing)
+    }
+}
+
 impl<const D: usize> Scene for VortexScene<D> {
     fn resolved(&self) -> Value {
         self.resolved.clone()
@@ -226,13 +243,13 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn estimate(&self) -> Estimate {
         let particles = shapes::surface::<D>(&self.shape, "/shape")
-            .map_or(0, |surface| band_particles(surface.as_ref(), self.half_band, self.lattice.spacing));
+            .map_or(0, |surface| band_particles(surface.as_ref(), self.reach(), self.lattice.spacing));
         Estimate {
             particles,
             steps: self.fixed.steps,
             time_step: self.fixed.time_step,
             end_time: self.end_time,
-            memory_bytes: memory_bytes::<D>(particles, self.method.degree),
+            memory_bytes: memory_bytes::<D>(particles, &self.method),
         }
     }
 
@@ -248,7 +265,7 @@ impl<const D: usize> Scene for VortexScene<D> {
         };
         let (start, surface) = if self.clouds.is_empty() {
             let surface = shapes::surface::<D>(&self.shape, "/shape")?;
-            let start = Start::about(surface.as_ref(), &self.lattice, self.half_band, &context.interrupt);
+            let start = Start::about(surface.as_ref(), &self.lattice, self.reach(), &context.interrupt);
             (start, Some(surface))
         } else {
             let (positions, level) =

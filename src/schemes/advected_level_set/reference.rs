@@ -3,6 +3,7 @@
 
 use crate::geometry::{Domain, Flow, Surface, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
+use crate::parallel::{Interrupt, Interrupted};
 use crate::time::PathIntegrator;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
@@ -60,33 +61,44 @@ impl<const D: usize> ExactMotion<D> {
     }
 
     /// The surface at a time, resolved for particles of a spacing; None where it is not known.
-    #[must_use]
-    pub fn front(&self, time: f64, spacing: f64) -> Option<ExactFront<'_, D>> {
-        let surface = self.surface()?;
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn front(
+        &self,
+        time: f64,
+        spacing: f64,
+        interrupt: &Interrupt,
+    ) -> Result<Option<ExactFront<'_, D>>, Interrupted> {
+        let Some(surface) = self.surface() else { return Ok(None) };
         let returned = self.flow.return_time().is_some_and(|period| {
             let turns = time / period;
             (turns - turns.round()).abs() < 1e-9
         });
         let by_formula = time == 0.0 || returned || self.flow.is_rigid();
         if by_formula {
-            return Some(ExactFront { motion: self, surface, time, advected: None });
+            return Ok(Some(ExactFront { motion: self, surface, time, advected: None }));
         }
         let (low, high) = surface.bounding_box();
         let perimeter = 4.0 * (high - low).max();
         let outline = surface.outline((spacing / POINTS_PER_SPACING).max(perimeter / MOST_POINTS));
         if outline.is_empty() {
-            return None;
+            return Ok(None);
         }
         let starts: Vec<Vector<D>> = outline.iter().flatten().copied().collect();
         let mut joined = Vec::with_capacity(starts.len());
         for chain in &outline {
             joined.extend((0..chain.len()).map(|k| k + 1 < chain.len()));
         }
-        let points: Vec<Vector<D>> =
-            starts.par_iter().map(|x| TOLERANCE.advance(self.flow.as_ref(), x, 0.0, time)).collect();
+        let end = |x: &Vector<D>| {
+            if interrupt.is_raised() { *x } else { TOLERANCE.advance(self.flow.as_ref(), x, 0.0, time) }
+        };
+        let points: Vec<Vector<D>> = starts.par_iter().map(end).collect();
+        interrupt.check()?;
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(points.iter().copied(), 0.25 * spacing);
-        Some(ExactFront { motion: self, surface, time, advected: Some(AdvectedFront { points, joined, cells }) })
+        let advected = Some(AdvectedFront { points, joined, cells });
+        Ok(Some(ExactFront { motion: self, surface, time, advected }))
     }
 }
 
@@ -138,7 +150,7 @@ impl<const D: usize> AdvectedFront<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::ExactMotion;
+    use super::{ExactMotion, Interrupt};
     use crate::geometry::Vector;
     use crate::geometry::flows::{Rotation, SingleVortex};
     use crate::geometry::surfaces::Ball;
@@ -150,7 +162,7 @@ mod tests {
     #[test]
     fn a_returned_vortex_is_the_start() {
         let motion = ExactMotion::new(ball(), Box::new(SingleVortex { period: Some(8.0) }));
-        let front = motion.front(8.0, 1.0 / 64.0).unwrap();
+        let front = motion.front(8.0, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         assert!((front.signed_distance(&Vector::<2>::new(0.5, 1.0)) - 0.1).abs() < 1e-15);
     }
 
@@ -158,7 +170,7 @@ mod tests {
     fn the_advected_front_agrees_with_a_nearly_returned_one() {
         // Just before the return the surface is displaced by less than 2e-8: speed vanishes with the cosine.
         let motion = ExactMotion::new(ball(), Box::new(SingleVortex { period: Some(2.0) }));
-        let front = motion.front(2.0 - 2e-8, 1.0 / 64.0).unwrap();
+        let front = motion.front(2.0 - 2e-8, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         for x in [Vector::<2>::new(0.5, 1.0), Vector::<2>::new(0.42, 0.7), Vector::<2>::new(0.655, 0.75)] {
             let exact = (x - Vector::<2>::new(0.5, 0.75)).norm() - 0.15;
             assert!((front.signed_distance(&x) - exact).abs() < 1e-7);
@@ -169,7 +181,7 @@ mod tests {
     fn rigid_motion_is_exact() {
         let rotation = Rotation { center: Vector::<2>::new(0.5, 0.5), angular_velocity: 1.0 };
         let motion = ExactMotion::new(ball(), Box::new(rotation));
-        let front = motion.front(std::f64::consts::FRAC_PI_2, 1.0 / 64.0).unwrap();
+        let front = motion.front(std::f64::consts::FRAC_PI_2, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         // A quarter turn takes the centre to (0.25, 0.5).
         assert!((front.signed_distance(&Vector::<2>::new(0.25, 0.8)) - 0.15).abs() < 1e-10);
     }

@@ -3,6 +3,7 @@
 use super::system::{AdvectedSystem, FieldChoice, RedistanceWhen};
 use crate::closest_point::LevelSurface;
 use crate::closest_point::enclosed_measure::enclosed_measure;
+use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::particles::Particles;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, entry, rescued};
@@ -38,34 +39,37 @@ pub struct AdvectedLevelSet<const D: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MeasuredErrors {
     time: f64,
-    phi_rms: f64,
-    phi_max: f64,
     measure_relative: f64,
-    samples_mean: f64,
-    samples_max: f64,
+    /// RMS and maximum of φ, mean and maximum of the samples, where the exact front is known.
+    distances: Option<[f64; 4]>,
 }
 
 impl MeasuredErrors {
-    const NUMBERS: usize = 6;
+    const NUMBERS: usize = 7;
 
     fn to_numbers(self) -> [f64; Self::NUMBERS] {
-        [self.time, self.phi_rms, self.phi_max, self.measure_relative, self.samples_mean, self.samples_max]
+        let [rms, max, mean, most] = self.distances.unwrap_or_default();
+        let is_known = if self.distances.is_some() { 1.0 } else { 0.0 };
+        [self.time, self.measure_relative, is_known, rms, max, mean, most]
     }
 
     fn from_numbers(n: &[f64]) -> Self {
-        Self { time: n[0], phi_rms: n[1], phi_max: n[2], measure_relative: n[3], samples_mean: n[4], samples_max: n[5] }
+        let distances = (n[2] > 0.5).then(|| [n[3], n[4], n[5], n[6]]);
+        Self { time: n[0], measure_relative: n[1], distances }
     }
 
     fn entries(&self, dimension: usize) -> Vec<ErrorEntry> {
         let reference = "exact motion";
         let measure = if dimension == 2 { "area" } else { "volume" };
-        vec![
-            entry("phi", "rms", self.phi_rms, self.time, reference),
-            entry("phi", "max", self.phi_max, self.time, reference),
-            entry(measure, "relative", self.measure_relative, self.time, "conservation"),
-            entry("samples", "mean", self.samples_mean, self.time, reference),
-            entry("samples", "max", self.samples_max, self.time, reference),
-        ]
+        let mut entries = vec![entry(measure, "relative", self.measure_relative, self.time, "conservation")];
+        if let Some([rms, max, mean, most]) = self.distances {
+            for (quantity, norm, value) in
+                [("phi", "rms", rms), ("phi", "max", max), ("samples", "mean", mean), ("samples", "max", most)]
+            {
+                entries.push(entry(quantity, norm, value, self.time, reference));
+            }
+        }
+        entries
     }
 }
 
@@ -107,16 +111,15 @@ impl<const D: usize> AdvectedLevelSet<D> {
         }
     }
 
-    /// Whether the step that ends at `step` redistances.
+    /// Whether the step that ends at `step` redistances the particles themselves. On a schedule only the schedule does,
+    /// since a redistancing leaves its distances or normals to the next: what output asks for in between is taken on a
+    /// copy and never becomes physics. Without a schedule nothing is left to anybody, so output may redistance.
     fn is_redistancing_due(&self, step: u64) -> bool {
-        let needed = step >= self.fixed.steps || self.is_error_due(step) || self.plan.is_frame_due(&self.fixed, step);
-        match (self.system.when, self.system.field) {
-            (RedistanceWhen::ForOutput, _) => needed,
-            // Overwriting for a frame would make the output part of the physics: such frames use a copy.
-            (RedistanceWhen::Every(every), FieldChoice::Overwrite) => {
-                step.is_multiple_of(every) || step >= self.fixed.steps
+        match self.system.when {
+            RedistanceWhen::ForOutput => {
+                step >= self.fixed.steps || self.is_error_due(step) || self.plan.is_frame_due(&self.fixed, step)
             }
-            (RedistanceWhen::Every(every), FieldChoice::Dual) => step.is_multiple_of(every) || needed,
+            RedistanceWhen::Every(every) => step.is_multiple_of(every),
         }
     }
 
@@ -142,30 +145,30 @@ impl<const D: usize> AdvectedLevelSet<D> {
         particles: &Particles<D>,
         surface: &LevelSurface<D>,
         measure: f64,
-    ) -> Option<MeasuredErrors> {
+    ) -> Result<MeasuredErrors, Interrupted> {
         let system = &self.system;
-        let front = system.motion.front(time, system.spacing)?;
+        let exact = self.initial_measure;
+        let measure_relative = (measure - exact).abs() / exact;
+        let Some(front) = system.motion.front(time, system.spacing, &system.interrupt)? else {
+            return Ok(MeasuredErrors { time, measure_relative, distances: None });
+        };
+        let interrupt = &system.interrupt;
+        let distance = |x: &Vector<D>| if interrupt.is_raised() { 0.0 } else { front.signed_distance(x) };
         let band = particles.flag(system.columns.in_band);
         let phi = particles.scalar(system.columns.phi);
         let differences: Vec<f64> = (0..particles.len())
             .into_par_iter()
             .filter(|&i| band[i] == 1)
-            .map(|i| phi[i] - front.signed_distance(&particles.positions()[i]))
+            .map(|i| phi[i] - distance(&particles.positions()[i]))
             .collect();
         let mut norms = ErrorNorms::default();
         for difference in differences {
             norms.add(difference);
         }
-        let (samples_mean, samples_max) = surface.over_samples(|x| front.signed_distance(x).abs());
-        let exact = self.initial_measure;
-        Some(MeasuredErrors {
-            time,
-            phi_rms: norms.rms(),
-            phi_max: norms.max(),
-            measure_relative: (measure - exact).abs() / exact,
-            samples_mean,
-            samples_max,
-        })
+        let (samples_mean, samples_max) = surface.over_samples(|x| distance(x).abs());
+        interrupt.check()?;
+        let distances = Some([norms.rms(), norms.max(), samples_mean, samples_max]);
+        Ok(MeasuredErrors { time, measure_relative, distances })
     }
 
     /// Takes the errors of this moment: of the particles as they are where they were just redistanced, else of a copy,
@@ -173,13 +176,19 @@ impl<const D: usize> AdvectedLevelSet<D> {
     fn take_errors(&mut self, now: Clock) -> Result<(), StepError> {
         let start = (self.phases.clock())();
         let measured = if self.redistanced == now.step {
-            self.measure_errors(now.time, &self.system.particles, &self.system.redistancing, self.measure)
+            self.measure_errors(now.time, &self.system.particles, &self.system.redistancing, self.measure)?
         } else {
             let (particles, surface) = self.system.redistanced_copy(&self.system.interrupt)?;
-            let measure = enclosed_measure(&surface, &self.system.interrupt)?;
-            self.measure_errors(now.time, &particles, &surface, measure)
+            if surface.is_lost() {
+                return Err(StepError::InterfaceLost { step: now.step, time: now.time });
+            }
+            // What the copy could not do the plain way stands behind the errors that are reported.
+            self.system.redistancing.take_over(&surface);
+            self.measure = enclosed_measure(&surface, &self.system.interrupt)?;
+            self.measured = now.step;
+            self.measure_errors(now.time, &particles, &surface, self.measure)?
         };
-        self.errors.extend(measured);
+        self.errors.push(measured);
         self.phases.book("errors", (self.phases.clock())() - start);
         Ok(())
     }
@@ -195,7 +204,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     }
 
     /// 1. Transport: positions move, ψ stays with them.
-    /// 2. Redistancing, where the scene or the output asks for it.
+    /// 2. Redistancing, on the scene's schedule or, without one, where output needs it.
     /// 3. The enclosed measure for a due series row; errors half way and at the end.
     fn step(&mut self) -> Result<(), StepError> {
         let before = self.clock();

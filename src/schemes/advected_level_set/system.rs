@@ -64,13 +64,13 @@ pub struct Start<const D: usize> {
 }
 
 impl<const D: usize> Start<D> {
-    /// On a lattice within `half_band` of a surface, with the exact distance as level.
+    /// On a lattice within `reach` of a surface, with the exact distance as level.
     #[must_use]
-    pub fn about(surface: &dyn Surface<D>, lattice: &Lattice, half_band: f64, interrupt: &Interrupt) -> Self {
+    pub fn about(surface: &dyn Surface<D>, lattice: &Lattice, reach: f64, interrupt: &Interrupt) -> Self {
         let (low, high) = surface.bounding_box();
-        let margin = half_band + lattice.spacing;
+        let margin = reach + lattice.spacing;
         let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
-        let positions = lattice.points_near(&low, &high, half_band, |x| surface.signed_distance(x), interrupt);
+        let positions = lattice.points_near(&low, &high, reach, |x| surface.signed_distance(x), interrupt);
         let level = positions.iter().map(|x| surface.signed_distance(x)).collect();
         Self { positions, level }
     }
@@ -103,7 +103,9 @@ impl<const D: usize> AdvectedSystem<D> {
         let columns = SurfaceColumns::add(&mut particles);
         particles.scalar_mut(psi).copy_from_slice(&start.level);
         particles.scalar_mut(columns.phi).copy_from_slice(&start.level);
-        particles.flag_mut(columns.in_band).fill(1);
+        for (flag, level) in particles.flag_mut(columns.in_band).iter_mut().zip(&start.level) {
+            *flag = u8::from(level.abs() <= half_band);
+        }
         if let Some(surface) = motion.surface() {
             for i in 0..particles.len() {
                 let exact = surface.nearest(&particles.positions()[i]);
@@ -162,11 +164,20 @@ impl<const D: usize> AdvectedSystem<D> {
         Ok(longest.sqrt() / self.spacing)
     }
 
+    /// The normals that tell branches apart: those of the last redistancing, where a schedule keeps them fresh.
+    fn last_normals<'p>(
+        when: RedistanceWhen,
+        particles: &'p Particles<D>,
+        columns: &SurfaceColumns,
+    ) -> Option<&'p [Vector<D>]> {
+        matches!(when, RedistanceWhen::Every(_)).then(|| particles.vector(columns.normal))
+    }
+
     /// Rebuilds the surface from ψ and writes distance, closest point, normal and curvature of the band.
     pub(super) fn redistance(&mut self, phases: &mut Phases) -> Result<(), Interrupted> {
         let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
         // Whoever is nearer than w/2 to a sample is asked for the exact distance (PCP 3.4).
-        let normals = Some(self.particles.vector(self.columns.normal));
+        let normals = Self::last_normals(self.when, &self.particles, &self.columns);
         let (surface, answers) = (&mut self.redistancing, &mut self.answers);
         redistance(surface, positions, psi, normals, self.half_band, answers, &self.interrupt, phases)?;
         phases.measure("redistancing/store", || self.store());
@@ -202,7 +213,7 @@ impl<const D: usize> AdvectedSystem<D> {
         };
         let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
         let mut answers = Answers::default();
-        let normals = Some(self.particles.vector(self.columns.normal));
+        let normals = Self::last_normals(self.when, &self.particles, &self.columns);
         let mut phases = Phases::new(CpuClock::still());
         redistance(&mut surface, positions, psi, normals, self.half_band, &mut answers, interrupt, &mut phases)?;
         self.columns.store(&mut particles, self.psi, &answers, self.half_band);
