@@ -153,41 +153,4 @@ impl<const D: usize> Particles<D> {
     pub fn columns_mut(&mut self) -> &mut [Column<D>] {
         &mut self.columns
     }
-
-    /// Puts particle `order[k]` at place k, in positions and in every column at once.
-    pub fn reorder(&mut self, order: &[usize]) {
-        self.positions = order.iter().map(|&i| self.positions[i]).collect();
-        for column in &mut self.columns {
-            match &mut column.values {
-                ColumnValues::Scalar(values) => *values = order.iter().map(|&i| values[i]).collect(),
-                ColumnValues::Vector(values) => *values = order.iter().map(|&i| values[i]).collect(),
-                ColumnValues::Flag(values) => *values = order.iter().map(|&i| values[i]).collect(),
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Particles, Vector};
-
-    #[test]
-    fn reordering_moves_positions_and_columns_together() {
-        let mut particles = Particles::new((0..5).map(|i| Vector::<2>::new(f64::from(i), 0.0)).collect());
-        let phi = particles.add_scalar("phi", 0.0);
-        let normal = particles.add_vector("normal", Vector::<2>::zeros());
-        let phase = particles.add_flag("phase", 0);
-        for i in 0..5_u8 {
-            particles.scalar_mut(phi)[i as usize] = f64::from(i);
-            particles.vector_mut(normal)[i as usize][1] = f64::from(i);
-            particles.flag_mut(phase)[i as usize] = i;
-        }
-        particles.reorder(&[3, 1, 4, 0, 2]);
-        for (k, i) in [3_u8, 1, 4, 0, 2].into_iter().enumerate() {
-            assert_eq!(particles.positions()[k][0] as u8, i);
-            assert_eq!(particles.scalar(phi)[k] as u8, i);
-            assert_eq!(particles.vector(normal)[k][1] as u8, i);
-            assert_eq!(particles.flag(phase)[k], i);
-        }
-    }
 }

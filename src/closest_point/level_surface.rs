@@ -96,19 +96,15 @@ impl<const D: usize> LevelSurface<D> {
         each!(self, surface => surface.is_lost())
     }
 
-    /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
-    /// the surface has gaps.
-    #[must_use]
-    pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
-        each!(self, surface => surface.is_nearest_particle_inside(x))
-    }
-
-    /// Whether a point lies inside, given its closest point. Away from the surface the nearest particle tells it: of a
-    /// surface with gaps, a foot at the rim of a gap faces nowhere in particular.
+    /// Whether a point lies inside, given its closest point. Away from a surface in space the nearest particle tells it:
+    /// of a surface with gaps, a foot at the rim of a gap faces nowhere in particular. In material coordinates there are
+    /// points wherever the flow has stretched the surface, and particles may lie far apart instead.
     #[must_use]
     pub fn is_inside(&self, x: &Vector<D>, foot: &ClosestPoint<D>) -> bool {
-        let is_far = foot.distance > FAR * self.spacing();
-        if is_far { self.is_nearest_particle_inside(x) } else { !foot.is_outside }
+        match self {
+            Self::Spatial(surface) if foot.distance > FAR * surface.spacing() => surface.is_nearest_particle_inside(x),
+            _ => !foot.is_outside,
+        }
     }
 
     /// What did not go the plain way so far.

@@ -46,8 +46,6 @@ pub struct MaterialSurface<const D: usize> {
     seeds: Vec<Seed<D>>,
     found: Vec<Vec<Seed<D>>>,
     seed_cells: CellList<D>,
-    /// Particles where they are now.
-    cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
     counts: RescueCounts,
     worst_condition: f64,
@@ -104,7 +102,6 @@ impl<const D: usize> MaterialSurface<D> {
             seeds: Vec::new(),
             found: Vec::new(),
             seed_cells: CellList::new(Domain::unbounded()),
-            cells: CellList::new(Domain::unbounded()),
             scratch: PerThread::new(),
             counts: RescueCounts::default(),
             worst_condition: 0.0,
@@ -151,12 +148,6 @@ impl<const D: usize> MaterialSurface<D> {
         self.seeds.is_empty()
     }
 
-    /// Whether the particle nearest to `x` has a negative level.
-    #[must_use]
-    pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
-        self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.origin.level[i] < 0.0)
-    }
-
     /// Fits ψ(X) and x(X) about the particles that started next to the surface, and seeds.
     ///
     /// # Errors
@@ -164,7 +155,6 @@ impl<const D: usize> MaterialSurface<D> {
     pub fn fit(&mut self, positions: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
         let quantities = 1 + D;
         let size = quantities * self.regression.terms();
-        self.cells.rebuild(positions.iter().copied(), 1.5 * self.spacing);
         let origin = Arc::clone(&self.origin);
         let near = origin.detection.near();
         self.fits.resize(near.len(), None);
@@ -335,7 +325,7 @@ impl<const D: usize> MaterialSurface<D> {
         }
         tally.sample_distance += 1;
         let Spot { point, jet, .. } = &self.seeds[nearest].spot;
-        answer(x, point, jet)
+        answer(x, point, jet, true)
     }
 
     /// The foot, or where the iteration left the fit, if it did.
@@ -357,7 +347,7 @@ impl<const D: usize> MaterialSurface<D> {
             }
             if is_last_step(&self.method, length, last, fit.radius, material.amax()) {
                 let foot = spot.point + Vector::<D>::from(step);
-                return Ok(answer(x, &foot, &spot.jet.moved(&step)));
+                return Ok(answer(x, &foot, &spot.jet.moved(&step), false));
             }
             if progress.is_stuck(length) {
                 return Err(None);
@@ -413,7 +403,7 @@ impl<const D: usize> MaterialSurface<D> {
     }
 }
 
-fn answer<const D: usize>(x: &Vector<D>, foot: &Vector<D>, jet: &Jet<f64, D>) -> ClosestPoint<D> {
+fn answer<const D: usize>(x: &Vector<D>, foot: &Vector<D>, jet: &Jet<f64, D>, is_sample: bool) -> ClosestPoint<D> {
     let offset = x - foot;
     let normal = Vector::<D>::from(jet.normal());
     ClosestPoint {
@@ -422,5 +412,6 @@ fn answer<const D: usize>(x: &Vector<D>, foot: &Vector<D>, jet: &Jet<f64, D>) ->
         normal,
         curvature: jet.curvature(),
         is_outside: offset.dot(&normal) >= 0.0,
+        is_sample,
     }
 }

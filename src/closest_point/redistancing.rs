@@ -25,6 +25,8 @@ pub struct ClosestPoint<const D: usize> {
     pub curvature: f64,
     /// Whether the query lies on the outer side, by the normal.
     pub is_outside: bool,
+    /// Whether it is the nearest sample itself, for want of a closest point.
+    pub is_sample: bool,
 }
 
 /// The surface of a set of particles: sample particles with their polynomials, and the means to rebuild it.
@@ -268,6 +270,7 @@ impl<const D: usize> Redistancing<D> {
             normal: foot.normal,
             curvature: foot.curvature,
             is_outside: offset.dot(&foot.normal) >= 0.0,
+            is_sample: false,
         })
     }
 
@@ -312,6 +315,7 @@ impl<const D: usize> Redistancing<D> {
             normal,
             curvature: jet.curvature(),
             is_outside: self.domain.displacement(point, x).dot(&normal) >= 0.0,
+            is_sample: true,
         }
     }
 

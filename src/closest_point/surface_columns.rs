@@ -71,12 +71,7 @@ impl SurfaceColumns {
         answers: &Answers<D>,
         half_band: f64,
     ) {
-        // Who leaves the band knows nothing of the surface any more.
-        for i in 0..particles.len() {
-            if particles.flag(self.in_band)[i] == 1 {
-                particles.vector_mut(self.normal)[i] = Vector::<D>::zeros();
-            }
-        }
+        // Who leaves the band keeps its last normal: an old one still tells branches apart better than none (measured).
         particles.flag_mut(self.in_band).fill(0);
         for (i, answer) in answers.iter().filter(|(_, a)| a.distance <= half_band) {
             particles.flag_mut(self.in_band)[i] = 1;

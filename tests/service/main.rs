@@ -9,6 +9,7 @@ mod files;
 mod jobs;
 mod readers;
 mod requests;
+mod verify;
 
 use support::Service;
 

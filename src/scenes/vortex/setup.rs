@@ -82,10 +82,9 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         };
         // In space a fit of the same degree needs proportionally more neighbours.
         let count = if D == 2 { count } else { 2 * count };
-        // Fewer sample particles cost accuracy at T/2 of a vortex and gain it at T, where four resolutions were compared.
-        let sample_threshold_h = if written.field == Field::Overwrite { 1.2 } else { 1.5 };
+        let weight = if written.field == Field::Overwrite { 3 } else { 2 };
         let choice = json!({
-            "degree": degree, "sample_threshold_h": sample_threshold_h, "neighborhood": {"type": neighborhood, "count": count}, "tolerance": 1e-12,
+            "degree": degree, "weight": weight, "neighborhood": {"type": neighborhood, "count": count}, "tolerance": 1e-12,
             "max_iterations": 100
         });
         let mut method =

@@ -188,11 +188,10 @@ impl<const D: usize> AdvectedSystem<D> {
     fn store(&mut self) {
         self.columns.store(&mut self.particles, self.psi, &self.answers, self.half_band);
         if self.field == FieldChoice::Overwrite {
-            for i in 0..self.particles.len() {
-                if self.particles.flag(self.columns.in_band)[i] == 1 {
-                    let phi = self.particles.scalar(self.columns.phi)[i];
-                    self.particles.scalar_mut(self.psi)[i] = phi;
-                }
+            // The distance from a mere sample is worse than what the particle has carried here.
+            for (i, answer) in self.answers.iter().filter(|(_, a)| a.distance <= self.half_band && !a.is_sample) {
+                let phi = answer.distance.copysign(self.particles.scalar(self.psi)[i]);
+                self.particles.scalar_mut(self.psi)[i] = phi;
             }
         }
     }
