@@ -21,5 +21,5 @@ pub use material::MaterialSurface;
 pub use method::PcpMethod;
 pub use queries::Answers;
 pub use redistancing::{ClosestPoint, Redistancing};
-pub use rescue::RescueCounts;
+pub use rescue::{RescueCounts, Soundness};
 pub use surface_columns::SurfaceColumns;

@@ -13,7 +13,7 @@ pub use basis::{BasisKind, PolynomialBasis};
 pub use local_polynomial::{Jet, LocalPolynomial};
 pub use multi_index::MultiIndexSet;
 pub use neighborhood::Neighborhood;
-pub use regression::{Fit, Regression, RegressionScratch, Solver};
+pub use regression::{Fit, FitData, Regression, RegressionScratch, Solver};
 
 /// The largest total degree that a basis can have.
 pub const MAX_DEGREE: usize = 8;

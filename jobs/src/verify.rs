@@ -85,7 +85,9 @@ pub fn verify(request: &Request, mut shown: impl FnMut(&Outcome) -> io::Result<(
         fs::create_dir_all(&request.results)?;
         for figure in figures {
             let path = request.results.join(format!("{}.svg", figure.name));
-            figures::draw(&path, figure, &bench.lines(figure))
+            bench
+                .lines(figure)
+                .and_then(|lines| figures::draw(&path, figure, &lines))
                 .map_err(|cause| VerifyError::Picture { name: figure.name, cause })?;
         }
         // A document that several kinds share is not replaced by the table of one.
@@ -124,16 +126,22 @@ impl Bench {
         Outcome::new(kind, row, figure, cpu_s, failure)
     }
 
-    fn lines(&self, figure: &Figure) -> Vec<(String, Vec<figures::Point>)> {
+    fn lines(&self, figure: &Figure) -> Result<figures::Lines, String> {
         let point = |scene: &Value| {
-            let report = self.report(scene).ok()?;
-            Some(figures::Point {
-                spacing: scene["spacing"].as_f64()?,
-                seconds: measure::seconds(&report, figure.phases),
-                error: measure::error(&report, figure.quantity)?,
-            })
+            let report = self.report(scene)?;
+            let found = || {
+                Some(figures::Point {
+                    spacing: scene["spacing"].as_f64()?,
+                    seconds: measure::seconds(&report, figure.phases),
+                    error: measure::error(&report, figure.quantity)?,
+                })
+            };
+            found().ok_or_else(|| format!("{scene} reports no {} {}", figure.quantity.name, figure.quantity.norm))
         };
-        figure.lines.iter().map(|(label, runs)| (label.clone(), runs.iter().filter_map(point).collect())).collect()
+        let line = |(label, runs): &(String, Vec<Value>)| {
+            Ok((label.clone(), runs.iter().map(point).collect::<Result<_, String>>()?))
+        };
+        figure.lines.iter().map(line).collect()
     }
 
     /// The report of a scene: of its earlier run with this build, or of one made now.

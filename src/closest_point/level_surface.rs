@@ -3,7 +3,7 @@
 use super::material::MaterialSurface;
 use super::queries::Answers;
 use super::redistancing::{ClosestPoint, Redistancing};
-use super::rescue::RescueCounts;
+use super::rescue::Soundness;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
@@ -107,27 +107,15 @@ impl<const D: usize> LevelSurface<D> {
         }
     }
 
-    /// What did not go the plain way so far.
+    /// How sound fits and queries have been so far.
     #[must_use]
-    pub fn counts(&self) -> &RescueCounts {
-        each!(self, surface => surface.counts())
+    pub fn soundness(&self) -> &Soundness {
+        each!(self, surface => surface.soundness())
     }
 
-    /// The worst condition of a scaled regression matrix so far.
-    #[must_use]
-    pub fn worst_condition(&self) -> f64 {
-        each!(self, surface => surface.worst_condition())
-    }
-
-    /// Takes over the worst condition of an earlier part of the same run.
-    pub fn restore_worst_condition(&mut self, condition: f64) {
-        each!(self, surface => surface.restore_worst_condition(condition));
-    }
-
-    /// Adds what another surface of the same particles could not do the plain way.
-    pub fn take_over(&mut self, other: &Self) {
-        self.counts().add(other.counts());
-        self.restore_worst_condition(self.worst_condition().max(other.worst_condition()));
+    /// The same, to take over that of an earlier part of the run or of a copy.
+    pub fn soundness_mut(&mut self) -> &mut Soundness {
+        each!(self, surface => surface.soundness_mut())
     }
 
     /// Mean and maximum of a measure over the points of the surface, in their order; (0, 0) without any.

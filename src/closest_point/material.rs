@@ -2,8 +2,8 @@
 //!
 //! Where particles are carried by a flow and keep their level ψ, both ψ and the position x are smooth functions of the
 //! particle's initial position X, however distorted the particles lie now. Fits of ψ(X) and x(X) over neighbours in the
-//! *initial* positions keep two sheets of a filament apart by themselves, and the neighbours never change. In the plane
-//! tangent to that map, the chain rule gives the level set in space:
+//! *initial* positions keep two sheets of a filament apart by themselves, and the neighbours never change. The chain rule
+//! gives the level set in space:
 //!
 //! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹,
 //!
@@ -12,15 +12,16 @@
 use super::detection::Detection;
 use super::method::PcpMethod;
 use super::newton::{ACCEPTED, LONGEST_STEP, Progress, is_last_step, newton_step, tangents};
+use super::projection::{Projected, project};
 use super::queries::{Answers, QUERIES};
-use super::redistancing::{ClosestPoint, Tally, count_fit};
-use super::rescue::{RescueCounts, add};
+use super::redistancing::{ClosestPoint, Tally};
+use super::rescue::{Soundness, add};
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
 use crate::polynomials::horner::derivatives;
-use crate::polynomials::{Fit, Jet, Regression, RegressionScratch};
+use crate::polynomials::{Fit, FitData, Jet, Regression, RegressionScratch};
 use nalgebra::SMatrix;
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 use std::sync::Arc;
@@ -47,8 +48,7 @@ pub struct MaterialSurface<const D: usize> {
     found: Vec<Vec<Seed<D>>>,
     seed_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
-    counts: RescueCounts,
-    worst_condition: f64,
+    soundness: Soundness,
 }
 
 /// A point of the surface.
@@ -103,8 +103,7 @@ impl<const D: usize> MaterialSurface<D> {
             found: Vec::new(),
             seed_cells: CellList::new(Domain::unbounded()),
             scratch: PerThread::new(),
-            counts: RescueCounts::default(),
-            worst_condition: 0.0,
+            soundness: Soundness::default(),
         }
     }
 
@@ -120,21 +119,15 @@ impl<const D: usize> MaterialSurface<D> {
         self.spacing
     }
 
-    /// What did not go the plain way so far.
+    /// How sound fits and queries have been so far.
     #[must_use]
-    pub fn counts(&self) -> &RescueCounts {
-        &self.counts
+    pub fn soundness(&self) -> &Soundness {
+        &self.soundness
     }
 
-    /// The worst condition of a scaled regression matrix so far.
-    #[must_use]
-    pub fn worst_condition(&self) -> f64 {
-        self.worst_condition
-    }
-
-    /// Takes over the worst condition of an earlier part of the same run.
-    pub fn restore_worst_condition(&mut self, condition: f64) {
-        self.worst_condition = condition;
+    /// The same, to take over that of an earlier part of the run.
+    pub fn soundness_mut(&mut self) -> &mut Soundness {
+        &mut self.soundness
     }
 
     /// Points of the surface.
@@ -170,19 +163,19 @@ impl<const D: usize> MaterialSurface<D> {
                 }
                 let last = near.len() - 1;
                 let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
-                let value = |j: usize, q: usize| if q == 0 { origin.level[j] } else { positions[j][q - 1] };
+                let values = |j: usize, q: usize| if q == 0 { origin.level[j] } else { positions[j][q - 1] };
+                let data =
+                    FitData { search: origin.detection.cells(), values, quantities, admit: |_: usize, _: usize| true };
                 scratch.with(|scratch| {
-                    let cells = origin.detection.cells();
-                    let all = |_, _| true;
-                    let centres = &centres[..near.len()];
-                    let found = regression.fit_lanes(cells, centres, &value, quantities, &all, scratch, coefficients);
+                    let found = regression.fit_lanes(&data, &centres[..near.len()], scratch, coefficients);
                     fits.copy_from_slice(&found[..near.len()]);
                 });
             });
         interrupt.check()?;
         for fit in &self.fits {
-            count_fit(&self.counts, fit.as_ref(), self.regression.degree());
-            self.worst_condition = fit.map_or(self.worst_condition, |fit| self.worst_condition.max(fit.condition));
+            self.soundness.counts.take_fit(fit.as_ref(), self.regression.degree());
+            self.soundness.worst_condition =
+                fit.map_or(self.soundness.worst_condition, |fit| self.soundness.worst_condition.max(fit.condition));
         }
         let mut found = std::mem::take(&mut self.found);
         found.resize_with(near.len(), Vec::new);
@@ -196,7 +189,7 @@ impl<const D: usize> MaterialSurface<D> {
         interrupt.check()?;
         self.seeds.clear();
         for (list, fit) in found.iter().zip(&self.fits) {
-            add(&self.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
+            add(&self.soundness.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
             self.seeds.extend(list);
         }
         self.found = found;
@@ -237,31 +230,12 @@ impl<const D: usize> MaterialSurface<D> {
     /// Moves a material point onto ψ = 0 along ∂ψ: the shortest way in initial positions, where the gradient in space may
     /// lead far along the surface.
     fn project(&self, patch: usize, fit: &Fit<D>, start: &Vector<D>) -> Option<Seed<D>> {
-        let mut material = *start;
-        let mut last = f64::INFINITY;
-        for _ in 0..self.method.max_iterations.min(50) {
-            let spot = self.spot(patch, fit, &material)?;
-            let mut shift = spot.rise * (-spot.jet.value / spot.rise.norm_squared());
-            let length = shift.norm();
-            if !length.is_finite() {
-                return None;
-            }
-            let largest = material.amax();
-            if is_last_step(&self.method, length, last, fit.radius, largest) {
-                let material = material + shift;
-                return self.spot(patch, fit, &material).map(|spot| Seed { patch, material, spot });
-            }
-            let most = LONGEST_STEP * fit.radius;
-            if length > most {
-                shift *= most / length;
-            }
-            material += shift;
-            if (material - fit.middle).norm_squared() > fit.radius * fit.radius {
-                return None;
-            }
-            last = length;
-        }
-        None
+        let Projected { x, step, .. } = project(&self.method, fit, start, |x| {
+            let spot = self.spot(patch, fit, x)?;
+            Some((spot.jet.value, spot.rise, ()))
+        })?;
+        let material = x + step;
+        self.spot(patch, fit, &material).map(|spot| Seed { patch, material, spot })
     }
 
     /// The seeds of a patch: its projected centre, and points along the surface every h where it has been stretched.
@@ -277,7 +251,7 @@ impl<const D: usize> MaterialSurface<D> {
         let most = |way: &Vector<D>| {
             let wanted = reach / way.norm();
             // A stretch beyond what seeds can cover leaves gaps.
-            add(&self.counts.unprojected, u64::from(wanted > f64::from(MOST_SEEDS)));
+            add(&self.soundness.counts.unprojected, u64::from(wanted > f64::from(MOST_SEEDS)));
             (wanted as i32).min(MOST_SEEDS)
         };
         let (i_most, j_most) = (most(&along), if D == 3 { most(&across) } else { 0 });
@@ -287,7 +261,7 @@ impl<const D: usize> MaterialSurface<D> {
                     let start = first.material + along * f64::from(i) + across * f64::from(j);
                     match self.project(patch, fit, &start) {
                         Some(seed) => seeds.push(seed),
-                        None => add(&self.counts.unprojected, 1),
+                        None => add(&self.soundness.counts.unprojected, 1),
                     }
                 }
             }
@@ -386,18 +360,12 @@ impl<const D: usize> MaterialSurface<D> {
                 return;
             }
             let mut tally = Tally::default();
-            let mut last: Option<usize> = None;
+            let mut last = None;
             for (foot, x) in feet.iter_mut().zip(points) {
-                let known = match last {
-                    Some(seed) => Some((seed, (self.seeds[seed].spot.point - x).norm_squared())),
-                    None => self.seed_cells.nearest(x, reach).map(|(seed, distance)| (seed, distance * distance)),
-                };
-                let nearest = known.map(|known| self.seed_cells.nearest_from(x, known));
-                let nearest = nearest.map(|(seed, r2)| (seed, r2.sqrt())).filter(|(_, distance)| *distance <= reach);
-                *foot = nearest.map(|(seed, distance)| self.solve(seed, distance, x, &mut tally));
-                last = nearest.map(|n| n.0);
+                let nearest = self.seed_cells.nearest_next(x, reach, &mut last, |seed| self.seeds[seed].spot.point);
+                *foot = nearest.map(|(seed, r2)| self.solve(seed, r2.sqrt(), x, &mut tally));
             }
-            tally.book(&self.counts);
+            tally.book(&self.soundness.counts);
         });
         interrupt.check()
     }

@@ -64,22 +64,8 @@ impl PcpMethod {
         Regression::new(basis, neighborhood, self.weight, self.minimum_ratio, spacing, self.solver)
     }
 
-    /// How far from the surface particles take part in fits, in multiples of h, growth of the radius included.
-    #[must_use]
-    pub fn reach_h<const D: usize>(&self) -> f64 {
-        let terms = term_count::<D>(self.degree) as f64;
-        let by_count = radius_of_count::<D>;
-        let cutoff = match self.neighborhood {
-            NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,
-            NeighborhoodChoice::Nearest { count } | NeighborhoodChoice::Material { count } => by_count(count as f64),
-        };
-        // Half again over what an even distribution needs leaves room for the growth of a starved neighbourhood.
-        self.sample_threshold_h + 1.5 * cutoff.max(by_count(self.minimum_ratio * terms)) + 1.0
-    }
-
-    /// How far from the surface the particles of evenly filled neighbourhoods lie, in multiples of h.
-    #[must_use]
-    pub fn even_reach_h<const D: usize>(&self) -> f64 {
+    /// r_c/h of evenly filled neighbourhoods.
+    fn even_cutoff_h<const D: usize>(&self) -> f64 {
         let cutoff = match self.neighborhood {
             NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,
             NeighborhoodChoice::Nearest { count } | NeighborhoodChoice::Material { count } => {
@@ -87,7 +73,20 @@ impl PcpMethod {
             }
         };
         let terms = term_count::<D>(self.degree) as f64;
-        self.sample_threshold_h + cutoff.max(radius_of_count::<D>(self.minimum_ratio * terms))
+        cutoff.max(radius_of_count::<D>(self.minimum_ratio * terms))
+    }
+
+    /// How far from the surface the particles of evenly filled neighbourhoods lie, in multiples of h.
+    #[must_use]
+    pub fn even_reach_h<const D: usize>(&self) -> f64 {
+        self.sample_threshold_h + self.even_cutoff_h::<D>()
+    }
+
+    /// How far from the surface particles take part in fits, in multiples of h, growth of the radius included.
+    #[must_use]
+    pub fn reach_h<const D: usize>(&self) -> f64 {
+        // Half again over what an even distribution needs leaves room for the growth of a starved neighbourhood.
+        self.sample_threshold_h + 1.5 * self.even_cutoff_h::<D>() + 1.0
     }
 
     /// How much farther than the sample a foot may seem from rounding and an early end, for a query at `x`.

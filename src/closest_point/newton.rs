@@ -148,7 +148,7 @@ pub fn closest_points<const D: usize>(
         let away = dot(&from_middle, &from_middle).to_array();
         let mut done = [false; LANES];
         let mut any_done = false;
-        let mut any_left = false;
+        let mut any_active = false;
         for lane in 0..LANES {
             if !active[lane] {
                 continue;
@@ -167,7 +167,7 @@ pub fn closest_points<const D: usize>(
                 ends[lane] = NewtonEnd::LeftSupport(Vector::<D>::from_fn(|d, _| next[d].to_array()[lane]));
                 active[lane] = false;
             }
-            any_left |= active[lane];
+            any_active |= active[lane];
         }
         if any_done {
             // The jet is at most one last step away: its quadratic part tells the normal there.
@@ -182,7 +182,7 @@ pub fn closest_points<const D: usize>(
                 });
             }
         }
-        if !any_left || iteration == method.max_iterations {
+        if !any_active || iteration == method.max_iterations {
             break;
         }
         x = next;

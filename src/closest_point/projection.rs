@@ -1,29 +1,42 @@
-//! Projection onto the zero of a local polynomial along its gradient (PCP eq. 9).
+//! Projection onto the zero of a local polynomial along its gradient (PCP eq. 9), in space or in initial positions.
 
 use super::method::PcpMethod;
 use super::newton::ACCEPTED;
 use crate::geometry::Vector;
-use crate::polynomials::{Fit, Jet, LocalPolynomial};
+use crate::polynomials::Fit;
 
-/// Moves `start` onto p = 0 and returns the jet there; None when the iteration leaves the support of the fit or does not
-/// settle.
+/// Longest step as a share of the support's radius.
+const LONGEST_STEP: f64 = 0.5;
+
+/// Where a projection ends: at `x + step`, at most one last short step from where the polynomial was evaluated.
+#[derive(Debug, Clone, Copy)]
+pub struct Projected<T, const D: usize> {
+    /// Where the polynomial was evaluated last.
+    pub x: Vector<D>,
+    /// The last step.
+    pub step: Vector<D>,
+    /// What was found there.
+    pub found: T,
+}
+
+/// Moves `start` onto the zero of what `evaluate` gives as value and gradient, with whatever the caller wants to know
+/// of the place; None when the iteration leaves the support of the fit or does not settle.
 #[must_use]
-pub fn project<const D: usize>(
+pub fn project<T, const D: usize>(
     method: &PcpMethod,
-    polynomial: &LocalPolynomial<D>,
     fit: &Fit<D>,
     start: &Vector<D>,
-) -> Option<(Vector<D>, Jet<f64, D>)> {
+    evaluate: impl Fn(&Vector<D>) -> Option<(f64, Vector<D>, T)>,
+) -> Option<Projected<T, D>> {
     let mut x = *start;
     let mut last = f64::INFINITY;
     for _ in 0..method.max_iterations {
-        let jet = polynomial.jet(&(x - fit.centre));
-        let gradient = Vector::<D>::from(jet.gradient);
+        let (value, gradient, found) = evaluate(&x)?;
         let slope = gradient.norm_squared();
-        if !(slope > 0.0 && jet.value.is_finite()) {
+        if !(slope > 0.0 && value.is_finite()) {
             return None;
         }
-        let mut step = gradient * (-jet.value / slope);
+        let mut step = gradient * (-value / slope);
         let length = step.norm();
         // Round-off may keep the residual above the tolerance for ever: no progress at a tiny step is the end too.
         let is_stalled = length <= ACCEPTED * fit.radius && length >= 0.5 * last;
@@ -31,9 +44,9 @@ pub fn project<const D: usize>(
         // own last bit.
         let is_quadratic = length <= ACCEPTED * fit.radius && length <= 1e-2 * last;
         if length <= method.tolerance || is_stalled || is_quadratic || length <= f64::EPSILON * x.amax() {
-            return Some((x + step, jet.moved(&step.into())));
+            return Some(Projected { x, step, found });
         }
-        let most = 0.5 * fit.radius;
+        let most = LONGEST_STEP * fit.radius;
         if length > most {
             step *= most / length;
         }
@@ -43,5 +56,6 @@ pub fn project<const D: usize>(
         }
         last = length;
     }
-    (last <= ACCEPTED * fit.radius).then(|| (x, polynomial.jet(&(x - fit.centre))))
+    let (_, _, found) = evaluate(&x).filter(|_| last <= ACCEPTED * fit.radius)?;
+    Some(Projected { x, step: Vector::<D>::zeros(), found })
 }

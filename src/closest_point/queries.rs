@@ -7,7 +7,6 @@
 use super::redistancing::{ClosestPoint, Redistancing, Tally};
 use crate::geometry::Vector;
 use crate::linear_algebra::number::LANES;
-use crate::neighbors::NeighborSearch;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
@@ -80,8 +79,12 @@ impl<const D: usize> Redistancing<D> {
     ) -> Result<(), Interrupted> {
         answers.nearest.resize(points.len(), (NONE, 0.0));
         answers.nearest.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(nearest, points)| {
-            if !interrupt.is_raised() {
-                self.nearest_samples(points, reach, nearest);
+            let mut last = None;
+            for (x, slot) in points.iter().zip(nearest) {
+                if interrupt.is_raised() {
+                    return;
+                }
+                *slot = self.nearest_sample(x, reach, &mut last).unwrap_or((NONE, 0.0));
             }
         });
         interrupt.check()?;
@@ -99,32 +102,15 @@ impl<const D: usize> Redistancing<D> {
                 let sample = nearest[same[0]].0;
                 for lanes in same.chunks(LANES) {
                     let last = lanes.len() - 1;
-                    let at: [&Vector<D>; LANES] = std::array::from_fn(|lane| &points[lanes[lane.min(last)]]);
+                    let at: [Vector<D>; LANES] = std::array::from_fn(|lane| points[lanes[lane.min(last)]]);
                     let away: [f64; LANES] = std::array::from_fn(|lane| nearest[lanes[lane.min(last)]].1.sqrt());
-                    let found = self.solve(sample, &at[..lanes.len()], &away, &mut tally);
-                    for (foot, answer) in feet[done..].iter_mut().zip(&found[..lanes.len()]) {
-                        *foot = Some(*answer);
-                    }
+                    let live = lanes.len();
+                    self.solve(sample, &at[..live], &away[..live], &mut feet[done..done + live], &mut tally);
                     done += lanes.len();
                 }
             }
-            tally.book(self.counts());
+            tally.book(&self.soundness().counts);
         });
         interrupt.check()
-    }
-
-    fn nearest_samples(&self, points: &[Vector<D>], reach: f64, nearest: &mut [(usize, f64)]) {
-        let (cells, samples) = (self.sample_cells(), self.samples());
-        let mut last = None;
-        for (x, slot) in points.iter().zip(nearest) {
-            let known = match last {
-                Some(sample) => Some((sample, self.squared_distance(&samples[sample], x))),
-                // Without a neighbour to start from, the search itself ends at the reach.
-                None => cells.nearest(x, reach).map(|(sample, distance)| (sample, distance * distance)),
-            };
-            let found = known.map(|known| cells.nearest_from(x, known)).filter(|(_, r2)| r2.sqrt() <= reach);
-            *slot = found.unwrap_or((NONE, 0.0));
-            last = found.map(|f| f.0);
-        }
     }
 }

@@ -3,13 +3,13 @@
 use super::detection::Detection;
 use super::method::PcpMethod;
 use super::newton::{Foot, NewtonEnd, Patch, closest_points};
-use super::projection::project;
-use super::rescue::{RescueCounts, add};
+use super::projection::{Projected, project};
+use super::rescue::{RescueCounts, Soundness, add};
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
-use crate::polynomials::{Fit, Jet, Regression, RegressionScratch};
+use crate::polynomials::{Fit, FitData, Jet, Regression, RegressionScratch};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
 /// The answer to a query.
@@ -47,8 +47,7 @@ pub struct Redistancing<const D: usize> {
     samples: Vec<Sample<D>>,
     sample_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
-    counts: RescueCounts,
-    worst_condition: f64,
+    soundness: Soundness,
 }
 
 /// A sample particle: a point of the surface with the polynomial that it was projected with.
@@ -79,8 +78,7 @@ impl<const D: usize> Redistancing<D> {
             coefficients: Vec::new(),
             samples: Vec::new(),
             scratch: PerThread::new(),
-            counts: RescueCounts::default(),
-            worst_condition: 0.0,
+            soundness: Soundness::default(),
         }
     }
 
@@ -99,25 +97,15 @@ impl<const D: usize> Redistancing<D> {
         &self.samples
     }
 
-    pub(super) fn sample_cells(&self) -> &CellList<D> {
-        &self.sample_cells
-    }
-
-    /// What did not go the plain way so far.
+    /// How sound fits and queries have been so far.
     #[must_use]
-    pub fn counts(&self) -> &RescueCounts {
-        &self.counts
+    pub fn soundness(&self) -> &Soundness {
+        &self.soundness
     }
 
-    /// The worst condition of a scaled regression matrix so far.
-    #[must_use]
-    pub fn worst_condition(&self) -> f64 {
-        self.worst_condition
-    }
-
-    /// Takes over the worst condition of an earlier part of the same run.
-    pub fn restore_worst_condition(&mut self, condition: f64) {
-        self.worst_condition = condition;
+    /// The same, to take over that of an earlier part of the run.
+    pub fn soundness_mut(&mut self) -> &mut Soundness {
+        &mut self.soundness
     }
 
     /// Step one of a rebuild: the particles with another of the opposite sign within ξ (PCP 3.1).
@@ -150,7 +138,7 @@ impl<const D: usize> Redistancing<D> {
         self.fitted.resize(near.len(), None);
         self.coefficients.resize(near.len() * terms, 0.0);
         let (cells, regression, method, scratch, counts) =
-            (self.detection.cells(), &self.regression, &self.method, &self.scratch, &self.counts);
+            (self.detection.cells(), &self.regression, &self.method, &self.scratch, &self.soundness.counts);
         let normals = normals.filter(|_| method.same_branch);
         let is_same_branch = |i: usize, j: usize| {
             // Unknown normals, which are zero, agree with every other.
@@ -171,26 +159,28 @@ impl<const D: usize> Redistancing<D> {
                     for ((fitted, coefficients), near) in lanes.zip(near.chunks(LANES)) {
                         let last = near.len() - 1;
                         let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| positions[near[lane.min(last)]]);
-                        let fits = regression.fit_lanes(
-                            cells,
-                            &centres[..near.len()],
-                            &|j, _| level[j],
-                            1,
-                            &|lane, j| is_same_branch(near[lane], j),
-                            scratch,
-                            coefficients,
-                        );
+                        let admit = |lane: usize, j: usize| is_same_branch(near[lane], j);
+                        let data = FitData { search: cells, values: |j, _| level[j], quantities: 1, admit };
+                        let fits = regression.fit_lanes(&data, &centres[..near.len()], scratch, coefficients);
                         for ((slot, coefficients), (fit, x)) in
                             fitted.iter_mut().zip(coefficients.chunks(terms)).zip(fits.iter().zip(&centres))
                         {
                             *slot = fit.and_then(|fit| {
                                 let polynomial = fit.polynomial(regression.degree(), coefficients);
-                                let projected = project(method, &polynomial, &fit, x);
+                                let projected = project(method, &fit, x, |x| {
+                                    let jet = polynomial.jet(&(x - fit.centre));
+                                    Some((jet.value, Vector::<D>::from(jet.gradient), jet))
+                                });
                                 add(&counts.unprojected, u64::from(projected.is_none()));
-                                projected.map(|(point, jet)| Sample { point, jet, fit, place })
+                                projected.map(|Projected { x, step, found }| Sample {
+                                    point: x + step,
+                                    jet: found.moved(&step.into()),
+                                    fit,
+                                    place,
+                                })
                             });
                             place += terms;
-                            count_fit(counts, fit.as_ref(), regression.degree());
+                            counts.take_fit(fit.as_ref(), regression.degree());
                         }
                     }
                 });
@@ -198,7 +188,8 @@ impl<const D: usize> Redistancing<D> {
         interrupt.check()?;
         self.samples.clear();
         self.samples.extend(self.fitted.iter().flatten());
-        self.worst_condition = self.samples.iter().fold(self.worst_condition, |worst, s| worst.max(s.fit.condition));
+        self.soundness.worst_condition =
+            self.samples.iter().fold(self.soundness.worst_condition, |worst, s| worst.max(s.fit.condition));
         self.sample_cells.rebuild(self.samples.iter().map(|s| s.point), SAMPLE_CELL * self.spacing);
         Ok(())
     }
@@ -211,12 +202,16 @@ impl<const D: usize> Redistancing<D> {
     #[must_use]
     pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
         let (nearest, distance) = self.sample_cells.nearest(x, reach)?;
+        let mut foot = [None];
         // Only the queries of a redistancing are counted.
-        Some(self.solve(nearest, &[x], &[distance; LANES], &mut Tally::default())[0])
+        self.solve(nearest, &[*x], &[distance], &mut foot, &mut Tally::default());
+        foot[0]
     }
 
-    pub(super) fn squared_distance(&self, sample: &Sample<D>, x: &Vector<D>) -> f64 {
-        self.domain.displacement(x, &sample.point).norm_squared()
+    /// The nearest sample not farther than `reach`, and its squared distance, for one query after another: each search
+    /// starts from the sample that `last` holds.
+    pub(super) fn nearest_sample(&self, x: &Vector<D>, reach: f64, last: &mut Option<usize>) -> Option<(usize, f64)> {
+        self.sample_cells.nearest_next(x, reach, last, |sample| self.samples[sample].point)
     }
 
     fn patch(&self, sample: usize) -> Patch<'_, D> {
@@ -231,31 +226,31 @@ impl<const D: usize> Redistancing<D> {
         point + self.domain.displacement(&point, x)
     }
 
-    /// Answers for points that have the same nearest sample, at the given distances from it.
+    /// Answers for up to [`LANES`] points that have the same nearest sample, at the given distances from it.
     pub(super) fn solve(
         &self,
         nearest: usize,
-        points: &[&Vector<D>],
-        distances: &[f64; LANES],
+        points: &[Vector<D>],
+        distances: &[f64],
+        feet: &mut [Option<ClosestPoint<D>>],
         tally: &mut Tally,
-    ) -> [ClosestPoint<D>; LANES] {
+    ) {
         let last = points.len() - 1;
-        let queries: [Vector<D>; LANES] = std::array::from_fn(|lane| self.in_frame_of(nearest, points[lane.min(last)]));
+        let queries: [Vector<D>; LANES] =
+            std::array::from_fn(|lane| self.in_frame_of(nearest, &points[lane.min(last)]));
         let (ends, iterations) = closest_points(&self.method, &self.patch(nearest), &queries[..points.len()]);
         tally.queries += points.len() as u64;
         tally.iterations += iterations;
-        std::array::from_fn(|lane| {
-            let lane = lane.min(last);
-            let foot = match ends[lane] {
-                NewtonEnd::Converged(foot) => self.accepted(&queries[lane], &foot, distances[lane]),
-                NewtonEnd::LeftSupport(at) => self.hop(nearest, points[lane], &at, distances[lane], tally),
+        for (lane, (x, foot)) in points.iter().zip(feet).enumerate() {
+            let distance = distances[lane];
+            let found = match ends[lane] {
+                NewtonEnd::Converged(foot) => self.accepted(&queries[lane], &foot, distance),
+                NewtonEnd::LeftSupport(at) => self.hop(nearest, x, &at, distance, tally),
                 NewtonEnd::Stuck => None,
             };
-            foot.unwrap_or_else(|| {
-                tally.sample_distance += 1;
-                self.sample_itself(nearest, points[lane], distances[lane])
-            })
-        })
+            tally.sample_distance += u64::from(found.is_none());
+            *foot = Some(found.unwrap_or_else(|| self.sample_itself(nearest, x, distance)));
+        }
     }
 
     /// The answer of a foot, unless it lies farther from the query than the sample does.
@@ -351,17 +346,5 @@ impl Tally {
         add(&counts.iterations, self.iterations);
         add(&counts.hopped, self.hopped);
         add(&counts.sample_distance, self.sample_distance);
-    }
-}
-
-pub(super) fn count_fit<const D: usize>(counts: &RescueCounts, fit: Option<&Fit<D>>, degree: usize) {
-    add(&counts.fits, 1);
-    match fit {
-        None => add(&counts.unfitted, 1),
-        Some(fit) => {
-            add(&counts.enlarged, u64::from(fit.enlargements > 0));
-            add(&counts.lowered, u64::from(fit.degree < degree));
-            add(&counts.decomposed, u64::from(fit.decomposed));
-        }
     }
 }

@@ -1,5 +1,6 @@
 //! Counts of everything that did not go the plain way. A rescue is data: counted and reported, never silent.
 
+use crate::polynomials::Fit;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 macro_rules! counters {
@@ -33,6 +34,23 @@ macro_rules! counters {
     };
 }
 
+/// How sound the fits and queries of a surface have been.
+#[derive(Debug, Default)]
+pub struct Soundness {
+    /// What did not go the plain way so far.
+    pub counts: RescueCounts,
+    /// The worst condition of a scaled regression matrix so far.
+    pub worst_condition: f64,
+}
+
+impl Soundness {
+    /// Adds that of another surface of the same particles.
+    pub fn take_over(&mut self, other: &Self) {
+        self.counts.add(&other.counts);
+        self.worst_condition = self.worst_condition.max(other.worst_condition);
+    }
+}
+
 counters! {
     /// Regressions solved.
     fits => "fits",
@@ -56,6 +74,21 @@ counters! {
     hopped => "queries.other_sample",
     /// Queries answered by the nearest sample itself.
     sample_distance => "queries.sample_distance",
+}
+
+impl RescueCounts {
+    /// Takes a fit, or the want of one, into account for a method of the given degree.
+    pub(super) fn take_fit<const D: usize>(&self, fit: Option<&Fit<D>>, degree: usize) {
+        add(&self.fits, 1);
+        match fit {
+            None => add(&self.unfitted, 1),
+            Some(fit) => {
+                add(&self.enlarged, u64::from(fit.enlargements > 0));
+                add(&self.lowered, u64::from(fit.degree < degree));
+                add(&self.decomposed, u64::from(fit.decomposed));
+            }
+        }
+    }
 }
 
 /// Adds to a counter.

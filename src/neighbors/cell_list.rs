@@ -409,6 +409,25 @@ impl<const D: usize> CellList<D> {
         best
     }
 
+    /// The nearest point not farther than `reach`, as (index, r²), for one place after another: each search starts from
+    /// the point that `last` holds, whose position `at` tells.
+    #[must_use]
+    pub fn nearest_next(
+        &self,
+        x: &Vector<D>,
+        reach: f64,
+        last: &mut Option<usize>,
+        at: impl Fn(usize) -> Vector<D>,
+    ) -> Option<(usize, f64)> {
+        let nearest = match *last {
+            Some(point) => self.nearest_from(x, (point, self.displacement(x, &at(point)).norm_squared())),
+            // Without a point to start from, the search itself ends at the reach.
+            None => self.nearest(x, reach).map(|(point, distance)| (point, distance * distance))?,
+        };
+        *last = Some(nearest.0);
+        (nearest.1.sqrt() <= reach).then_some(nearest)
+    }
+
     /// A distance that no point of the list exceeds from `x`.
     fn farthest(&self, x: &Vector<D>) -> f64 {
         let high = Vector::<D>::from_fn(|d, _| self.low[d] + self.edge[d] * self.counts[d] as f64);

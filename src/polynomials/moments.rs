@@ -33,11 +33,10 @@ pub struct LaneBatch<const D: usize> {
     /// Neighbours a lane; lanes with fewer are filled up with weight 0.
     rows: usize,
     coordinates: [Vec<[f64; LANES]>; D],
-    /// Squared distances in radii, then weights.
+    /// One for a neighbour, zero for a row that fills a lane up; then the weights.
     weights: Vec<[f64; LANES]>,
     /// Right-hand sides, quantity by quantity.
     values: Vec<[f64; LANES]>,
-    capacity: usize,
     moments: Vec<Lanes>,
     systems: LaneSystems,
     solution: Vec<Lanes>,
@@ -53,7 +52,6 @@ impl<const D: usize> Default for LaneBatch<D> {
             coordinates: std::array::from_fn(|_| Vec::new()),
             weights: Vec::new(),
             values: Vec::new(),
-            capacity: 0,
             moments: Vec::new(),
             systems: LaneSystems::default(),
             solution: Vec::new(),
@@ -69,7 +67,6 @@ impl<const D: usize> LaneBatch<D> {
     pub fn reset(&mut self, rows: usize, quantities: usize) {
         let rows = rows.next_multiple_of(TOGETHER);
         self.rows = rows;
-        self.capacity = rows;
         let clear = |numbers: &mut Vec<[f64; LANES]>, length: usize| {
             numbers.clear();
             numbers.resize(length, [0.0; LANES]);
@@ -93,7 +90,7 @@ impl<const D: usize> LaneBatch<D> {
     /// Writes a right-hand side.
     #[inline(always)]
     pub fn set_value(&mut self, lane: usize, row: usize, quantity: usize, value: f64) {
-        self.values[quantity * self.capacity + row][lane] = value;
+        self.values[quantity * self.rows + row][lane] = value;
     }
 
     /// Multiplies every weight by exp(−k |t|²).
@@ -149,20 +146,9 @@ impl<const D: usize> Moments<D> {
     ) -> (Lanes, &'b [Lanes]) {
         let zero = Lanes::splat(0.0);
         let terms = term_count::<D>(N);
-        let LaneBatch {
-            rows,
-            coordinates,
-            weights,
-            values,
-            capacity,
-            moments,
-            systems,
-            solution,
-            correction,
-            residuals,
-            powers,
-        } = batch;
-        let (rows, capacity) = (*rows, *capacity);
+        let LaneBatch { rows, coordinates, weights, values, moments, systems, solution, correction, residuals, powers } =
+            batch;
+        let rows = *rows;
         moments.clear();
         moments.resize(term_count::<D>(2 * N), zero);
         for first in (0..rows).step_by(TOGETHER) {
@@ -180,7 +166,7 @@ impl<const D: usize> Moments<D> {
         solution.clear();
         solution.resize(quantities * terms, zero);
         for (quantity, coefficients) in solution.chunks_exact_mut(terms).enumerate() {
-            let values = &values[quantity * capacity..quantity * capacity + rows];
+            let values = &values[quantity * rows..(quantity + 1) * rows];
             for first in (0..rows).step_by(TOGETHER) {
                 let mut scale = [zero; TOGETHER];
                 for q in 0..TOGETHER {

@@ -57,7 +57,7 @@ pub struct Fit<const D: usize> {
     pub enlargements: u32,
     /// Condition estimate of the scaled matrix.
     pub condition: f64,
-    /// Whether moments were too ill-conditioned and the fit is an orthogonal decomposition instead.
+    /// Whether moments were asked for and could not do, so that it is an orthogonal decomposition.
     pub decomposed: bool,
 }
 
@@ -80,9 +80,18 @@ pub struct RegressionScratch<const D: usize> {
     graded: Vec<f64>,
 }
 
-/// The values that are fitted: particle and quantity to number.
-pub trait Values: Fn(usize, usize) -> f64 {}
-impl<F: Fn(usize, usize) -> f64> Values for F {}
+/// What is fitted, and among whom.
+#[derive(Debug, Clone, Copy)]
+pub struct FitData<'a, S, V, A> {
+    /// The particles.
+    pub search: &'a S,
+    /// Particle and quantity to number.
+    pub values: V,
+    /// How many quantities.
+    pub quantities: usize,
+    /// Whether a particle may take part in the fit of a lane.
+    pub admit: A,
+}
 
 /// Enlargements tried for a matrix of low rank before the degree falls.
 const RANK_ENLARGEMENTS: u32 = 8;
@@ -122,58 +131,50 @@ impl<const D: usize> Regression<D> {
         (self.minimum_ratio * self.terms() as f64).ceil() as usize
     }
 
-    /// Fits `quantities` values around up to [`LANES`] centres. Coefficients stand centre by centre, quantity by
-    /// quantity, in nested order. `admit(lane, j)` says who may take part in the fit of a lane.
+    /// Fits every quantity around up to [`LANES`] centres. Coefficients stand centre by centre, quantity by quantity, in
+    /// nested order.
     ///
     /// 1. Collect the neighbours of each centre, with as many as the method asks.
     /// 2. Solve all by moments, where the method says so.
     /// 3. What has too few neighbours or too small a pivot, or all: [`Self::fit`].
-    #[expect(clippy::too_many_arguments, reason = "inputs, scratch and output, each named")]
-    pub fn fit_lanes(
+    pub fn fit_lanes<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
-        search: &impl NeighborSearch<D>,
+        data: &FitData<S, V, A>,
         centres: &[Vector<D>],
-        values: &impl Values,
-        quantities: usize,
-        admit: &impl Fn(usize, usize) -> bool,
         scratch: &mut RegressionScratch<D>,
         coefficients: &mut [f64],
     ) -> [Option<Fit<D>>; LANES] {
-        let size = quantities * self.terms();
+        let size = data.quantities * self.terms();
         let mut fits = [None; LANES];
         if let Some(moments) = &self.moments {
-            fits = self.fit_by_moments(moments, search, centres, values, quantities, admit, scratch, coefficients);
+            fits = self.fit_by_moments(moments, data, centres, scratch, coefficients);
         }
         for (lane, (x, coefficients)) in centres.iter().zip(coefficients.chunks_exact_mut(size)).enumerate() {
             if fits[lane].is_none() {
                 let decomposed = self.moments.is_some();
-                fits[lane] = self
-                    .fit(search, x, values, quantities, &|j| admit(lane, j), scratch, coefficients)
-                    .map(|fit| Fit { decomposed, ..fit });
+                let fit = self.fit(data, lane, x, scratch, coefficients);
+                fits[lane] = fit.map(|fit| Fit { decomposed, ..fit });
             }
         }
         fits
     }
 
-    #[expect(clippy::too_many_arguments, reason = "inputs, scratch and output, each named")]
-    fn fit_by_moments(
+    fn fit_by_moments<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
         moments: &Moments<D>,
-        search: &impl NeighborSearch<D>,
+        data: &FitData<S, V, A>,
         centres: &[Vector<D>],
-        values: &impl Values,
-        quantities: usize,
-        admit: &impl Fn(usize, usize) -> bool,
         scratch: &mut RegressionScratch<D>,
         coefficients: &mut [f64],
     ) -> [Option<Fit<D>>; LANES] {
-        let terms = self.terms();
+        let FitData { search, values, quantities, admit } = data;
+        let (terms, quantities) = (self.terms(), *quantities);
         let mut extents = [None; LANES];
         let mut rows = 0;
         for (lane, x) in centres.iter().enumerate() {
             let neighbors = &mut scratch.lanes[lane];
             let admit = |j: usize| admit(lane, j);
-            extents[lane] = Some(self.neighborhood.collect(search, x, self.needed(), self.spacing, &admit, neighbors));
+            extents[lane] = Some(self.neighborhood.collect(*search, x, self.needed(), self.spacing, &admit, neighbors));
             rows = rows.max(neighbors.len());
         }
         let batch = &mut scratch.batch;
@@ -218,33 +219,30 @@ impl<const D: usize> Regression<D> {
         fits
     }
 
-    /// Fits the values around `x` by orthogonal decomposition and writes the coefficients in nested order (terms beyond
+    /// Fits the values around `x`, the centre of a lane, by orthogonal decomposition and writes the coefficients in nested order (terms beyond
     /// a lowered degree are 0).
     ///
     /// 1. Collect neighbours; grow the radius until n_n ≥ minimum_ratio · n_c.
     /// 2. Solve; on a low rank grow further, then lower the degree one by one.
     ///
     /// None when not even a plane can be fitted.
-    #[expect(clippy::too_many_arguments, reason = "inputs, scratch and output, each named")]
-    pub fn fit(
+    pub fn fit<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
-        search: &impl NeighborSearch<D>,
+        data: &FitData<S, V, A>,
+        lane: usize,
         x: &Vector<D>,
-        values: &impl Values,
-        quantities: usize,
-        admit: &impl Fn(usize) -> bool,
         scratch: &mut RegressionScratch<D>,
         coefficients: &mut [f64],
     ) -> Option<Fit<D>> {
         coefficients.fill(0.0);
+        let (search, admit) = (data.search, |j: usize| (data.admit)(lane, j));
         let mut degree = self.basis.degree();
-        let extent = self.neighborhood.collect(search, x, self.needed(), self.spacing, admit, &mut scratch.neighbors);
+        let extent = self.neighborhood.collect(search, x, self.needed(), self.spacing, &admit, &mut scratch.neighbors);
         let (mut radius, mut enlargements) = (extent.radius, extent.enlargements);
         let mut rank_enlargements = 0;
         loop {
             let enough = scratch.neighbors.len() >= term_count::<D>(degree);
-            if enough && let Some(condition) = self.solve(x, values, quantities, radius, degree, scratch, coefficients)
-            {
+            if enough && let Some(condition) = self.solve(data, x, radius, degree, scratch, coefficients) {
                 let unscaled = self.basis.kind() == BasisKind::MonomialUnscaled;
                 return Some(Fit {
                     centre: if unscaled { Vector::<D>::zeros() } else { *x },
@@ -262,7 +260,7 @@ impl<const D: usize> Regression<D> {
                 rank_enlargements += 1;
                 enlargements += 1;
                 radius *= GROWTH;
-                gather(search, x, radius, admit, &mut scratch.neighbors);
+                gather(search, x, radius, &admit, &mut scratch.neighbors);
             } else if degree > 1 {
                 degree -= 1;
                 rank_enlargements = 0;
@@ -273,12 +271,10 @@ impl<const D: usize> Regression<D> {
     }
 
     /// Least squares over the collected neighbours; None when the matrix is short of rank.
-    #[expect(clippy::too_many_arguments, reason = "inputs, scratch and output, each named")]
-    fn solve(
+    fn solve<S, V: Fn(usize, usize) -> f64, A>(
         &self,
+        data: &FitData<S, V, A>,
         x: &Vector<D>,
-        values: &impl Values,
-        quantities: usize,
         radius: f64,
         degree: usize,
         scratch: &mut RegressionScratch<D>,
@@ -288,13 +284,13 @@ impl<const D: usize> Regression<D> {
         let unscaled = self.basis.kind() == BasisKind::MonomialUnscaled;
         let inverse = 1.0 / radius;
         let mut condition = 0.0;
-        for (quantity, own) in coefficients.chunks_exact_mut(self.terms()).enumerate().take(quantities) {
+        for (quantity, own) in coefficients.chunks_exact_mut(self.terms()).enumerate() {
             scratch.system.reset(scratch.neighbors.len(), terms);
             scratch.row.resize(terms, 0.0);
             for (row, neighbor) in scratch.neighbors.iter().enumerate() {
                 let local = if unscaled { x + neighbor.dx } else { neighbor.dx * inverse };
                 self.basis.row(&local, degree, &mut scratch.row);
-                let mut value = values(neighbor.index, quantity);
+                let mut value = (data.values)(neighbor.index, quantity);
                 if self.weight > 0.0 {
                     // The square root of the weight multiplies the row.
                     let w = (-0.5 * self.weight * neighbor.r2 * inverse * inverse).exp();
@@ -318,7 +314,9 @@ impl<const D: usize> Regression<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{BasisKind, Fit, LANES, Neighborhood, PolynomialBasis, Regression, RegressionScratch, Solver, Vector};
+    use super::{
+        BasisKind, Fit, FitData, LANES, Neighborhood, PolynomialBasis, Regression, RegressionScratch, Solver, Vector,
+    };
     use crate::geometry::Domain;
     use crate::geometry::lattice::Lattice;
     use crate::neighbors::CellList;
@@ -340,7 +338,8 @@ mod tests {
         values: &[f64],
         coefficients: &mut [f64],
     ) -> Option<Fit<2>> {
-        regression.fit(cells, x, &|j, _| values[j], 1, &|_| true, &mut RegressionScratch::default(), coefficients)
+        let data = FitData { search: cells, values: |j, _| values[j], quantities: 1, admit: |_, _| true };
+        regression.fit(&data, 0, x, &mut RegressionScratch::default(), coefficients)
     }
 
     /// Moments against orthogonal decompositions, for every degree, dimension and two quantities at once.
@@ -362,13 +361,13 @@ mod tests {
         let terms = fast.terms();
         let mut scratch = RegressionScratch::default();
         let middle: Vec<Vector<D>> = points.iter().filter(|x| x.norm() < 0.3).take(15).copied().collect();
+        let data = FitData { search: &cells, values: |j, q: usize| values[q][j], quantities: 2, admit: |_, _| true };
         for centres in middle.chunks(LANES) {
             let mut ours = vec![0.0; LANES * 2 * terms];
-            let value = |j: usize, q: usize| values[q][j];
-            let fits = fast.fit_lanes(&cells, centres, &value, 2, &|_, _| true, &mut scratch, &mut ours);
+            let fits = fast.fit_lanes(&data, centres, &mut scratch, &mut ours);
             for (lane, x) in centres.iter().enumerate() {
                 let mut exact = vec![0.0; 2 * terms];
-                let reference = oracle.fit(&cells, x, &value, 2, &|_| true, &mut scratch, &mut exact).unwrap();
+                let reference = oracle.fit(&data, lane, x, &mut scratch, &mut exact).unwrap();
                 let fit = fits[lane].unwrap();
                 assert_eq!((fit.neighbors, fit.radius), (reference.neighbors, reference.radius));
                 assert!(!fit.decomposed, "degree {degree}: condition {}", fit.condition);

@@ -72,13 +72,13 @@ pub static PARAMETERS: &[Parameter] = &[
         Kind::Number { above: Some(0.0), least: None, below: None, most: Some(1e-6) },
         DefaultValue::Json("1e-14"),
     ),
-    CHOSEN,
     Parameter::new(
         "max_iterations",
         "most iterations of a solve",
         Kind::Integer { least: 1, most: 100_000 },
         DefaultValue::Json("1000"),
     ),
+    CHOSEN,
 ];
 
 static NEIGHBORHOODS: &[Variant] = &[

@@ -1,7 +1,7 @@
 //! Root-mean-square and maximum of errors, and the report entries that closest-point schemes share.
 
 use crate::closest_point::rescue::get;
-use crate::closest_point::{LevelSurface, RescueCounts};
+use crate::closest_point::{RescueCounts, Soundness};
 use crate::simulation::report::Newton;
 use crate::simulation::{ErrorEntry, Health, Report};
 use std::collections::BTreeMap;
@@ -65,13 +65,13 @@ pub fn rescued(counts: &RescueCounts) -> u64 {
 
 /// The report of a closest-point scheme from its parts.
 #[must_use]
-pub fn closest_point_report<const D: usize>(
-    surface: &LevelSurface<D>,
+pub fn closest_point_report(
+    soundness: &Soundness,
     errors: Vec<ErrorEntry>,
     health: Health,
     method: BTreeMap<&'static str, String>,
 ) -> Report {
-    let counts = surface.counts();
+    let counts = &soundness.counts;
     let entries = counts.entries();
     let some = |labels: &[&str]| {
         entries.iter().filter(|(name, count)| labels.contains(name) && *count > 0).copied().collect::<BTreeMap<_, _>>()
@@ -80,7 +80,7 @@ pub fn closest_point_report<const D: usize>(
     Report {
         errors,
         health,
-        worst_condition: surface.worst_condition(),
+        worst_condition: soundness.worst_condition,
         rescued_fits: some(&[
             "fits.larger_radius",
             "fits.lower_degree",

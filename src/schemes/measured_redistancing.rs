@@ -1,30 +1,10 @@
-//! A whole redistancing with its phases booked: what every closest-point scheme does, each with its own bookkeeping
-//! of the answers.
+//! The two halves of a redistancing with their phases booked: what every closest-point scheme does, each with points
+//! and answers of its own.
 
 use crate::closest_point::{Answers, LevelSurface};
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::simulation::Phases;
-
-/// Rebuilds the surface from the level of the particles, then asks it about every particle whose nearest sample lies
-/// within `reach`.
-///
-/// # Errors
-/// [`Interrupted`] when somebody asked to stop.
-#[expect(clippy::too_many_arguments, reason = "inputs, output and bookkeeping, each named")]
-pub fn redistance<const D: usize>(
-    surface: &mut LevelSurface<D>,
-    positions: &[Vector<D>],
-    level: &[f64],
-    normals: Option<&[Vector<D>]>,
-    reach: f64,
-    answers: &mut Answers<D>,
-    interrupt: &Interrupt,
-    phases: &mut Phases,
-) -> Result<(), Interrupted> {
-    rebuild(surface, positions, level, normals, interrupt, phases)?;
-    query(surface, positions, reach, answers, interrupt, phases)
-}
 
 /// Rebuilds the surface from the level of points.
 ///

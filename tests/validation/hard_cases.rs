@@ -63,9 +63,18 @@ impl<const D: usize> Case<D> {
         let mut answers = Answers::default();
         surface.closest_points(&self.points, f64::INFINITY, &mut answers, &Interrupt::default()).unwrap();
         let rescued = ["fits.lower_degree", "fits.none", "samples.not_projected", "queries.sample_distance"];
-        let entries = surface.counts().entries();
+        let entries = surface.soundness().counts.entries();
         let count = entries.iter().filter(|(name, _)| rescued.contains(name)).map(|(_, count)| count).sum();
-        (answers.iter().map(|(i, answer)| (i, *answer)).collect(), count)
+        let answers: Vec<_> = answers.iter().map(|(i, answer)| (i, *answer)).collect();
+        // Every sample that stands in for a closest point is counted, and counted once.
+        let samples = answers.iter().filter(|(_, answer)| answer.is_sample).count() as u64;
+        assert!(entries.contains(&("queries.sample_distance", samples)), "{samples} samples, {entries:?}");
+        assert!(entries.contains(&("queries", answers.len() as u64)));
+        // Whoever is solved beside others gets the bits of being solved alone.
+        for (i, answer) in answers.iter().step_by(answers.len() / 1000 + 1) {
+            assert_eq!(surface.query(&self.points[*i], f64::INFINITY), Some(*answer));
+        }
+        (answers, count)
     }
 
     /// The largest error of the distance, over particles that the exact distance is known for.

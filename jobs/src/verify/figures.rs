@@ -26,13 +26,14 @@ fn style(k: usize) -> ShapeStyle {
     ShapeStyle::from(&Palette99::pick(k).to_rgba()).stroke_width(2)
 }
 
-type Lines = [(String, Vec<Point>)];
+/// Labels and runs.
+pub type Lines = Vec<(String, Vec<Point>)>;
 
 /// Draws both pictures side by side.
 ///
 /// # Errors
 /// A message when the file cannot be written.
-pub fn draw(path: &Path, figure: &Figure, lines: &Lines) -> Result<(), String> {
+pub fn draw(path: &Path, figure: &Figure, lines: &[(String, Vec<Point>)]) -> Result<(), String> {
     let root = SVGBackend::new(path, (1480, 560)).into_drawing_area();
     root.fill(&WHITE).map_err(|e| e.to_string())?;
     let root = root.titled(figure.title, ("sans-serif", 22)).map_err(|e| e.to_string())?;
@@ -57,7 +58,12 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     if low <= high { low / 2.0..high * 2.0 } else { 0.1..10.0 }
 }
 
-fn panel(area: &DrawingArea<SVGBackend, Shift>, lines: &Lines, axis: &str, x: fn(&Point) -> f64) -> Result<(), String> {
+fn panel(
+    area: &DrawingArea<SVGBackend, Shift>,
+    lines: &[(String, Vec<Point>)],
+    axis: &str,
+    x: fn(&Point) -> f64,
+) -> Result<(), String> {
     let points = || lines.iter().flat_map(|(_, points)| points);
     let (across, up) = (range(points().map(x)), range(points().map(|p| p.error)));
     let mut chart = ChartBuilder::on(area)

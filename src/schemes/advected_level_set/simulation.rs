@@ -86,9 +86,9 @@ impl<const D: usize> AdvectedLevelSet<D> {
         // Of a surface that is known by its particles alone, the first quadrature says what is to be kept.
         let measure = system.motion.surface().map_or_else(
             || {
-                let never = Interrupt::default();
-                let copy = system.redistanced_copy(&never);
-                copy.and_then(|(_, surface)| enclosed_measure(&surface, &never)).unwrap_or(f64::NAN)
+                let copy = system.redistanced_copy(&system.interrupt);
+                // Whoever interrupts ends the run before its first step.
+                copy.and_then(|(_, surface)| enclosed_measure(&surface, &system.interrupt)).unwrap_or(f64::NAN)
             },
             crate::geometry::Surface::measure,
         );
@@ -115,7 +115,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
     /// since a redistancing leaves its distances or normals to the next: what output asks for in between is taken on a
     /// copy and never becomes physics. Without a schedule nothing is left to anybody, so output may redistance.
     fn is_redistancing_due(&self, step: u64) -> bool {
-        match self.system.when {
+        match self.system.parts.when {
             RedistanceWhen::ForOutput => {
                 step >= self.fixed.steps || self.is_error_due(step) || self.plan.is_frame_due(&self.fixed, step)
             }
@@ -149,7 +149,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
         let system = &self.system;
         let exact = self.initial_measure;
         let measure_relative = (measure - exact).abs() / exact;
-        let Some(front) = system.motion.front(time, system.spacing, &system.interrupt)? else {
+        let Some(front) = system.motion.front(time, system.parts.spacing, &system.interrupt)? else {
             return Ok(MeasuredErrors { time, measure_relative, distances: None });
         };
         let interrupt = &system.interrupt;
@@ -167,7 +167,8 @@ impl<const D: usize> AdvectedLevelSet<D> {
         }
         let (samples_mean, samples_max) = surface.over_samples(|x| distance(x).abs());
         interrupt.check()?;
-        let distances = Some([norms.rms(), norms.max(), samples_mean, samples_max]);
+        // Over an empty band there is no error, which is not an error of zero.
+        let distances = (!norms.is_empty()).then(|| [norms.rms(), norms.max(), samples_mean, samples_max]);
         Ok(MeasuredErrors { time, measure_relative, distances })
     }
 
@@ -183,7 +184,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
                 return Err(StepError::InterfaceLost { step: now.step, time: now.time });
             }
             // What the copy could not do the plain way stands behind the errors that are reported.
-            self.system.redistancing.take_over(&surface);
+            self.system.redistancing.soundness_mut().take_over(surface.soundness());
             self.measure = enclosed_measure(&surface, &self.system.interrupt)?;
             self.measured = now.step;
             self.measure_errors(now.time, &particles, &surface, self.measure)?
@@ -251,7 +252,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             ("volume_drift", known(is_measured, (self.measure - exact) / exact)),
             ("band_particles", in_band),
             ("cfl", self.max_cfl),
-            ("rescued_fits", rescued(self.system.redistancing.counts()) as f64),
+            ("rescued_fits", rescued(&self.system.redistancing.soundness().counts) as f64),
         ]
     }
 
@@ -271,7 +272,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         };
         let mut fields = Fields::at(particles.positions());
         fields.surface(particles, &self.system.columns, true);
-        if self.system.field == FieldChoice::Dual {
+        if self.system.parts.field == FieldChoice::Dual {
             fields.scalar("psi", particles.scalar(self.system.psi).to_vec());
         }
         let (flow, time) = (self.system.motion.flow(), self.clock().time);
@@ -284,10 +285,10 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let Clock { step, time } = self.clock();
         let mut state = State { step, time, ..State::default() };
         state.push_particles(&self.system.particles);
-        let surface = &self.system.redistancing;
-        state.push_counts("rescues", surface.counts().entries().iter().map(|e| e.1).collect());
+        let soundness = self.system.redistancing.soundness();
+        state.push_counts("rescues", soundness.counts.entries().iter().map(|e| e.1).collect());
         state.push_counts("redistanced", vec![self.redistanced, self.measured]);
-        state.push_reals("monitors", &[self.measure, self.max_cfl, surface.worst_condition()]);
+        state.push_reals("monitors", &[self.measure, self.max_cfl, soundness.worst_condition]);
         let errors: Vec<f64> = self.errors.iter().flat_map(|e| e.to_numbers()).collect();
         state.push_reals("errors", &errors);
         state
@@ -297,16 +298,16 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         if state.step > self.fixed.steps {
             return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
         }
-        let surface = &mut self.system.redistancing;
+        let soundness = self.system.redistancing.soundness_mut();
         let (rescues, redistanced) = (state.counts("rescues")?, state.counts("redistanced")?);
         let (monitors, errors) = (state.reals("monitors")?, state.reals("errors")?);
-        check_length("rescues", rescues.len(), surface.counts().entries().len())?;
+        check_length("rescues", rescues.len(), soundness.counts.entries().len())?;
         check_length("redistanced", redistanced.len(), 2)?;
         check_length("monitors", monitors.len(), 3)?;
         check_length("errors", errors.len(), errors.len() / MeasuredErrors::NUMBERS * MeasuredErrors::NUMBERS)?;
         state.pull_particles(&mut self.system.particles)?;
-        surface.counts().restore(rescues);
-        surface.restore_worst_condition(monitors[2]);
+        soundness.counts.restore(rescues);
+        soundness.worst_condition = monitors[2];
         self.measure = monitors[0];
         self.max_cfl = monitors[1];
         self.redistanced = redistanced[0];
@@ -318,7 +319,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
 
     fn report(&self) -> Report {
         let errors = self.errors.iter().flat_map(|e| e.entries(D)).collect();
-        closest_point_report(&self.system.redistancing, errors, self.health(), self.method.clone())
+        closest_point_report(self.system.redistancing.soundness(), errors, self.health(), self.method.clone())
     }
 
     fn phases(&self) -> &Phases {
@@ -331,7 +332,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             finite: self.system.particles.positions().iter().all(|x| x.iter().all(|c| c.is_finite())),
             max_cfl: self.max_cfl,
             volume_drift: Some((self.measure - exact) / exact),
-            rescued_fits: rescued(self.system.redistancing.counts()),
+            rescued_fits: rescued(&self.system.redistancing.soundness().counts),
         }
     }
 

@@ -7,7 +7,7 @@ use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
 use crate::particles::{Particles, ScalarKey};
-use crate::schemes::measured_redistancing::redistance;
+use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::simulation::{CpuClock, Phases};
 use crate::time::PathIntegrator;
 use rayon::prelude::{ParallelIterator, ParallelSliceMut};
@@ -24,7 +24,7 @@ pub enum FieldChoice {
 /// When to redistance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RedistanceWhen {
-    /// After every so many steps, and at the end.
+    /// After every so many steps.
     Every(u64),
     /// Only when a frame or an error needs it.
     ForOutput,
@@ -33,18 +33,8 @@ pub enum RedistanceWhen {
 /// Particles in a flow.
 pub struct AdvectedSystem<const D: usize> {
     /// Surface and flow: the exact answer.
-    pub motion: ExactMotion<D>,
-    /// h.
-    pub spacing: f64,
-    /// w/2.
-    pub half_band: f64,
-    /// Path integrator.
-    pub integrator: PathIntegrator,
-    /// What is transported.
-    pub field: FieldChoice,
-    /// When to redistance.
-    pub when: RedistanceWhen,
-    pub(super) method: PcpMethod,
+    pub(super) motion: ExactMotion<D>,
+    pub(super) parts: AdvectedParts,
     pub(super) particles: Particles<D>,
     /// ψ, constant along paths (dual) or the distance of the last redistancing.
     pub(super) psi: ScalarKey,
@@ -97,7 +87,7 @@ impl<const D: usize> AdvectedSystem<D> {
     /// Particles with a level, in a flow. Where the surface is known, columns start with the exact answers.
     #[must_use]
     pub fn new(motion: ExactMotion<D>, start: Start<D>, parts: AdvectedParts, interrupt: Interrupt) -> Self {
-        let AdvectedParts { spacing, half_band, integrator, field, when, method } = parts;
+        let AdvectedParts { spacing, half_band, ref method, .. } = parts;
         let mut particles = Particles::new(start.positions);
         let psi = particles.add_scalar("psi", 0.0);
         let columns = SurfaceColumns::add(&mut particles);
@@ -122,26 +112,12 @@ impl<const D: usize> AdvectedSystem<D> {
         } else {
             LevelSurface::Spatial(Box::new(Redistancing::new(method.clone(), Domain::unbounded(), spacing)))
         };
-        Self {
-            motion,
-            spacing,
-            half_band,
-            integrator,
-            field,
-            when,
-            method,
-            particles,
-            psi,
-            columns,
-            redistancing,
-            answers,
-            interrupt,
-        }
+        Self { motion, parts, particles, psi, columns, redistancing, answers, interrupt }
     }
 
     /// Moves every particle along its path; returns the longest way in spacings.
     pub(super) fn advect(&mut self, time: f64, step: f64) -> Result<f64, Interrupted> {
-        let (flow, integrator, interrupt) = (self.motion.flow(), self.integrator, &self.interrupt);
+        let (flow, integrator, interrupt) = (self.motion.flow(), self.parts.integrator, &self.interrupt);
         let longest = self
             .particles
             .positions_mut()
@@ -161,36 +137,25 @@ impl<const D: usize> AdvectedSystem<D> {
             // A maximum does not depend on the order of its terms.
             .reduce(|| 0.0, f64::max);
         interrupt.check()?;
-        Ok(longest.sqrt() / self.spacing)
-    }
-
-    /// The normals that tell branches apart: those of the last redistancing, where a schedule keeps them fresh.
-    fn last_normals<'p>(
-        when: RedistanceWhen,
-        particles: &'p Particles<D>,
-        columns: &SurfaceColumns,
-    ) -> Option<&'p [Vector<D>]> {
-        matches!(when, RedistanceWhen::Every(_)).then(|| particles.vector(columns.normal))
+        Ok(longest.sqrt() / self.parts.spacing)
     }
 
     /// Rebuilds the surface from ψ and writes distance, closest point, normal and curvature of the band.
     pub(super) fn redistance(&mut self, phases: &mut Phases) -> Result<(), Interrupted> {
-        let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
-        // Whoever is nearer than w/2 to a sample is asked for the exact distance (PCP 3.4).
-        let normals = Self::last_normals(self.when, &self.particles, &self.columns);
-        let (surface, answers) = (&mut self.redistancing, &mut self.answers);
-        redistance(surface, positions, psi, normals, self.half_band, answers, &self.interrupt, phases)?;
+        let Self { parts, particles, psi, columns, redistancing, answers, interrupt, .. } = self;
+        ask(redistancing, parts, particles, *psi, columns, answers, interrupt, phases)?;
         phases.measure("redistancing/store", || self.store());
         Ok(())
     }
 
     /// Writes the answers, and the distances over ψ where the scene says so.
     fn store(&mut self) {
-        self.columns.store(&mut self.particles, self.psi, &self.answers, self.half_band);
-        if self.field == FieldChoice::Overwrite {
+        let half_band = self.parts.half_band;
+        self.columns.store(&mut self.particles, self.psi, &self.answers, half_band);
+        if self.parts.field == FieldChoice::Overwrite {
             // The distance from a mere sample is worse than what the particle has carried here.
-            for (i, answer) in self.answers.iter().filter(|(_, a)| a.distance <= self.half_band && !a.is_sample) {
-                let phi = answer.distance.copysign(self.particles.scalar(self.psi)[i]);
+            for (i, _) in self.answers.iter().filter(|(_, a)| a.distance <= half_band && !a.is_sample) {
+                let phi = self.particles.scalar(self.columns.phi)[i];
                 self.particles.scalar_mut(self.psi)[i] = phi;
             }
         }
@@ -206,16 +171,33 @@ impl<const D: usize> AdvectedSystem<D> {
         let mut surface = match &self.redistancing {
             LevelSurface::Material(surface) => LevelSurface::Material(Box::new(surface.fresh())),
             LevelSurface::Spatial(_) => {
-                let (method, domain) = (self.method.clone(), Domain::unbounded());
-                LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.spacing)))
+                let (method, domain) = (self.parts.method.clone(), Domain::unbounded());
+                LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.parts.spacing)))
             }
         };
-        let (positions, psi) = (self.particles.positions(), self.particles.scalar(self.psi));
-        let mut answers = Answers::default();
-        let normals = Self::last_normals(self.when, &self.particles, &self.columns);
-        let mut phases = Phases::new(CpuClock::still());
-        redistance(&mut surface, positions, psi, normals, self.half_band, &mut answers, interrupt, &mut phases)?;
-        self.columns.store(&mut particles, self.psi, &answers, self.half_band);
+        let (mut answers, mut phases) = (Answers::default(), Phases::new(CpuClock::still()));
+        let Self { parts, psi, columns, .. } = self;
+        ask(&mut surface, parts, &self.particles, *psi, columns, &mut answers, interrupt, &mut phases)?;
+        columns.store(&mut particles, *psi, &answers, parts.half_band);
         Ok((particles, surface))
     }
+}
+
+/// Rebuilds a surface from ψ and asks it about everybody within w/2 of it (PCP 3.4). Branches are told apart by the normals
+/// of the last redistancing, where a schedule keeps them fresh.
+#[expect(clippy::too_many_arguments, reason = "parts of a system, of which a copy replaces some")]
+fn ask<const D: usize>(
+    surface: &mut LevelSurface<D>,
+    parts: &AdvectedParts,
+    particles: &Particles<D>,
+    psi: ScalarKey,
+    columns: &SurfaceColumns,
+    answers: &mut Answers<D>,
+    interrupt: &Interrupt,
+    phases: &mut Phases,
+) -> Result<(), Interrupted> {
+    let positions = particles.positions();
+    let normals = matches!(parts.when, RedistanceWhen::Every(_)).then(|| particles.vector(columns.normal));
+    rebuild(surface, positions, particles.scalar(psi), normals, interrupt, phases)?;
+    query(surface, positions, parts.half_band, answers, interrupt, phases)
 }
