@@ -7,8 +7,8 @@ use crate::polynomials::multi_index::term_count;
 use crate::scene::Violation;
 use serde_json::json;
 
-/// Sample points at most.
-const MOST_SAMPLES: f64 = 2e5;
+/// The thinnest band that is measured as it is, as a part of its shape's extent.
+const FINEST_PART: f64 = 16.0;
 /// Nodes of a lattice along one axis at most: far beyond any memory, far below what indices can count.
 const MOST_NODES: f64 = 1e9;
 
@@ -27,35 +27,35 @@ pub fn check_extent<const D: usize>(surface: &dyn Surface<D>, reach: f64, spacin
     Some(Violation::new("/spacing", "range", detail, &json!(spacing), allowed))
 }
 
-/// Particles of spacing h within `reach` of a surface: counted on the lattice itself where that is small, else on a
-/// coarser one. A band thinner than that one is widened for the count, since its measure is linear in its width.
+/// Particles of spacing h within `reach` of a surface: the measure of the band over h^D.
+///
+/// Cubes are halved where the band's border passes through them (the distance is 1-Lipschitz, so its value at the centre
+/// and the half diagonal tell) until they are small against the band; those count by the part of their width that lies
+/// inside. A band much thinner than its shape is widened for the count, since its measure is linear in its width.
 #[must_use]
 pub fn band_particles<const D: usize>(surface: &dyn Surface<D>, reach: f64, spacing: f64) -> u64 {
     let (low, high) = surface.bounding_box();
-    let samples = |size: &Vector<D>, step: f64| size.iter().map(|s| (s / step).ceil().max(1.0)).product::<f64>();
-    let mut step = spacing;
-    let mut wide = reach;
-    while samples(&(high - low).add_scalar(2.0 * wide), step) > MOST_SAMPLES {
-        step *= 1.1;
-        wide = reach.max(1.5 * step);
+    let wide = reach.max((high - low).max() / FINEST_PART);
+    let half = 0.5 * (high - low).max() + wide;
+    let mut cubes = vec![((low + high) * 0.5, half)];
+    let mut measure = 0.0;
+    while let Some((center, half)) = cubes.pop() {
+        let distance = surface.signed_distance(&center).abs();
+        let diagonal = half * (D as f64).sqrt();
+        let volume = (2.0 * half).powi(D as i32);
+        if distance + diagonal <= wide {
+            measure += volume;
+        } else if half <= 0.25 * wide {
+            measure += volume * (0.5 + 0.5 * (wide - distance) / half).clamp(0.0, 1.0);
+        } else if distance - diagonal < wide {
+            let quarter = 0.5 * half;
+            cubes.extend((0..1 << D).map(|corner: usize| {
+                let offset = |d: usize| if corner >> d & 1 == 1 { quarter } else { -quarter };
+                (Vector::<D>::from_fn(|d, _| center[d] + offset(d)), quarter)
+            }));
+        }
     }
-    let low = low.add_scalar(-wide);
-    let size = high.add_scalar(wide) - low;
-    let counts: [usize; D] = std::array::from_fn(|d| (size[d] / step).ceil().max(1.0) as usize);
-    let total: usize = counts.iter().product();
-    let cell: f64 = (0..D).map(|d| size[d] / counts[d] as f64).product();
-    let inside = (0..total)
-        .filter(|index| {
-            let mut rest = *index;
-            let x = Vector::<D>::from_fn(|d, _| {
-                let k = rest % counts[d];
-                rest /= counts[d];
-                low[d] + size[d] * (k as f64 + 0.5) / counts[d] as f64
-            });
-            surface.signed_distance(&x).abs() <= wide
-        })
-        .count();
-    let particles = inside as f64 * cell * (reach / wide) / spacing.powi(D as i32);
+    let particles = measure * (reach / wide) / spacing.powi(D as i32);
     // What is no number is no number that would fit into any memory.
     if particles.is_nan() { u64::MAX } else { particles.round() as u64 }
 }
