@@ -8,11 +8,13 @@ pub mod cloud;
 pub mod json_schema;
 pub mod rows;
 pub mod schema;
+pub mod work;
 
 pub use check::{Violation, check};
-pub use cloud::{Cloud, CloudReference, Clouds};
+pub use cloud::{Cloud, CloudReference, CloudSizes, CloudSource, Clouds};
 pub use rows::Rows;
 pub use schema::{Default as DefaultValue, Kind, Parameter, Variant};
+pub use work::PhaseWork;
 
 use crate::parallel::Interrupt;
 use crate::simulation::{CpuClock, OutputPlan, Simulation};
@@ -32,6 +34,8 @@ pub struct SceneKind {
     pub preset: fn(name: &str, given: &Map<String, Value>) -> Map<String, Value>,
     /// A small job body that runs in seconds.
     pub example: &'static str,
+    /// Short scenes by which a machine is measured: together they have every phase of the kind.
+    pub calibration: fn() -> Vec<Value>,
     /// What the kind must show.
     pub rows: fn() -> Rows,
     /// From checked parameters (all defaults present) to a scene.
@@ -54,8 +58,11 @@ pub trait Scene: Send + Sync {
         Vec::new()
     }
 
-    /// Size of the run; without the points that come from outside.
-    fn estimate(&self) -> Estimate;
+    /// Size of the run; `sizes` tells of points that come from outside.
+    fn estimate(&self, sizes: &CloudSizes) -> Estimate;
+
+    /// Work of the run by phase, for a plan of output.
+    fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork>;
 
     /// The simulation at its start. Memory for particles is allocated here.
     ///

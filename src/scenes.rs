@@ -7,6 +7,7 @@ pub mod pcp_parameters;
 pub mod redistance;
 pub mod shapes;
 pub mod vortex;
+pub mod work_estimate;
 
 use crate::scene::SceneKind;
 

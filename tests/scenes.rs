@@ -8,7 +8,7 @@ mod support;
 
 use meniscus::parallel::Interrupt;
 use meniscus::scene::schema::{Default, Kind, Parameter};
-use meniscus::scene::{BuildContext, Cloud, Clouds};
+use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, OutputPlan, State};
 use serde_json::{Value, json};
@@ -236,7 +236,7 @@ fn nonsense_is_refused_at_its_place() {
 #[test]
 fn estimates_of_particles_are_within_five_per_cent() {
     for body in bodies() {
-        let estimated = scene(&body).estimate().particles as f64;
+        let estimated = scene(&body).estimate(&CloudSizes::new()).particles as f64;
         let made = build(&body, PLAN).particle_count() as f64;
         assert!((estimated / made - 1.0).abs() < 0.05, "{estimated} for {made}: {body}");
     }

@@ -1,11 +1,15 @@
 //! The service as a whole: store, supervisor, listener, and their orderly start and end.
 
+use crate::calibration;
 use crate::config::Config;
 use crate::router;
+use crate::telemetry;
 use meniscus_jobs::executor::local::LocalExecutor;
 use meniscus_jobs::lock::{DirectoryLock, LockError};
 use meniscus_jobs::store::{Store, StoreError};
-use meniscus_jobs::supervisor::{Settings, Supervisor, SupervisorHandle};
+use meniscus_jobs::supervisor::{Supervisor, SupervisorHandle};
+use meniscus_jobs::uploads::inspector::{self, InspectorHandle};
+use metrics_exporter_prometheus::PrometheusHandle;
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,6 +25,10 @@ pub struct Application {
     pub store: Arc<Store>,
     /// Who runs them.
     pub supervisor: SupervisorHandle,
+    /// Who looks into uploads.
+    pub inspector: InspectorHandle,
+    /// Counts for operators.
+    pub metrics: PrometheusHandle,
     /// The operator's choice.
     pub config: Arc<Config>,
     /// Whether recovery is done and no shutdown has begun.
@@ -48,7 +56,7 @@ pub enum ServeError {
 }
 
 /// Archives at once.
-const ARCHIVES: usize = 16;
+const ARCHIVES: usize = 8;
 /// Time that open answers have to end after the supervisor has.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
@@ -64,11 +72,14 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
     let store = Arc::new(Store::open(&config.data)?);
     // This very program, even when an upgrade has replaced its file: all attempts of a service are of one build.
     let executor = Box::new(LocalExecutor::new("/proc/self/exe".into()));
-    let supervisor = Supervisor::new(Arc::clone(&store), executor, Settings::with_slots(config.slots));
+    let supervisor = Supervisor::new(Arc::clone(&store), executor, config.settings());
+    let inspector = inspector::start(Arc::clone(&store), "/proc/self/exe".into())?;
     let (stop, stopping) = watch::channel(false);
     let application = Application {
         store,
         supervisor: supervisor.handle(),
+        inspector,
+        metrics: telemetry::metrics()?,
         config: Arc::new(config),
         ready: Arc::new(AtomicBool::new(false)),
         draining: Arc::new(AtomicBool::new(false)),
@@ -89,6 +100,9 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
         tracing::info!("ready");
         supervisor.run();
     })?;
+    if application.config.calibrate {
+        calibration::start_where_needed(&application.store, application.config.threads)?;
+    }
     let handle = application.supervisor.clone();
     let draining = Arc::clone(&application.draining);
     let ready = Arc::clone(&application.ready);

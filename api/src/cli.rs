@@ -1,16 +1,18 @@
 //! The command line.
 
+use crate::access::Scope;
 use crate::application;
-use crate::config::Config;
+use crate::config::{Choices, Config};
 use crate::foreground;
 use crate::telemetry;
+use base64::Engine;
 use clap::{Parser, Subcommand};
 use meniscus_jobs::executor::worker_process;
-use meniscus_jobs::{backup, verify};
+use meniscus_jobs::uploads::{Purpose, inspection, jail};
+use meniscus_jobs::{backup, calibration, digest, fsck, process, verify};
 use std::fmt::Display;
-use std::io::Write;
-use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(Debug, Parser)]
@@ -24,18 +26,11 @@ struct Arguments {
 enum Command {
     /// Run the HTTP service.
     Serve {
-        /// Data directory; made when it is not there.
+        /// Configuration (TOML) with the names of the flags; flags win.
         #[arg(long)]
-        data: PathBuf,
-        /// Address to listen on; port 0 picks a free one.
-        #[arg(long, default_value = "127.0.0.1:8080")]
-        bind: SocketAddr,
-        /// Jobs at once; cores / threads when not given.
-        #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
-        slots: Option<u64>,
-        /// Threads of a job, default and most; cores / slots, or 1, when not given.
-        #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
-        threads: Option<u64>,
+        config: Option<PathBuf>,
+        #[command(flatten)]
+        choices: Choices,
     },
     /// Run one job in the foreground.
     Run {
@@ -82,6 +77,39 @@ enum Command {
         #[arg(long)]
         data: PathBuf,
     },
+    /// Look over a data directory that no service is using; fails when something is wrong.
+    Fsck {
+        /// Data directory.
+        #[arg(long)]
+        data: PathBuf,
+    },
+    /// Make a token: shown once on standard output, its line for the token file behind it.
+    Token {
+        /// A name for its bearer.
+        name: String,
+        /// What it allows: read, submit, control, with commas between.
+        #[arg(long, default_value = "read,submit,control")]
+        scopes: String,
+    },
+    /// Look into a file from outside (started by the service, under limits).
+    #[command(hide = true)]
+    Inspect {
+        /// What it is to be used as.
+        #[arg(long = "as")]
+        purpose: String,
+        /// The file.
+        file: PathBuf,
+    },
+    /// Measure this machine (started by the service).
+    #[command(hide = true)]
+    Calibrate {
+        /// A directory to work in; it is emptied.
+        #[arg(long)]
+        scratch: PathBuf,
+        /// Threads.
+        #[arg(long, default_value_t = 1)]
+        threads: u64,
+    },
     /// Run one attempt at a job (started by the service).
     #[command(hide = true)]
     Worker {
@@ -91,18 +119,28 @@ enum Command {
     },
 }
 
+/// Threads that wait for the disk at most: more would only take memory.
+const BLOCKING_THREADS: usize = 32;
+
 /// Reads the arguments and does what they say.
 #[must_use]
 pub fn main() -> ExitCode {
     match Arguments::parse().command {
-        Command::Serve { data, bind, slots, threads } => {
+        Command::Serve { config, choices } => {
             telemetry::start();
-            let small = |number: Option<u64>| number.map(|n| n as usize);
-            let config = match Config::new(data, bind, small(slots), small(threads)) {
+            let choices = match config.map(|path| Choices::of_file(&path)).transpose() {
+                Ok(file) => choices.or(file.unwrap_or_default()),
+                Err(error) => return fail(&error),
+            };
+            let config = match Config::new(&choices) {
                 Ok(config) => config,
                 Err(error) => return fail(&error),
             };
-            let runtime = match tokio::runtime::Builder::new_multi_thread().enable_all().build() {
+            let runtime = match tokio::runtime::Builder::new_multi_thread()
+                .max_blocking_threads(BLOCKING_THREADS)
+                .enable_all()
+                .build()
+            {
                 Ok(runtime) => runtime,
                 Err(error) => return fail(&error),
             };
@@ -127,8 +165,60 @@ pub fn main() -> ExitCode {
         Command::Backup { target, data } => {
             backup::back_up(&data, &target).map_or_else(|e| fail(&e), |()| ExitCode::SUCCESS)
         }
+        Command::Fsck { data } => look_over(&data).unwrap_or_else(|error| fail(&error)),
+        Command::Token { name, scopes } => make_token(&name, &scopes),
+        Command::Inspect { purpose, file } => inspect(&purpose, &file),
+        Command::Calibrate { scratch, threads } => calibrate(&scratch, threads),
         Command::Worker { attempt } => worker_process::run(&attempt).map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS),
     }
+}
+
+fn look_over(data: &Path) -> Result<ExitCode, fsck::FsckError> {
+    let findings = fsck::check(data)?;
+    let mut output = std::io::stdout().lock();
+    for finding in &findings.wrong {
+        writeln!(output, "{finding}")?;
+    }
+    let fsck::Findings { jobs, files, wrong } = findings;
+    writeln!(output, "{jobs} jobs and {files} files looked at, {} things wrong", wrong.len())?;
+    Ok(if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn make_token(name: &str, scopes: &str) -> ExitCode {
+    let is_name = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.@".contains(&b));
+    if !is_name || Scope::parse_list(scopes).is_none() {
+        return fail(
+            &"a name has letters, digits and -_.@ alone; scopes are read, submit, control with commas between",
+        );
+    }
+    let mut secret = [0_u8; 32];
+    let drawn = std::fs::File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut secret));
+    if let Err(error) = drawn {
+        return fail(&error);
+    }
+    let token = format!("mns_{}", base64::engine::general_purpose::URL_SAFE_NO_PAD.encode(secret));
+    let line = format!("{name} {scopes} sha256:{}", digest::of_bytes(token.as_bytes()));
+    let shown = writeln!(std::io::stdout(), "{token}\n{line}");
+    shown.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
+}
+
+fn inspect(purpose: &str, file: &Path) -> ExitCode {
+    let Some(purpose) = Purpose::from_word(purpose) else { return fail(&"there is no such purpose") };
+    let seen = jail::enter().and_then(|()| inspection::run(purpose, file, &mut std::io::stdout().lock()));
+    seen.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
+}
+
+fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
+    process::be_nice();
+    if let Err(error) = worker_process::end_with_input() {
+        return fail(&error);
+    }
+    let found = match calibration::measure_here(scratch, threads) {
+        Ok(found) => found,
+        Err(error) => return fail(&error),
+    };
+    let written = serde_json::to_writer(std::io::stdout().lock(), &found);
+    written.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
 }
 
 fn fail(error: &dyn Display) -> ExitCode {

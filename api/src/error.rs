@@ -1,9 +1,11 @@
 //! Errors as RFC 9457 problems: the only mapping from what went wrong to a status code.
 
+use crate::access::{Budget, Scope};
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use meniscus::scene::Violation;
+use meniscus_jobs::process;
 use meniscus_jobs::store::{ChangeError, StoreError};
 use serde::Serialize;
 use serde_json::Value;
@@ -71,6 +73,8 @@ pub enum ApiError {
         /// Bytes that are free beyond the reserve.
         room: u64,
     },
+    /// Nothing can be written any more.
+    DiskFull,
     /// Too many of the same are under way.
     Busy,
     /// The path exists, the method does not.
@@ -78,7 +82,26 @@ pub enum ApiError {
     /// The state does not allow it.
     Conflict(String),
     /// The body is larger than this many bytes.
-    TooLarge(usize),
+    TooLarge(u64),
+    /// The body is of a kind that is not taken.
+    UnsupportedMedia,
+    /// No token, or none that is known.
+    Unauthorized,
+    /// The token has not this scope.
+    Forbidden(Scope),
+    /// The service does not answer under this name.
+    UnknownHost,
+    /// A page of another origin asks.
+    ForeignOrigin,
+    /// The client has made as much as it may in this minute.
+    TooMany(Budget),
+    /// As many jobs are unfinished as may be.
+    QuotaReached {
+        /// So many are.
+        unfinished: u64,
+        /// So many may be.
+        most: u64,
+    },
     /// No byte of the range exists in a file of this size.
     RangeNotSatisfiable(u64),
     /// Not yet, or not any more.
@@ -107,6 +130,12 @@ impl ApiError {
                 );
                 (StatusCode::INSUFFICIENT_STORAGE, "no-space", "the files of this job would not fit", Some(detail))
             }
+            Self::DiskFull => (
+                StatusCode::INSUFFICIENT_STORAGE,
+                "disk-full",
+                "the disk is full",
+                Some("what is there can be read; jobs that rest for want of space go on by themselves".to_owned()),
+            ),
             Self::Busy => (StatusCode::SERVICE_UNAVAILABLE, "busy", "too many of these are under way", None),
             Self::MethodNotAllowed => {
                 (StatusCode::METHOD_NOT_ALLOWED, "method-not-allowed", "this resource does not do that", None)
@@ -119,6 +148,48 @@ impl ApiError {
                 "too-large",
                 "the body is too large",
                 Some(format!("at most {limit} bytes")),
+            ),
+            Self::UnsupportedMedia => (
+                StatusCode::UNSUPPORTED_MEDIA_TYPE,
+                "unsupported-media",
+                "the body is not taken in this form",
+                Some("send the bytes of the file themselves (curl --data-binary @FILE)".to_owned()),
+            ),
+            Self::Unauthorized => (
+                StatusCode::UNAUTHORIZED,
+                "unauthorized",
+                "a token is needed",
+                Some("Authorization: Bearer TOKEN".to_owned()),
+            ),
+            Self::Forbidden(scope) => (
+                StatusCode::FORBIDDEN,
+                "forbidden",
+                "the token does not allow that",
+                Some(format!("the scope {} is needed", scope.word())),
+            ),
+            Self::UnknownHost => (
+                StatusCode::MISDIRECTED_REQUEST,
+                "unknown-host",
+                "the service does not answer under this name",
+                Some("the operator adds names by --allow-host".to_owned()),
+            ),
+            Self::ForeignOrigin => (
+                StatusCode::FORBIDDEN,
+                "foreign-origin",
+                "pages of other origins are not answered",
+                Some("the operator adds names by --allow-host".to_owned()),
+            ),
+            Self::TooMany(budget) => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "too-many",
+                "too much was made in this minute",
+                Some(format!("{} a minute are allowed", budget.quota)),
+            ),
+            Self::QuotaReached { unfinished, most } => (
+                StatusCode::TOO_MANY_REQUESTS,
+                "quota",
+                "too many jobs are unfinished",
+                Some(format!("{unfinished} are, {most} may be")),
             ),
             Self::RangeNotSatisfiable(size) => {
                 let detail = Some(format!("the file has {size} bytes"));
@@ -140,6 +211,14 @@ impl IntoResponse for ApiError {
             tracing::error!(cause, "request failed");
         }
         let range = if let Self::RangeNotSatisfiable(size) = &self { Some(*size) } else { None };
+        let budget = if let Self::TooMany(budget) = &self { Some(*budget) } else { None };
+        let challenge = match &self {
+            Self::Unauthorized => Some("Bearer realm=\"meniscus\"".to_owned()),
+            Self::Forbidden(scope) => {
+                Some(format!("Bearer realm=\"meniscus\", error=\"insufficient_scope\", scope=\"{}\"", scope.word()))
+            }
+            _ => None,
+        };
         let errors = if let Self::Invalid(items) = self { items } else { Vec::new() };
         let body = Problem {
             r#type: format!("/problems/{kind}"),
@@ -151,8 +230,20 @@ impl IntoResponse for ApiError {
         let mut response = (status, Json(body)).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
-        if status == StatusCode::SERVICE_UNAVAILABLE {
-            headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+        let wait = match (status, budget) {
+            (_, Some(budget)) => {
+                budget.write(headers);
+                Some(budget.next_s)
+            }
+            (StatusCode::TOO_MANY_REQUESTS, None) => Some(60),
+            (StatusCode::SERVICE_UNAVAILABLE, None) => Some(1),
+            _ => None,
+        };
+        if let Some(wait) = wait {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from(wait));
+        }
+        if let Some(challenge) = challenge.and_then(|text| HeaderValue::from_str(&text).ok()) {
+            headers.insert(header::WWW_AUTHENTICATE, challenge);
         }
         if let Some(value) = range.and_then(|size| HeaderValue::from_str(&format!("bytes */{size}")).ok()) {
             headers.insert(header::CONTENT_RANGE, value);
@@ -172,6 +263,8 @@ impl From<StoreError> for ApiError {
                 allowed: "the id of a checkpoint, ckpt_…".into(),
                 did_you_mean: None,
             }]),
+            StoreError::UploadGone => Self::Conflict("an upload was deleted while it was to be used".to_owned()),
+            error if process::is_out_of_space(&error) => Self::DiskFull,
             error => Self::Internal(error.to_string()),
         }
     }
@@ -179,7 +272,7 @@ impl From<StoreError> for ApiError {
 
 impl From<std::io::Error> for ApiError {
     fn from(error: std::io::Error) -> Self {
-        Self::Internal(error.to_string())
+        if process::is_out_of_space(&error) { Self::DiskFull } else { Self::Internal(error.to_string()) }
     }
 }
 

@@ -1,12 +1,13 @@
 //! `meniscus run` and `meniscus resume`: one job in this process, with a progress bar and no service.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use meniscus_jobs::body::{self, Allowance};
+use meniscus_jobs::body::{self, Allowance, NoSources};
 use meniscus_jobs::observers::Control;
 use meniscus_jobs::order::{Order, StartCheckpoint};
 use meniscus_jobs::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
 use meniscus_jobs::{checkpoint, process, strict_json, worker};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -72,7 +73,7 @@ fn resolve(spec: &Value, threads: Option<usize>) -> Result<Value, RunError> {
         memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4,
         local_files: true,
     };
-    let body = body::parse(spec, allowance, |_| None).map_err(|violations| {
+    let body = body::parse(spec, allowance, &NoSources).map_err(|violations| {
         let lines: Vec<String> = violations
             .iter()
             .map(|v| {
@@ -99,6 +100,8 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
         attempts_directory: out.clone(),
         may_start_afresh: checkpoints.is_empty(),
         checkpoints,
+        inputs: BTreeMap::new(),
+        time: None,
         usage: Usage::default(),
     };
     let keep = resolved["checkpoint"]["keep"].as_u64().unwrap_or(2) as usize;

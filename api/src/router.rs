@@ -1,9 +1,11 @@
 //! Every route in one list, and what every answer goes through.
 
+use crate::access;
 use crate::application::Application;
 use crate::error::ApiError;
-use crate::routes::{checkpoints, events, files, jobs, results, scenes, service};
-use axum::extract::{Request, State};
+use crate::routes::{checkpoints, estimates, events, files, jobs, metrics, results, scenes, service, studies, uploads};
+use ::metrics::{counter, histogram};
+use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
@@ -12,6 +14,7 @@ use serde_json::Value;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 use tower_http::catch_panic::CatchPanicLayer;
+use tracing::Instrument;
 use ulid::Ulid;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
@@ -30,8 +33,10 @@ fn documented() -> OpenApiRouter<Application> {
         .routes(routes!(service::index))
         .routes(routes!(service::health))
         .routes(routes!(service::ready))
+        .routes(routes!(metrics::metrics))
         .routes(routes!(scenes::list))
         .routes(routes!(scenes::get))
+        .routes(routes!(estimates::estimate))
         .routes(routes!(jobs::submit, jobs::list))
         .routes(routes!(jobs::get, jobs::delete))
         .routes(routes!(jobs::cancel))
@@ -48,6 +53,18 @@ fn documented() -> OpenApiRouter<Application> {
         .routes(routes!(checkpoints::latest))
         .routes(routes!(checkpoints::get, checkpoints::delete))
         .routes(routes!(checkpoints::content))
+        .routes(routes!(uploads::submit, uploads::list))
+        .routes(routes!(uploads::get, uploads::delete))
+        .routes(routes!(studies::submit, studies::list))
+        .routes(routes!(studies::get, studies::delete))
+        .routes(routes!(studies::jobs_of))
+        .routes(routes!(events::of_study))
+        .routes(routes!(studies::table))
+        .routes(routes!(studies::report))
+        .routes(routes!(studies::cancel))
+        .routes(routes!(studies::pause))
+        .routes(routes!(studies::resume))
+        .routes(routes!(studies::retry))
 }
 
 /// The document as clients read it: a wildcard `{*path}` is axum's spelling of the parameter `{path}`.
@@ -68,6 +85,7 @@ pub fn router(application: Application) -> Router {
         .fallback(|| async { ApiError::NotFound("resource") })
         .method_not_allowed_fallback(|| async { ApiError::MethodNotAllowed })
         .layer(middleware::from_fn_with_state(application.clone(), only_when_ready))
+        .layer(middleware::from_fn_with_state(application.clone(), access::guard))
         .layer(CatchPanicLayer::custom(|_| ApiError::Internal("a handler panicked".to_owned()).into_response()))
         .layer(middleware::from_fn(with_request_id))
         .with_state(application)
@@ -84,25 +102,51 @@ async fn only_when_ready(State(application): State<Application>, request: Reques
     next.run(request).await
 }
 
-/// Every answer carries a request id, which the log repeats.
+/// Every answer carries a request id, which the log repeats, and what keeps browsers from guessing.
 async fn with_request_id(request: Request, next: Next) -> Response {
     let id = format!("req_{}", Ulid::generate());
     let (method, path, began) = (request.method().clone(), request.uri().path().to_owned(), Instant::now());
-    let mut response = next.run(request).await;
+    let route = request.extensions().get::<MatchedPath>().map_or("other", MatchedPath::as_str).to_owned();
+    let span = tracing::info_span!("request", request = id, %method, path);
+    let mut response = next.run(request).instrument(span.clone()).await;
     let kind = response.headers().get(header::CONTENT_TYPE);
     let is_plain = kind.is_none_or(|kind| kind.as_bytes().starts_with(b"text/plain"));
     if response.status() == StatusCode::BAD_REQUEST && is_plain {
         // axum's own words for a path or query that is no text.
         response = ApiError::BadRequest.into_response();
     }
-    if let Ok(value) = HeaderValue::from_str(&id) {
-        response.headers_mut().insert(HeaderName::from_static("x-request-id"), value);
-    }
+    let status = response.status().as_u16();
     let headers = response.headers_mut();
-    headers.insert(HeaderName::from_static("x-content-type-options"), HeaderValue::from_static("nosniff"));
-    tracing::debug!(id, %method, path, status = response.status().as_u16(), elapsed = ?began.elapsed(), "request");
+    if let Ok(value) = HeaderValue::from_str(&id) {
+        headers.insert(HeaderName::from_static("x-request-id"), value);
+    }
+    for (name, value) in SECURITY_HEADERS {
+        headers.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
+    }
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-cache"));
+    let made = headers.get(header::LOCATION).and_then(|place| place.to_str().ok()).map(str::to_owned);
+    let elapsed = began.elapsed();
+    counter!("meniscus_http_requests_total", "method" => method.as_str().to_owned(), "route" => route.clone(), "status" => status.to_string()).increment(1);
+    histogram!("meniscus_http_request_seconds", "route" => route).record(elapsed.as_secs_f64());
+    // What changes something is told; reading is told to those who ask for it.
+    span.in_scope(|| {
+        if method == Method::GET || method == Method::HEAD {
+            tracing::debug!(status, ?elapsed, "answered");
+        } else {
+            tracing::info!(status, ?elapsed, made, "answered");
+        }
+    });
     response
 }
+
+/// Nothing here is a page: no script, no frame, no guessing of types.
+const SECURITY_HEADERS: [(&str, &str); 5] = [
+    ("x-content-type-options", "nosniff"),
+    ("x-frame-options", "DENY"),
+    ("referrer-policy", "no-referrer"),
+    ("cross-origin-resource-policy", "same-origin"),
+    ("content-security-policy", "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"),
+];
 
 #[cfg(test)]
 mod tests {

@@ -1,12 +1,21 @@
 //! Handlers, one file a resource.
 
 pub mod checkpoints;
+pub mod estimates;
 pub mod events;
 pub mod files;
 pub mod jobs;
+pub mod metrics;
+mod page;
 pub mod results;
 pub mod scenes;
 pub mod service;
+mod sources;
+pub mod studies;
+pub mod uploads;
+
+pub(crate) use page::{Page, flag, number, refuse_unknown};
+pub(crate) use sources::StoreSources;
 
 use crate::application::Application;
 use crate::error::ApiError;
@@ -19,7 +28,9 @@ pub(crate) async fn with_store<R: Send + 'static>(
     work: impl FnOnce(&Store) -> Result<R, ApiError> + Send + 'static,
 ) -> Result<R, ApiError> {
     let store = Arc::clone(&application.store);
-    tokio::task::spawn_blocking(move || work(&store)).await?
+    // What is logged inside keeps the id of the request.
+    let span = tracing::Span::current();
+    tokio::task::spawn_blocking(move || span.in_scope(|| work(&store))).await?
 }
 
 /// A job that must be there.

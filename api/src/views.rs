@@ -1,5 +1,9 @@
 //! What clients see: the only wire types.
 
+mod collections;
+
+pub use collections::{DryRunView, EstimateView, StudyList, StudyView, UploadList, UploadView};
+
 use meniscus_jobs::build;
 use meniscus_jobs::records::{HealthRecord, Progress, Usage};
 use meniscus_jobs::store::{CheckpointRow, Event, FileRow, JobRow};
@@ -138,8 +142,11 @@ pub struct JobList {
 /// An event.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct EventView {
-    /// Number within the job, from 1 without gaps.
+    /// Number within the job (or the study), from 1 without gaps.
     pub id: u64,
+    /// The job, in the events of a study.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub job: Option<String>,
     /// `state`, `progress`, `checkpoint`, `frame`, `warning` or `finding`.
     pub r#type: String,
     /// RFC 3339, UTC.
@@ -337,7 +344,7 @@ impl From<JobRow> for JobView {
             health: HealthView { finite, max_cfl, volume_drift, rescued_fits, warnings: job.warnings },
             attempt: job.attempt,
             usage: UsageView { wall_s, cpu_s, peak_memory_bytes, disk_bytes },
-            lineage: LineageView { study: None, restarted_from: job.restarted_from, retry_of: None },
+            lineage: LineageView { study: job.study, restarted_from: job.restarted_from, retry_of: job.retry_of },
             deterministic: DeterministicView { build: build::name(), isa: build::isa() },
             created_at: job.created_at,
             started_at: job.started_at,
@@ -351,7 +358,7 @@ impl From<JobRow> for JobView {
 impl From<Event> for EventView {
     fn from(event: Event) -> Self {
         let Event { id, kind, at, attempt, data } = event;
-        Self { id, r#type: kind, at, attempt, data }
+        Self { id, job: None, r#type: kind, at, attempt, data }
     }
 }
 

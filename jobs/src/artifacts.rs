@@ -1,6 +1,7 @@
 //! Writing files so that a reader sees them whole or not at all: beside the target, synced, renamed, the directory
 //! synced after.
 
+use crate::breakpoints::pass;
 use crate::digest;
 use crate::records::FileRecord;
 use std::fs::{self, File};
@@ -22,8 +23,12 @@ pub fn unfinished(path: &Path) -> PathBuf {
 pub fn finish(path: &Path) -> io::Result<()> {
     let beside = unfinished(path);
     File::open(&beside)?.sync_all()?;
+    pass("artifact/synced");
     fs::rename(&beside, path)?;
-    sync_directory(path.parent().unwrap_or(Path::new(".")))
+    pass("artifact/renamed");
+    sync_directory(path.parent().unwrap_or(Path::new(".")))?;
+    pass("artifact/named");
+    Ok(())
 }
 
 /// Makes renames and removals in a directory durable.

@@ -1,14 +1,18 @@
 //! The body of a job: as written by a client, and as understood with every default.
 
 mod restart;
+mod sources;
 mod wishes;
 
-pub use restart::RestartSource;
+pub use restart::{Origin, RestartSource};
+pub use sources::{NoSources, Sources};
 pub use wishes::{CheckpointWishes, Limits, Output, Wishes};
 
+use crate::forecast::{self, Forecast, WORKER_BASE_BYTES};
 use meniscus::scene::schema::{NOT_NEGATIVE, POSITIVE};
-use meniscus::scene::{DefaultValue, Estimate, Kind, Parameter, Scene, Violation, check, understand};
+use meniscus::scene::{CloudSizes, CloudSource, DefaultValue, Kind, Parameter, Scene, Violation, check, understand};
 use meniscus::scenes::SCENES;
+use meniscus::simulation::OutputPlan;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -39,16 +43,13 @@ pub struct JobBody {
     pub priority: i64,
     /// The scene.
     pub scene: Box<dyn Scene>,
-    /// Size of the run.
-    pub estimate: Estimate,
-    /// Size of its files.
-    pub disk_bytes: u64,
-    /// The job whose checkpoint this one starts from.
-    pub restarted_from: Option<String>,
+    /// What it will take.
+    pub forecast: Forecast,
+    /// The checkpoint that it starts from.
+    pub origin: Option<Origin>,
+    /// The uploads that its scene names.
+    pub uploads: Vec<String>,
 }
-
-/// Memory of a worker before it holds any particle.
-pub const WORKER_BASE_BYTES: u64 = 48 << 20;
 
 static OUTPUT: &[Parameter] = &[
     Parameter::restart_safe(
@@ -118,15 +119,11 @@ const OUTPUT_FIELDS: [&str; 3] = ["every_time", "fields", "series_every_steps"];
 
 /// From a client's JSON to a job.
 ///
-/// `find_checkpoint` looks up what a restart names.
+/// `sources` knows the checkpoints and uploads that a body may name.
 ///
 /// # Errors
 /// All violations at once, with pointers from the body's root.
-pub fn parse(
-    spec: &Value,
-    allowance: Allowance,
-    mut find_checkpoint: impl FnMut(&str) -> Option<RestartSource>,
-) -> Result<JobBody, Vec<Violation>> {
+pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Result<JobBody, Vec<Violation>> {
     let Value::Object(given) = spec else {
         return Err(vec![Violation::new("", "type", "a job is an object", spec, json!("an object with a scene"))]);
     };
@@ -154,17 +151,23 @@ pub fn parse(
             None
         }
         (Some(_), None) => None,
-        (None, Some(restart)) => restart::parse(restart, &mut find_checkpoint, &mut errors),
+        (None, Some(restart)) => restart::parse(restart, sources, &mut errors),
     };
     let scene_json = restart.as_ref().map(|(_, scene)| scene.clone()).or_else(|| given.get("scene").cloned());
     let prefix = if restart.is_some() { "/restart/overrides" } else { "/scene" };
     let scene = scene_json.and_then(|value| {
         understand(&value, SCENES).map_err(|found| errors.extend(found.into_iter().map(|v| v.under(prefix)))).ok()
     });
-    for cloud in scene.iter().flat_map(|scene| scene.clouds()).filter(|_| !allowance.local_files) {
-        let detail = "a local file is valid for `meniscus run` alone; this service takes no uploads yet";
-        let at = format!("{prefix}{}", cloud.pointer);
-        errors.push(Violation::new(at, "not_here", detail, &json!(cloud.file), Value::Null));
+    let mut sizes = CloudSizes::new();
+    let mut uploads = Vec::new();
+    for cloud in scene.iter().flat_map(|scene| scene.clouds()) {
+        match sources::size_of(&cloud, sources, allowance.local_files) {
+            Ok(size) => sizes.extend(size.map(|size| (cloud.pointer, size))),
+            Err(violation) => errors.push(violation.under(prefix)),
+        }
+        if let CloudSource::Upload(upload) = cloud.source {
+            uploads.push(upload);
+        }
     }
     let mut output = section(given, "output", OUTPUT, Some(&OUTPUT_FIELDS), &mut errors);
     let fields = output_fields(given, scene.as_deref(), &mut errors);
@@ -178,7 +181,7 @@ pub fn parse(
     let mut limits = section(given, "limits", LIMITS, None, &mut errors);
     default_limit(&mut limits, "threads", allowance.threads, &mut errors);
     default_limit(&mut limits, "memory_bytes", allowance.memory_bytes, &mut errors);
-    let estimate = scene.as_ref().map(|scene| scene.estimate());
+    let estimate = scene.as_ref().map(|scene| scene.estimate(&sizes));
     if let (Some(estimate), Some(memory)) = (estimate, limits.get("memory_bytes").and_then(Value::as_u64)) {
         let needed = WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes);
         if needed > memory {
@@ -208,11 +211,25 @@ pub fn parse(
     if !errors.is_empty() {
         return Err(errors);
     }
-    let disk_bytes = disk_estimate(&estimate, &output, &checkpoint);
+    let threads = limits.get("threads").and_then(Value::as_u64).unwrap_or(1);
+    let plan = OutputPlan {
+        every_time: output.get("every_time").and_then(Value::as_f64),
+        series_every_steps: output.get("series_every_steps").and_then(Value::as_u64).unwrap_or(10),
+    };
+    let of_scene = scene.resolved();
+    let forecast = Forecast {
+        estimate,
+        work: scene.work(&plan, &sizes),
+        family: format!("{}/{}", of_scene["kind"].as_str().unwrap_or_default(), of_scene["dimension"]),
+        threads,
+        memory_bytes: WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes),
+        disk_bytes: forecast::disk_bytes(&estimate, &output, &checkpoint),
+        time: None,
+    };
     let mut resolved = Map::new();
     resolved.insert("name".into(), json!(name));
     resolved.insert("labels".into(), json!(labels));
-    resolved.insert("scene".into(), scene.resolved());
+    resolved.insert("scene".into(), of_scene);
     if let Some(restart) = given.get("restart") {
         resolved.insert("restart".into(), restart.clone());
     }
@@ -228,25 +245,13 @@ pub fn parse(
         labels,
         priority,
         scene,
-        estimate,
-        disk_bytes,
-        restarted_from: restart.map(|(source, _)| source.checkpoint),
+        forecast,
+        origin: restart.map(|(source, _)| source.origin),
+        uploads,
     })
 }
 
-/// Bytes of all files of a run: frames and checkpoints by the particle.
-fn disk_estimate(estimate: &Estimate, output: &Map<String, Value>, checkpoint: &Map<String, Value>) -> u64 {
-    const FRAME: u64 = 200;
-    const CHECKPOINT: u64 = 120;
-    let every = output.get("every_time").and_then(Value::as_f64).unwrap_or(f64::INFINITY);
-    let frames = ((estimate.end_time / every).min(estimate.steps as f64) + 2.0) as u64;
-    let kept = checkpoint.get("keep").and_then(Value::as_u64).unwrap_or(2).saturating_add(1);
-    let per_particle = FRAME.saturating_mul(frames).saturating_add(CHECKPOINT.saturating_mul(kept));
-    // SQLite's whole numbers end at 2⁶³.
-    estimate.particles.saturating_mul(per_particle).saturating_add(1 << 20).min(1 << 62)
-}
-
-fn text(given: &Map<String, Value>, name: &str, errors: &mut Vec<Violation>) -> Option<String> {
+pub(crate) fn text(given: &Map<String, Value>, name: &str, errors: &mut Vec<Violation>) -> Option<String> {
     match given.get(name) {
         None | Some(Value::Null) => None,
         Some(Value::String(text)) if text.len() <= 200 => Some(text.clone()),
@@ -263,7 +268,7 @@ fn text(given: &Map<String, Value>, name: &str, errors: &mut Vec<Violation>) -> 
     }
 }
 
-fn labels(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> BTreeMap<String, String> {
+pub(crate) fn labels(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> BTreeMap<String, String> {
     let mut labels = BTreeMap::new();
     match given.get("labels") {
         None | Some(Value::Null) => {}

@@ -5,6 +5,7 @@
 //! match.
 
 use crate::artifacts;
+use crate::breakpoints::pass;
 use crate::build;
 use crate::digest;
 use crate::formats::hdf5_file::{count_bytes, real_bytes, write};
@@ -128,10 +129,20 @@ pub fn write_verified(path: &Path, mut meta: Meta, state: &State) -> Result<(Str
     }
     meta.arrays = arrays_of(state);
     let beside = artifacts::unfinished(path);
+    pass("checkpoint/begin");
     let written = write_file(&beside, &meta, state)
-        .and_then(|()| std::fs::File::open(&beside)?.sync_all().map_err(CheckpointError::from))
-        .and_then(|()| read(&beside, None).map(|_| ()))
-        .and_then(|()| artifacts::finish(path).map_err(CheckpointError::from));
+        .and_then(|()| {
+            pass("checkpoint/closed");
+            std::fs::File::open(&beside)?.sync_all().map_err(CheckpointError::from)
+        })
+        .and_then(|()| {
+            pass("checkpoint/synced");
+            read(&beside, None).map(|_| ())
+        })
+        .and_then(|()| {
+            pass("checkpoint/verified");
+            artifacts::finish(path).map_err(CheckpointError::from)
+        });
     if let Err(error) = written {
         // A leftover would only take space; failing to remove it changes nothing.
         let _ = std::fs::remove_file(&beside);
@@ -247,6 +258,7 @@ fn write_file(path: &Path, meta: &Meta, state: &State) -> Result<(), CheckpointE
     let group = file.create_group("state")?;
     for array in &state.reals {
         write(&group, &array.name, array.components, &array.values)?;
+        pass("checkpoint/array");
     }
     for array in &state.counts {
         write(&group, &array.name, 1, &array.values)?;
@@ -254,6 +266,7 @@ fn write_file(path: &Path, meta: &Meta, state: &State) -> Result<(), CheckpointE
     let text = serde_json::to_vec(meta)?;
     write(&file, "meta", 1, &text)?;
     write(&file, "meta_sha256", 1, digest::of_bytes(&text).as_bytes())?;
+    pass("checkpoint/written");
     file.close()?;
     Ok(())
 }

@@ -1,7 +1,9 @@
 //! Files that others read: VTKHDF frames, CSV series, SVG pictures.
 
+pub mod cloud_file;
 pub mod csv;
 pub mod frame_index;
 pub mod hdf5_file;
 pub mod picture;
+pub mod speed_error;
 pub mod vtkhdf;

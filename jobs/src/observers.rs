@@ -11,6 +11,7 @@ pub mod series;
 
 pub use control::Control;
 
+use crate::breakpoints::pass;
 use crate::checkpoint::Counters;
 use crate::records::{Record, RecordSink};
 use checkpoints::Checkpoints;
@@ -73,7 +74,9 @@ impl Observer for Observers<'_> {
             let counters = self.counters(simulation);
             let checkpoints = &mut self.checkpoints;
             let record = self.progress.timed("checkpoint", || checkpoints.write(simulation, counters))?;
+            pass("checkpoint/unrecorded");
             self.sink.put(&Record::Checkpoint(record), true)?;
+            pass("checkpoint/recorded");
         }
         if let Some(progress) = self.progress.observe(simulation, finished || stopping) {
             self.sink.put(&Record::Progress(progress), false)?;

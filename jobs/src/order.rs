@@ -1,8 +1,10 @@
 //! The order that a worker gets: `attempt.json` in the attempt's directory.
 
+use crate::forecast::TimeForecast;
 use crate::records::Usage;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Name of the file.
@@ -23,6 +25,12 @@ pub struct Order {
     pub checkpoints: Vec<StartCheckpoint>,
     /// Whether the start of the scene will do when no checkpoint is sound.
     pub may_start_afresh: bool,
+    /// Points that the scene takes from uploads, by their ids, in the format of [`crate::formats::cloud_file`].
+    #[serde(default)]
+    pub inputs: BTreeMap<String, PathBuf>,
+    /// What the run was forecast to take.
+    #[serde(default)]
+    pub time: Option<TimeForecast>,
     /// Cost of the attempts before.
     pub usage: Usage,
 }

@@ -88,10 +88,21 @@ pub fn is_out_of_space(error: &(dyn std::error::Error + 'static)) -> bool {
             .downcast_ref::<std::io::Error>()
             .is_some_and(|e| matches!(e.kind(), std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded));
         // libhdf5 wraps the system's error in text.
-        if full || error.to_string().contains("No space left on device") {
+        if full
+            || error.to_string().contains("No space left on device")
+            || error.to_string().contains("database or disk is full")
+        {
             return true;
         }
         current = error.source();
     }
     false
+}
+
+/// The name of this machine's processor.
+#[must_use]
+pub fn cpu_name() -> Option<String> {
+    let info = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = info.lines().find(|line| line.starts_with("model name"))?;
+    line.split(':').nth(1).map(|name| name.trim().to_owned())
 }

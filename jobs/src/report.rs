@@ -2,6 +2,7 @@
 
 use crate::build;
 use crate::digest;
+use crate::process;
 use crate::records::Usage;
 use meniscus::simulation::Report;
 use serde_json::{Value, json};
@@ -44,17 +45,10 @@ pub fn compose(
         "method": report.method,
         "provenance": {
             "build": build::name(),
-            "cpu": cpu_name(),
+            "cpu": process::cpu_name(),
             "isa": build::isa(),
             "threads": threads,
             "scene_sha256": digest::of_bytes(scene.to_string().as_bytes()),
         },
     })
-}
-
-/// The name of this machine's processor.
-pub(crate) fn cpu_name() -> Option<String> {
-    let info = std::fs::read_to_string("/proc/cpuinfo").ok()?;
-    let line = info.lines().find(|line| line.starts_with("model name"))?;
-    line.split(':').nth(1).map(|name| name.trim().to_owned())
 }

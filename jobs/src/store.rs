@@ -3,23 +3,37 @@
 //! One connection writes, under a lock; a few others read. Every change of a job is a compare-and-set on its `rev`
 //! inside a transaction that also writes the event, so what a client saw and what the file says never differ.
 
+pub mod answers;
+pub mod calibration;
+pub mod census;
 pub mod events;
+pub mod ids;
 pub mod import;
+pub mod integrity;
 pub mod listing;
 pub mod migrations;
+pub mod retention;
 pub mod rows;
 pub mod settle;
+pub mod studies;
+pub mod submission;
 pub mod transitions;
+pub mod uploads;
 
+pub use answers::{KeptAnswer, Made, Once};
 pub use events::Event;
 pub use listing::JobFilter;
 pub use rows::{CheckpointRow, FileRow, JobRow};
+pub use studies::{NewStudy, PointRow, StudyRow};
+pub use submission::{NewJob, START_CHECKPOINT};
 pub use transitions::{Change, ChangeError};
+pub use uploads::{NewUpload, UploadRow};
 
-use crate::body::{JobBody, RestartSource};
+use crate::body::{Origin, RestartSource};
 use crate::job::State;
-use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
-use serde_json::{Value, json};
+use ids::RisingIds;
+use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -37,8 +51,7 @@ pub struct Store {
     writer: Mutex<Connection>,
     readers: Vec<Mutex<Connection>>,
     next_reader: std::sync::atomic::AtomicUsize,
-    /// Ids that rise even within a millisecond.
-    ids: Mutex<ulid::Generator>,
+    ids: RisingIds,
     /// Counts changes; waiting clients watch it.
     changes: watch::Sender<u64>,
 }
@@ -55,6 +68,9 @@ pub enum StoreError {
     /// The checkpoint of a restart was removed in the meantime.
     #[error("the checkpoint is gone")]
     CheckpointGone,
+    /// An upload that a scene names was removed in the meantime.
+    #[error("the upload is gone")]
+    UploadGone,
     /// A row does not say what it should.
     #[error("a stored value is unreadable: {0}")]
     Json(#[from] serde_json::Error),
@@ -75,16 +91,18 @@ impl Store {
     /// [`StoreError`].
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         std::fs::create_dir_all(directory.join("jobs"))?;
+        std::fs::create_dir_all(directory.join("uploads"))?;
         let path = directory.join(FILE_NAME);
         let mut writer = connect(&path)?;
         migrations::apply(&mut writer)?;
+        let ids = RisingIds::above(&writer)?;
         let readers = (0..READERS).map(|_| connect(&path).map(Mutex::new)).collect::<Result<_, _>>()?;
         Ok(Self {
             directory: directory.to_owned(),
             writer: Mutex::new(writer),
             readers,
             next_reader: std::sync::atomic::AtomicUsize::new(0),
-            ids: Mutex::new(ulid::Generator::new()),
+            ids,
             changes: watch::Sender::new(0),
         })
     }
@@ -131,61 +149,8 @@ impl Store {
         Ok(result)
     }
 
-    /// Makes a job; it is durable when this returns. A restart's checkpoint is linked into the job's directory first,
-    /// so that deleting the source takes nothing away.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn submit(&self, body: &JobBody) -> Result<JobRow, StoreError> {
-        let id = format!("job_{}", self.next_id());
-        let mut restart_sha256 = None;
-        if let Some(checkpoint) = &body.restarted_from {
-            let row = self.checkpoint(checkpoint)?.ok_or(StoreError::CheckpointGone)?;
-            let folder = self.job_directory(&id);
-            std::fs::create_dir_all(&folder)?;
-            let source = crate::order::attempt_directory(&self.job_directory(&row.job), row.attempt).join(&row.path);
-            let target = folder.join(START_CHECKPOINT);
-            // Its row may have been there a moment ago and its file be gone by now.
-            if std::fs::hard_link(&source, &target).is_err() && std::fs::copy(&source, &target).is_err() {
-                remove_directory(&folder)?;
-                return Err(StoreError::CheckpointGone);
-            }
-            crate::artifacts::sync_directory(&folder)?;
-            restart_sha256 = Some(row.sha256);
-        }
-        let now = crate::clock::now();
-        self.write(|transaction| {
-            let estimate = json!({
-                "particles": body.estimate.particles, "steps": body.estimate.steps,
-                "time_step": body.estimate.time_step, "memory_bytes": crate::body::WORKER_BASE_BYTES.saturating_add(body.estimate.memory_bytes),
-                "disk_bytes": body.disk_bytes,
-            });
-            transaction
-                .prepare_cached(
-                    "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at, restarted_from, restart_sha256)
-                     VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
-                )?
-                .execute(params![
-                    id,
-                    body.name,
-                    serde_json::to_string(&body.labels)?,
-                    body.kind,
-                    body.spec.to_string(),
-                    body.resolved.to_string(),
-                    estimate.to_string(),
-                    body.priority,
-                    now,
-                    body.restarted_from,
-                    restart_sha256,
-                ])?;
-            events::append(transaction, &id, 0, "state", &json!({"from": Value::Null, "to": State::Queued.word()}))?;
-            rows::job(transaction, &id)?.ok_or_else(|| rusqlite::Error::QueryReturnedNoRows.into())
-        })
-    }
-
     fn next_id(&self) -> Ulid {
-        let mut generator = self.ids.lock().unwrap_or_else(PoisonError::into_inner);
-        generator.generate().unwrap_or_else(|_| Ulid::generate())
+        self.ids.next()
     }
 
     /// A job by id.
@@ -239,9 +204,8 @@ impl Store {
         };
         let job = rows::job(&connection, &row.job)?;
         Ok(job.map(|job| RestartSource {
-            checkpoint: row.id,
+            origin: Origin::Checkpoint(row.id),
             resolved: job.resolved,
-            job: row.job,
             isa: row.isa,
             step: row.step,
         }))
@@ -260,10 +224,7 @@ impl Store {
             if !state.as_deref().and_then(State::from_word).is_some_and(State::is_terminal) {
                 return Ok(false);
             }
-            for table in ["events", "files", "checkpoints"] {
-                transaction.execute(&format!("DELETE FROM {table} WHERE job = ?1"), [id])?;
-            }
-            transaction.execute("DELETE FROM jobs WHERE id = ?1", [id])?;
+            delete_rows(transaction, id)?;
             Ok(true)
         })?;
         if deleted {
@@ -272,29 +233,36 @@ impl Store {
         Ok(deleted)
     }
 
-    /// Removes directories of jobs that the store does not know: leftovers of a deletion or of a submission that a
-    /// crash cut short.
+    /// Removes directories of jobs and uploads that the store does not know: leftovers of a deletion, of a submission
+    /// or an upload that a crash cut short.
     ///
     /// # Errors
     /// [`StoreError`].
     pub fn sweep(&self) -> Result<(), StoreError> {
-        for entry in std::fs::read_dir(self.directory.join("jobs"))? {
-            let entry = entry?;
-            let name = entry.file_name();
-            let known = match name.to_str() {
-                Some(id) => self.job(id)?.is_some(),
-                None => false,
+        for kind in ["jobs", "uploads"] {
+            let known: HashSet<String> = {
+                let connection = self.read();
+                let mut statement = connection.prepare(&format!("SELECT id FROM {kind}"))?;
+                let rows = statement.query_map([], |row| row.get(0))?;
+                rows.collect::<Result<_, _>>()?
             };
-            if !known {
-                remove_directory(&entry.path())?;
+            for entry in std::fs::read_dir(self.directory.join(kind))? {
+                let entry = entry?;
+                if !entry.file_name().to_str().is_some_and(|name| known.contains(name)) {
+                    remove_directory(&entry.path())?;
+                }
             }
         }
         Ok(())
     }
 }
 
-/// Name of a restart's checkpoint in the new job's directory.
-pub const START_CHECKPOINT: &str = "start.h5";
+fn delete_rows(transaction: &Transaction, job: &str) -> rusqlite::Result<()> {
+    for table in ["events", "files", "checkpoints", "inputs"] {
+        transaction.prepare_cached(&format!("DELETE FROM {table} WHERE job = ?1"))?.execute([job])?;
+    }
+    transaction.prepare_cached("DELETE FROM jobs WHERE id = ?1")?.execute([job]).map(|_| ())
+}
 
 pub(crate) fn connect(path: &Path) -> Result<Connection, rusqlite::Error> {
     let connection = Connection::open(path)?;

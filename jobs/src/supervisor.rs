@@ -5,6 +5,7 @@ mod leftovers;
 mod limits;
 
 use crate::body::Wishes;
+use crate::breakpoints::pass;
 use crate::executor::{Executor, Worker};
 use crate::job::{Reason, State, Trigger};
 use crate::order::{self, Order, StartCheckpoint, attempt_directory};
@@ -33,6 +34,8 @@ pub struct Settings {
     pub pause_grace: Duration,
     /// Free space that new attempts leave untouched.
     pub disk_reserve_bytes: u64,
+    /// Days that ended jobs are kept; None keeps them for ever.
+    pub retention_days: Option<u32>,
 }
 
 impl Settings {
@@ -45,6 +48,7 @@ impl Settings {
             cancel_grace: Duration::from_millis(1200),
             pause_grace: Duration::from_secs(10),
             disk_reserve_bytes: DISK_RESERVE_BYTES,
+            retention_days: None,
         }
     }
 }
@@ -109,6 +113,8 @@ pub struct Supervisor {
     receiver: Receiver<Message>,
     draining: bool,
     space_checked: Instant,
+    /// When what is too old was last looked for.
+    expired: Option<Instant>,
     /// No worker is started before this time, after one could not be.
     start_again: Instant,
 }
@@ -119,6 +125,8 @@ const TICK: Duration = Duration::from_millis(100);
 const DRAIN: Duration = Duration::from_secs(15);
 /// Time that a worker has to end after its verdict.
 const LAST_WORDS: Duration = Duration::from_secs(5);
+/// Time between two looks for what is kept no longer.
+const EXPIRY_INTERVAL: Duration = Duration::from_secs(600);
 /// Time without starts after one that failed.
 const START_PAUSE: Duration = Duration::from_secs(1);
 
@@ -137,6 +145,7 @@ impl Supervisor {
             receiver,
             draining: false,
             space_checked: now,
+            expired: None,
             start_again: now,
         }
     }
@@ -223,9 +232,24 @@ impl Supervisor {
         for k in ended.into_iter().rev() {
             self.running.swap_remove(k);
         }
+        self.store.stop_failed_studies()?;
+        self.expire()?;
         if !self.draining && Instant::now() >= self.start_again {
             self.resume_when_space_is_back()?;
             while self.running.len() < self.settings.slots && self.start_next()? {}
+        }
+        Ok(())
+    }
+
+    /// Deletes what is kept no longer, every now and then.
+    fn expire(&mut self) -> Result<(), StoreError> {
+        if self.expired.is_some_and(|last| last.elapsed() < EXPIRY_INTERVAL) {
+            return Ok(());
+        }
+        self.expired = Some(Instant::now());
+        let gone = self.store.expire(self.settings.retention_days)?;
+        if gone > 0 {
+            tracing::info!(gone, "jobs were kept long enough and are deleted");
         }
         Ok(())
     }
@@ -271,8 +295,10 @@ impl Supervisor {
     /// Removes checkpoints beyond those to keep.
     fn prune_checkpoints(&self, k: usize) -> Result<(), StoreError> {
         let running = &self.running[k];
+        pass("checkpoint/imported");
         let directory = self.store.job_directory(&running.job);
         for old in self.store.prune_checkpoints(&running.job, running.wishes.checkpoint.keep as usize)? {
+            pass("checkpoint/pruned");
             if let Err(error) = std::fs::remove_file(attempt_directory(&directory, old.attempt).join(&old.path)) {
                 tracing::warn!(job = running.job, %error, "an old checkpoint could not be removed");
             }
@@ -381,6 +407,8 @@ impl Supervisor {
             attempts_directory: job_directory.join("attempts"),
             checkpoints,
             may_start_afresh: job.restarted_from.is_none(),
+            inputs: self.store.inputs(&job.id)?,
+            time: serde_json::from_value(job.estimate["time"].clone()).unwrap_or_default(),
             usage: job.usage,
         })
     }

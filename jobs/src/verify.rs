@@ -1,24 +1,20 @@
 //! `verify`: runs the rows that scenes must show and compares figures. Runs are jobs of one thread in a directory of
 //! their own; those of this build that are already there are not repeated.
 
-mod figures;
 mod measure;
 mod table;
 
 pub use table::Outcome;
 
-use crate::body::{self, Allowance};
-use crate::observers::Control;
-use crate::order::Order;
-use crate::records::{Record, RecordSink, Usage, Verdict};
-use crate::{build, digest, process, worker};
+use crate::formats::speed_error;
+use crate::{build, digest, local_run};
 use meniscus::scene::SceneKind;
 use meniscus::scene::rows::{Figure, Row};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What to verify, and where.
 #[derive(Debug, Clone)]
@@ -87,7 +83,8 @@ pub fn verify(request: &Request, mut shown: impl FnMut(&Outcome) -> io::Result<(
             let path = request.results.join(format!("{}.svg", figure.name));
             bench
                 .lines(figure)
-                .and_then(|lines| figures::draw(&path, figure, &lines))
+                .and_then(|lines| speed_error::draw(figure.title, "CPU seconds of redistancing", &lines))
+                .and_then(|text| fs::write(&path, text).map_err(|error| error.to_string()))
                 .map_err(|cause| VerifyError::Picture { name: figure.name, cause })?;
         }
         // A document that several kinds share is not replaced by the table of one.
@@ -126,11 +123,11 @@ impl Bench {
         Outcome::new(kind, row, figure, cpu_s, failure)
     }
 
-    fn lines(&self, figure: &Figure) -> Result<figures::Lines, String> {
+    fn lines(&self, figure: &Figure) -> Result<speed_error::Lines, String> {
         let point = |scene: &Value| {
             let report = self.report(scene)?;
             let found = || {
-                Some(figures::Point {
+                Some(speed_error::Point {
                     spacing: scene["spacing"].as_f64()?,
                     seconds: measure::seconds(&report, figure.phases),
                     error: measure::error(&report, figure.quantity)?,
@@ -151,49 +148,7 @@ impl Bench {
         if let Some(report) = read() {
             return Ok(report);
         }
-        run(scene, &directory)?;
+        local_run::run(scene, &directory, 1)?;
         read().ok_or_else(|| "the run left no report".to_owned())
-    }
-}
-
-/// One scene on one thread into an empty directory.
-fn run(scene: &Value, directory: &Path) -> Result<(), String> {
-    let system = |error: io::Error| error.to_string();
-    if directory.exists() {
-        fs::remove_dir_all(directory).map_err(system)?;
-    }
-    fs::create_dir_all(directory).map_err(system)?;
-    let allowance =
-        Allowance { threads: 1, memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4, local_files: false };
-    let body = body::parse(&json!({"scene": scene}), allowance, |_| None).map_err(|violations| {
-        violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
-    })?;
-    let order = Order {
-        job: "verify".to_owned(),
-        epoch: 1,
-        body: body.resolved,
-        attempts_directory: directory.to_owned(),
-        may_start_afresh: true,
-        checkpoints: Vec::new(),
-        usage: Usage::default(),
-    };
-    match worker::run_attempt(&order, directory, &Control::default(), &mut Silent) {
-        Verdict::Succeeded => {
-            // The report is what is wanted; frames of large runs would fill the disk.
-            for part in ["frames", "checkpoints"] {
-                let _ = fs::remove_dir_all(directory.join(part));
-            }
-            Ok(())
-        }
-        Verdict::Failed { message, .. } => Err(message),
-        other => Err(format!("ended as {other:?}")),
-    }
-}
-
-struct Silent;
-
-impl RecordSink for Silent {
-    fn put(&mut self, _record: &Record, _durable: bool) -> io::Result<()> {
-        Ok(())
     }
 }

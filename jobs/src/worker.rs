@@ -3,7 +3,7 @@
 use crate::artifacts;
 use crate::body::Wishes;
 use crate::checkpoint::{self, CheckpointError, Counters, Meta};
-use crate::formats::{picture, vtkhdf};
+use crate::formats::{cloud_file, picture, vtkhdf};
 use crate::job::Reason;
 use crate::observers::checkpoints::Checkpoints;
 use crate::observers::frames::Frames;
@@ -14,7 +14,7 @@ use crate::order::{Order, StartCheckpoint};
 use crate::process;
 use crate::records::{Record, RecordSink, Verdict};
 use crate::report;
-use meniscus::scene::{BuildContext, CloudReference, Clouds, Scene, understand};
+use meniscus::scene::{BuildContext, CloudReference, CloudSource, Clouds, Scene, understand};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
 use meniscus::simulation::{CpuClock, RunError, Simulation, State, StepError, run};
@@ -100,13 +100,19 @@ fn storage_verdict(error: &(dyn std::error::Error + 'static), directory: &Path) 
 }
 
 /// The points that a scene takes from files.
-fn read_clouds(scene: &dyn Scene) -> Result<Clouds, Failure> {
+fn read_clouds(scene: &dyn Scene, order: &Order) -> Result<Clouds, Failure> {
     let read = |cloud: CloudReference| {
-        let found = vtkhdf::read_cloud(Path::new(&cloud.file));
-        let damaged = |cause: &dyn std::fmt::Display| {
-            Failure::Known(Reason::InputDamaged, format!("{} ({}): {cause}", cloud.pointer, cloud.file))
+        let (name, found) = match &cloud.source {
+            CloudSource::File(file) => (file, vtkhdf::read_cloud(Path::new(file)).map_err(|e| e.to_string())),
+            CloudSource::Upload(id) => {
+                let path = order.inputs.get(id).ok_or_else(|| "the upload is gone".to_owned());
+                let read = |path| std::fs::File::open(path).and_then(|mut file| cloud_file::read(&mut file));
+                (id, path.and_then(|path| read(path).map_err(|error| error.to_string())))
+            }
         };
-        found.map(|points| (cloud.pointer, points)).map_err(|error| damaged(&error))
+        found
+            .map(|points| (cloud.pointer, points))
+            .map_err(|cause| Failure::Known(Reason::InputDamaged, format!("{} ({name}): {cause}", cloud.pointer)))
     };
     scene.clouds().into_iter().map(read).collect()
 }
@@ -127,7 +133,7 @@ fn attempt(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
     log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
     pool.install(|| {
-        let clouds = read_clouds(scene.as_ref())?;
+        let clouds = read_clouds(scene.as_ref(), order)?;
         let context = BuildContext {
             clouds,
             plan: wishes.plan(),
@@ -282,7 +288,7 @@ fn prepare<'a>(
             wishes.checkpoint.every_steps,
         ),
         // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
-        progress: ProgressMeter::new(order.usage, counters.phases.clone()),
+        progress: ProgressMeter::new(order.usage, counters.phases.clone(), order.time.clone()),
         control,
         sink,
         restored: start.is_own.then_some(start.step),

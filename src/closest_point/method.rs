@@ -65,7 +65,8 @@ impl PcpMethod {
     }
 
     /// r_c/h of evenly filled neighbourhoods.
-    fn even_cutoff_h<const D: usize>(&self) -> f64 {
+    #[must_use]
+    pub fn even_cutoff_h<const D: usize>(&self) -> f64 {
         let cutoff = match self.neighborhood {
             NeighborhoodChoice::Radius { cutoff_h } => cutoff_h,
             NeighborhoodChoice::Nearest { count } | NeighborhoodChoice::Material { count } => {

@@ -21,18 +21,52 @@ pub struct Cloud {
 pub struct CloudReference {
     /// Where in the scene.
     pub pointer: &'static str,
-    /// The local file that is named there.
-    pub file: String,
+    /// What is named there.
+    pub source: CloudSource,
+}
+
+/// Where points come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CloudSource {
+    /// A local file.
+    File(String),
+    /// An upload, by its id.
+    Upload(String),
 }
 
 /// Clouds by the pointers that name them.
 pub type Clouds = BTreeMap<&'static str, Cloud>;
 
-/// The file that a checked choice names, if it is `points`.
-#[must_use]
-pub fn reference(choice: &Value, pointer: &'static str) -> Option<CloudReference> {
-    let file = choice["file"].as_str().filter(|_| choice["type"] == "points")?;
-    Some(CloudReference { pointer, file: file.to_owned() })
+/// How many points there are, by the pointers that name them, as far as it is known.
+pub type CloudSizes = BTreeMap<&'static str, u64>;
+
+/// What a checked choice names, if it is `points`.
+///
+/// # Errors
+/// It names nothing, or two things.
+pub fn reference(choice: &Value, pointer: &'static str) -> Result<Option<CloudReference>, Violation> {
+    if choice["type"] != "points" {
+        return Ok(None);
+    }
+    let text = |name: &str| choice[name].as_str().map(str::to_owned);
+    let source = match (text("file"), text("upload")) {
+        (Some(file), None) => CloudSource::File(file),
+        (None, Some(upload)) => CloudSource::Upload(upload),
+        (given, _) => {
+            let code = if given.is_some() { "conflict" } else { "required" };
+            let detail = "points come from an upload, or in `meniscus run` from a file; name one of them";
+            return Err(Violation::new(pointer, code, detail, choice, json!({"type": "points", "upload": "upl_…"})));
+        }
+    };
+    Ok(Some(CloudReference { pointer, source }))
+}
+
+/// The same, where what is wrong is added to `violations`.
+pub fn named(choice: &Value, pointer: &'static str, violations: &mut Vec<Violation>) -> Option<CloudReference> {
+    reference(choice, pointer).unwrap_or_else(|violation| {
+        violations.push(violation);
+        None
+    })
 }
 
 /// The points of a cloud in `D` dimensions.

@@ -91,11 +91,14 @@ const UNION: Variant = Variant {
     )],
 };
 
-/// Points from a file: frames of earlier runs are such files.
+/// Points from an upload or a file: frames of earlier runs are such files.
 pub const POINTS: Variant = Variant {
     name: "points",
-    doc: "points of a VTKHDF file (valid for `meniscus run` alone); as a shape with PointData/phi, which is their level",
-    parameters: &[Parameter::new("file", "path of the file", Kind::Text, DefaultValue::Required)],
+    doc: "points of a VTKHDF file; as a shape with PointData/phi, which is their level",
+    parameters: &[
+        Parameter::new("upload", "id of an upload that is ready", Kind::Text, DefaultValue::Absent),
+        Parameter::new("file", "path of a file (valid for `meniscus run` alone)", Kind::Text, DefaultValue::Absent),
+    ],
 };
 
 static ALL: &[Variant] = plain_shapes!(UNION, POINTS);

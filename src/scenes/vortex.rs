@@ -15,5 +15,6 @@ pub static KIND: SceneKind = SceneKind {
     preset: parameters::preset,
     example: include_str!("vortex/example.json"),
     understand: setup::understand,
+    calibration: rows::calibration,
     rows: rows::rows,
 };

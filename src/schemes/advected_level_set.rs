@@ -4,6 +4,6 @@ mod reference;
 mod simulation;
 mod system;
 
-pub use reference::ExactMotion;
+pub use reference::{ExactMotion, front_points};
 pub use simulation::AdvectedLevelSet;
 pub use system::{AdvectedParts, AdvectedSystem, FieldChoice, RedistanceWhen, Start};

@@ -1,137 +1,20 @@
-//! What must survive: `kill -9` at any moment, damaged checkpoints, an orderly shutdown in the middle of work.
+//! What must survive: `kill -9` at any moment, damaged checkpoints, a full disk, an orderly shutdown in the middle of work.
+//! The proofs run here about twenty times each; `make soak` runs them by the thousand.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+mod proofs;
+mod quick;
 #[path = "../support/service.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
+use common::{Expected, checkpoint_files};
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-use support::{Service, chance, endless_job, eventually, long_job, signal, steady_job};
-
-/// The results that every disturbed run must reach, from an undisturbed one.
-struct Expected {
-    frames: Vec<(String, String)>,
-    series: String,
-}
-
-impl Expected {
-    fn of(service: &Service, body: &Value) -> Self {
-        let id = service.submit(body);
-        service.wait_for(&id, &["succeeded"]);
-        Self { frames: service.frames(&id), series: service.series(&id) }
-    }
-
-    fn check(&self, service: &Service, id: &str) {
-        // The whole files are the same bytes, which is more than their data sets.
-        assert_eq!(service.frames(id), self.frames, "{id}");
-        assert_eq!(service.series(id), self.series, "{id}");
-        let ids: Vec<u64> = service.events(id).iter().map(|e| e["id"].as_u64().unwrap()).collect();
-        assert_eq!(ids, (1..=ids.len() as u64).collect::<Vec<_>>(), "{id}: events have gaps");
-        let fractions: Vec<f64> = service
-            .events(id)
-            .iter()
-            .filter(|e| e["type"] == "progress")
-            .map(|e| e["data"]["fraction"].as_f64().unwrap())
-            .collect();
-        assert!(fractions.is_sorted(), "{id}: the fraction falls: {fractions:?}");
-        // What killed attempts left behind is gone: as many frames and checkpoints on disk as listed.
-        let frames = files_below(service, id, "frames");
-        assert_eq!(frames.len(), self.frames.len(), "{id}: {frames:?}");
-        let listed = service.get(&format!("/v1/jobs/{id}/checkpoints")).json()["items"].as_array().unwrap().len();
-        let checkpoints = files_below(service, id, "checkpoints");
-        assert_eq!(checkpoints.len(), listed, "{id}: {checkpoints:?}");
-    }
-}
-
-/// A seed from the environment, or one of this moment; printed, so that a failure can be repeated.
-#[expect(clippy::print_stdout, reason = "a failing run must show its seed")]
-fn seed() -> u64 {
-    let given = std::env::var("MENISCUS_SEED").ok().and_then(|s| s.parse().ok());
-    let seed = given.unwrap_or_else(|| {
-        std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_micros() as u64
-    });
-    println!("MENISCUS_SEED={seed}");
-    seed
-}
-
-#[test]
-fn twenty_kills_of_workers_lose_nothing() {
-    let directory = tempfile::tempdir().unwrap();
-    let service = Service::start(directory.path(), &["--slots", "2", "--threads", "2"]);
-    let body = steady_job();
-    let expected = Expected::of(&service, &body);
-    let seed = seed();
-    let mut kills = 0;
-    let mut round = 0;
-    // Two deaths a job at most: a third without a new checkpoint would rightly fail it.
-    while kills < 20 {
-        let ids: Vec<String> = (0..2).map(|_| service.submit(&body)).collect();
-        for (k, id) in ids.iter().enumerate() {
-            for death in 0..2 {
-                let attempt = service.job(id)["attempt"].as_u64().unwrap().max(1);
-                service.wait_for(id, &["running", "succeeded"]);
-                let moment = chance(seed, round * 100 + 10 * k as u64 + death);
-                std::thread::sleep(Duration::from_secs_f64(0.5 * moment));
-                if let Some(pid) = service.worker(id) {
-                    signal(pid, Signal::KILL);
-                    kills += 1;
-                    eventually("the next attempt runs", Duration::from_secs(20), || {
-                        let job = service.job(id);
-                        (job["attempt"].as_u64().unwrap() > attempt || job["state"] == "succeeded").then_some(())
-                    });
-                }
-            }
-        }
-        for id in &ids {
-            service.wait_for(id, &["succeeded"]);
-            expected.check(&service, id);
-        }
-        round += 1;
-        assert!(round < 40, "only {kills} kills found a worker");
-    }
-}
-
-#[test]
-fn twenty_kills_of_the_service_lose_no_job() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut service = Service::start(directory.path(), &["--slots", "2"]);
-    let body = steady_job();
-    let expected = Expected::of(&service, &body);
-    let seed = seed();
-    let mut acknowledged: Vec<String> = (0..3).map(|_| service.submit(&body)).collect();
-    for kill in 0..20 {
-        std::thread::sleep(Duration::from_secs_f64(0.4 * chance(seed, kill)));
-        if kill % 7 == 3 {
-            // Killed right after the 201.
-            acknowledged.push(service.submit(&body));
-        }
-        let workers: Vec<u32> = acknowledged.iter().filter_map(|id| service.worker(id)).collect();
-        service.kill();
-        eventually("orphans are gone by the closed pipe alone", Duration::from_secs(5), || {
-            let alive = |pid: &u32| {
-                std::fs::read_to_string(format!("/proc/{pid}/status")).is_ok_and(|s| !s.contains("State:\tZ"))
-            };
-            (!workers.iter().any(alive)).then_some(())
-        });
-        service.restart();
-        let unfinished =
-            acknowledged.iter().map(|id| service.job(id)).filter(|job| job["state"] != "succeeded").count();
-        if unfinished < 2 {
-            acknowledged.push(service.submit(&body));
-        }
-    }
-    for id in &acknowledged {
-        let job = service.wait_for(id, &["succeeded"]);
-        expected.check(&service, id);
-        assert_eq!(job["health"]["warnings"], json!([]), "a restart of the service is no fault of the job");
-    }
-    // None doubled: the store knows these and the undisturbed one.
-    let all = service.get("/v1/jobs?limit=500").json();
-    assert_eq!(all["items"].as_array().unwrap().len(), acknowledged.len() + 1);
-}
+use std::path::Path;
+use std::time::Duration;
+use support::{Service, chance, endless_job, eventually, long_job, seed, signal};
 
 #[test]
 fn an_orderly_shutdown_checkpoints_and_requeues() {
@@ -154,24 +37,6 @@ fn an_orderly_shutdown_checkpoints_and_requeues() {
     // It went on from the checkpoint that the shutdown made, not from the start.
     assert!(service.get(&format!("/v1/jobs/{id}/log")).text().contains("restored ckpt_"));
     expected.check(&service, &id);
-}
-
-/// All files in a folder of every attempt of a job, by name.
-fn files_below(service: &Service, id: &str, folder: &str) -> Vec<PathBuf> {
-    let attempts = service.data.join("jobs").join(id).join("attempts");
-    let attempts = std::fs::read_dir(attempts).into_iter().flatten().flatten();
-    let mut files: Vec<PathBuf> = attempts
-        .flat_map(|attempt| std::fs::read_dir(attempt.path().join(folder)).into_iter().flatten().flatten())
-        .map(|entry| entry.path())
-        .collect();
-    files.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
-    files
-}
-
-/// The whole checkpoints among them.
-fn checkpoint_files(service: &Service, id: &str) -> Vec<PathBuf> {
-    let is_whole = |path: &PathBuf| path.extension().is_some_and(|e| e == "h5");
-    files_below(service, id, "checkpoints").into_iter().filter(is_whole).collect()
 }
 
 type Damage = fn(&Path);
@@ -314,20 +179,4 @@ fn a_worker_that_dies_three_times_without_a_checkpoint_fails_the_job() {
     });
     assert_eq!(job["reason"], "worker.crash");
     assert!(job["message"].as_str().unwrap().starts_with("3 workers in a row"));
-}
-
-#[test]
-fn cancels_at_random_moments_are_prompt() {
-    let directory = tempfile::tempdir().unwrap();
-    let service = Service::start(directory.path(), &["--slots", "2"]);
-    let seed = seed();
-    for round in 0..20 {
-        let id = service.submit(&steady_job());
-        std::thread::sleep(Duration::from_secs_f64(0.3 * chance(seed, round)));
-        let asked = Instant::now();
-        service.act(&id, "cancel");
-        service.wait_for(&id, &["canceled", "succeeded"]);
-        // Far above the two seconds of the contract only where the machine itself stands still.
-        assert!(asked.elapsed() < Duration::from_secs(8), "{:?}", asked.elapsed());
-    }
 }

@@ -28,6 +28,7 @@ pub struct Service {
     pub url: String,
     pub data: PathBuf,
     arguments: Vec<String>,
+    variables: Vec<(String, String)>,
     agent: ureq::Agent,
 }
 
@@ -61,9 +62,10 @@ impl Answer {
     }
 }
 
-fn launch(data: &Path, arguments: &[String]) -> (Child, String) {
+fn launch(data: &Path, arguments: &[String], variables: &[(String, String)]) -> (Child, String) {
     let mut child = Command::new(program())
-        .args(["serve", "--bind", "127.0.0.1:0", "--data"])
+        .envs(variables.iter().cloned())
+        .args(["serve", "--bind", "127.0.0.1:0", "--no-calibration", "--data"])
         .arg(data)
         .args(arguments)
         .stdout(Stdio::piped())
@@ -80,10 +82,17 @@ fn launch(data: &Path, arguments: &[String]) -> (Child, String) {
 
 impl Service {
     pub fn start(data: &Path, arguments: &[&str]) -> Self {
+        Self::start_with(data, arguments, &[])
+    }
+
+    /// With variables in its environment, which its workers see, too.
+    pub fn start_with(data: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Self {
         let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
-        let (child, url) = launch(data, &arguments);
+        let variables: Vec<(String, String)> =
+            variables.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+        let (child, url) = launch(data, &arguments, &variables);
         let agent = ureq::Agent::config_builder().http_status_as_error(false).max_redirects(0).build().into();
-        let service = Self { child, url, data: data.to_owned(), arguments, agent };
+        let service = Self { child, url, data: data.to_owned(), arguments, variables, agent };
         service.wait_ready();
         service
     }
@@ -105,8 +114,42 @@ impl Service {
     }
 
     pub fn restart(&mut self) {
-        (self.child, self.url) = launch(&self.data, &self.arguments);
+        (self.child, self.url) = launch(&self.data, &self.arguments, &self.variables);
         self.wait_ready();
+    }
+
+    /// Whether the service has come to an end by itself.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_some()
+    }
+
+    /// A job, or nothing where the service does not answer.
+    pub fn try_job(&self, id: &str) -> Option<Value> {
+        let answer = self.agent.get(format!("{}/v1/jobs/{id}", self.url)).call();
+        answer.ok()?.body_mut().read_to_string().ok().and_then(|text| serde_json::from_str(&text).ok())
+    }
+
+    /// Looks the data directory over, with the service stopped.
+    pub fn fsck(&self) {
+        let output = Command::new(program()).args(["fsck", "--data"]).arg(&self.data).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    }
+
+    /// Resident memory of the service.
+    pub fn resident_bytes(&self) -> u64 {
+        meniscus_jobs::process::resident_bytes(self.pid()).unwrap()
+    }
+
+    /// The worker of a job, waited for.
+    pub fn worker_eventually(&self, id: &str) -> u32 {
+        eventually("there is a worker", Duration::from_secs(20), || self.worker(id))
+    }
+
+    /// Does something to the store behind the service's back.
+    pub fn with_store<R>(&self, work: impl FnOnce(&rusqlite::Connection) -> rusqlite::Result<R>) -> R {
+        let store = rusqlite::Connection::open(self.data.join("meniscus.sqlite")).unwrap();
+        store.busy_timeout(Duration::from_secs(10)).unwrap();
+        work(&store).unwrap()
     }
 
     /// SIGTERM, and the wait for an orderly end.
@@ -264,4 +307,15 @@ pub fn endless_job() -> Value {
 /// A number in [0, 1) from a seed and a counter, printed seeds make a run repeatable.
 pub fn chance(seed: u64, counter: u64) -> f64 {
     0.5 + 0.5 * meniscus::geometry::random::CounterRandom::new(seed).symmetric(&[counter.cast_signed()])
+}
+
+/// A seed from the environment, or one of this moment; printed, so that a failure can be repeated.
+#[expect(clippy::print_stdout, reason = "a failing run must show its seed")]
+pub fn seed() -> u64 {
+    let given = std::env::var("MENISCUS_SEED").ok().and_then(|s| s.parse().ok());
+    let seed = given.unwrap_or_else(|| {
+        std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_micros() as u64
+    });
+    println!("MENISCUS_SEED={seed}");
+    seed
 }

@@ -1,20 +1,19 @@
 //! Jobs: submit, list, get, delete, and requests to them.
 
 use crate::application::Application;
+use crate::creation::{Creation, kept};
 use crate::error::{ApiError, Problem, ProblemItem};
-use crate::routes::{job, with_store};
+use crate::routes::{Page, StoreSources, job, with_store};
 use crate::views::{JobList, JobView};
 use axum::Json;
-use axum::body::Body;
-use axum::extract::{Path, Query, State};
+use axum::extract::{Path, Query, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use meniscus::scene::Violation;
 use meniscus::scene::check::closest;
 use meniscus_jobs::job::{Reason, State as JobState, Trigger};
-use meniscus_jobs::store::{Change, ChangeError, JobFilter, JobRow};
-use meniscus_jobs::supervisor::DISK_RESERVE_BYTES;
-use meniscus_jobs::{body, clock, process, strict_json};
+use meniscus_jobs::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store};
+use meniscus_jobs::{body, clock, process};
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -22,63 +21,56 @@ use std::time::Duration;
 pub const BODY_LIMIT: usize = 1 << 20;
 /// Longest wait for a change.
 const LONGEST_WAIT: u64 = 60;
-/// Jobs on a page when nothing is said, and at most.
-const PAGE: (u64, u64) = (50, 500);
 
 /// Submits a job. A 201 is durable: it survives whatever happens next.
-#[utoipa::path(post, path = "/v1/jobs", tag = "jobs",
+#[utoipa::path(post, path = "/v1/jobs", tag = "jobs", params(("Idempotency-Key" = Option<String>, Header)),
     request_body(content = Object, description = "a job body: {\"scene\": {\"kind\": …}} at least; see /v1/scenes"),
     responses((status = 201, body = JobView, headers(("Location" = String))), (status = 400, body = Problem),
-        (status = 413, body = Problem), (status = 422, body = Problem), (status = 503, body = Problem), (status = 507, body = Problem)))]
-pub async fn submit(
-    State(application): State<Application>,
-    headers: HeaderMap,
-    content: Body,
-) -> Result<Response, ApiError> {
-    let announced =
-        headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()).and_then(|v| v.parse::<usize>().ok());
-    if announced.is_some_and(|length| length > BODY_LIMIT) {
-        return Err(ApiError::TooLarge(BODY_LIMIT));
-    }
-    let bytes = axum::body::to_bytes(content, BODY_LIMIT).await.map_err(|error| {
-        let text = std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string);
-        if text.contains("length limit") { ApiError::TooLarge(BODY_LIMIT) } else { ApiError::Unparsable(text) }
-    })?;
-    let allowance = application.config.allowance();
-    let row = with_store(&application, move |store| {
-        let spec = strict_json::parse(&bytes).map_err(|error| ApiError::Unparsable(error.to_string()))?;
-        // A failing store is not a missing checkpoint.
-        let mut failure = None;
-        let find = |id: &str| {
-            store.restart_source(id).unwrap_or_else(|error| {
-                failure = Some(error);
-                None
-            })
-        };
-        let body = body::parse(&spec, allowance, find);
-        if let Some(error) = failure {
-            return Err(error.into());
+        (status = 413, body = Problem), (status = 422, body = Problem), (status = 429, body = Problem),
+        (status = 503, body = Problem), (status = 507, body = Problem)))]
+pub async fn submit(State(application): State<Application>, request: Request) -> Result<Response, ApiError> {
+    let creation = Creation::take(&application, request, BODY_LIMIT).await?;
+    let here = application.clone();
+    let response = with_store(&application, move |store| {
+        let spec = creation.json()?;
+        if let Some(made) = creation.once.as_ref().map(|once| store.recall(once)).transpose()?.flatten() {
+            return creation.answer(made);
         }
-        let body = body?;
-        let room = process::free_space(store.directory()).unwrap_or(u64::MAX).saturating_sub(DISK_RESERVE_BYTES);
-        if body.disk_bytes > room {
-            return Err(ApiError::NoSpace { needed: body.disk_bytes, room });
-        }
-        Ok(store.submit(&body)?)
+        let sources = StoreSources::new(store);
+        let body = body::parse(&spec, here.config.allowance(), &sources);
+        sources.check()?;
+        let mut body = body?;
+        body.forecast.time_by(&store.calibration()?);
+        check_room(&here, store, 1, body.forecast.disk_bytes)?;
+        let answer =
+            |row: &JobRow| kept(StatusCode::CREATED, Some(format!("/v1/jobs/{}", row.id)), &JobView::from(row.clone()));
+        creation.answer(store.submit(&NewJob::of(&body), creation.once.as_ref(), answer)?)
     })
     .await?;
     application.supervisor.wake();
-    let location =
-        HeaderValue::from_str(&format!("/v1/jobs/{}", row.id)).map_err(|e| ApiError::Internal(e.to_string()))?;
-    let mut response = (StatusCode::CREATED, Json(JobView::from(row))).into_response();
-    response.headers_mut().insert(header::LOCATION, location);
     Ok(response)
+}
+
+/// Refuses what the disk or the operator's quota has no room for.
+pub(super) fn check_room(application: &Application, store: &Store, jobs: u64, disk_bytes: u64) -> Result<(), ApiError> {
+    let reserve = application.config.disk_reserve_bytes;
+    let room = process::free_space(store.directory()).unwrap_or(u64::MAX).saturating_sub(reserve);
+    if disk_bytes > room {
+        return Err(ApiError::NoSpace { needed: disk_bytes, room });
+    }
+    if let Some(most) = application.config.most_unfinished {
+        let unfinished = store.census()?.unfinished();
+        if unfinished + jobs > most {
+            return Err(ApiError::QuotaReached { unfinished, most });
+        }
+    }
+    Ok(())
 }
 
 /// A page of jobs; inserts never shift pages.
 #[utoipa::path(get, path = "/v1/jobs", tag = "jobs",
     params(("state" = Option<String>, Query, description = "one or more states, separated by commas"),
-        ("kind" = Option<String>, Query), ("name" = Option<String>, Query),
+        ("kind" = Option<String>, Query), ("study" = Option<String>, Query), ("name" = Option<String>, Query),
         ("label.KEY" = Option<String>, Query, description = "a label by its key"),
         ("created_after" = Option<String>, Query), ("created_before" = Option<String>, Query),
         ("sort" = Option<String>, Query, description = "created_at or -created_at (default)"),
@@ -88,46 +80,35 @@ pub async fn list(
     State(application): State<Application>,
     Query(query): Query<Vec<(String, String)>>,
 ) -> Result<Response, ApiError> {
-    let mut filter = filter(&query)?;
-    let limit = filter.limit;
-    filter.limit += 1;
-    let mut rows = with_store(&application, move |store| Ok(store.list(&filter)?)).await?;
-    let more = rows.len() as u64 > limit;
-    rows.truncate(limit as usize);
-    let next = rows.last().filter(|_| more).map(|row| row.id.clone());
-    let link = next.as_ref().map(|cursor| next_link(&query, cursor));
-    let body = JobList { items: rows.into_iter().map(JobView::from).collect(), next };
-    let mut response = Json(body).into_response();
-    if let Some(link) = link.and_then(|link| HeaderValue::from_str(&link).ok()) {
-        response.headers_mut().insert(header::LINK, link);
-    }
-    Ok(response)
+    page(&application, "/v1/jobs", &query, None).await
 }
 
-fn next_link(query: &[(String, String)], cursor: &str) -> String {
-    let escape = |text: &str| {
-        text.bytes()
-            .map(|b| {
-                if b.is_ascii_alphanumeric() || b"-._~".contains(&b) {
-                    char::from(b).to_string()
-                } else {
-                    format!("%{b:02X}")
-                }
-            })
-            .collect::<String>()
-    };
-    let mut parts: Vec<String> = query
-        .iter()
-        .filter(|(name, _)| name != "cursor")
-        .map(|(name, value)| format!("{}={}", escape(name), escape(value)))
-        .collect();
-    parts.push(format!("cursor={}", escape(cursor)));
-    format!("</v1/jobs?{}>; rel=\"next\"", parts.join("&"))
+/// A page of jobs, of one study or of all.
+pub(super) async fn page(
+    application: &Application,
+    path: &str,
+    query: &[(String, String)],
+    study: Option<String>,
+) -> Result<Response, ApiError> {
+    let mut filter = filter(query)?;
+    let others: Vec<&str> = query.iter().map(|(name, _)| name.as_str()).collect();
+    let page = Page::of(query, &others)?;
+    filter.limit = page.limit + 1;
+    filter.cursor.clone_from(&page.cursor);
+    filter.study = study.or(filter.study);
+    let rows = with_store(application, move |store| Ok(store.list(&filter)?)).await?;
+    Ok(page.answer(
+        path,
+        rows,
+        |row| row.id.clone(),
+        |items, next| JobList { items: items.into_iter().map(JobView::from).collect(), next },
+    ))
 }
 
 fn filter(query: &[(String, String)]) -> Result<JobFilter, ApiError> {
-    const KNOWN: [&str; 8] = ["state", "kind", "name", "created_after", "created_before", "sort", "limit", "cursor"];
-    let mut filter = JobFilter { limit: PAGE.0, ..JobFilter::default() };
+    const KNOWN: [&str; 9] =
+        ["state", "kind", "study", "name", "created_after", "created_before", "sort", "limit", "cursor"];
+    let mut filter = JobFilter::default();
     let mut errors: Vec<ProblemItem> = Vec::new();
     let refuse = |name: &str, code: &'static str, detail: &str, got: &str, allowed: Value| {
         Violation::new(name, code, detail, &json!(got), allowed)
@@ -147,6 +128,7 @@ fn filter(query: &[(String, String)]) -> Result<JobFilter, ApiError> {
                 }
             }
             "kind" => filter.kind = Some(value.clone()),
+            "study" => filter.study = Some(value.clone()),
             "name" => filter.name = Some(value.clone()),
             "created_after" | "created_before" => match clock::parse(value) {
                 Some(time) if name == "created_after" => filter.created_after = Some(time),
@@ -156,20 +138,13 @@ fn filter(query: &[(String, String)]) -> Result<JobFilter, ApiError> {
                     errors.push(refuse(name, "type", "an RFC 3339 time is needed", value, allowed).into());
                 }
             },
-            "cursor" => filter.cursor = Some(value.clone()),
+            "cursor" | "limit" => {}
             "sort" => match value.as_str() {
                 "created_at" => filter.oldest_first = true,
                 "-created_at" => filter.oldest_first = false,
                 _ => {
                     let allowed = json!(["created_at", "-created_at"]);
                     errors.push(refuse("sort", "unknown", "there is no such order", value, allowed).into());
-                }
-            },
-            "limit" => match value.parse::<u64>() {
-                Ok(limit) if (1..=PAGE.1).contains(&limit) => filter.limit = limit,
-                _ => {
-                    let allowed = json!(format!("1 to {}", PAGE.1));
-                    errors.push(refuse("limit", "range", "a whole number is needed", value, allowed).into());
                 }
             },
             other => match other.strip_prefix("label.") {

@@ -1,17 +1,35 @@
 //! `restart`: a scene taken from a checkpoint, with overrides of restart-safe fields.
 
+use super::Sources;
 use meniscus::scene::{Violation, check};
 use serde_json::{Value, json};
+
+/// Where the checkpoint of a restart lies.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Origin {
+    /// With the job that wrote it.
+    Checkpoint(String),
+    /// Among the uploads.
+    Upload(String),
+}
+
+impl Origin {
+    /// The id.
+    #[must_use]
+    pub fn id(&self) -> &str {
+        match self {
+            Self::Checkpoint(id) | Self::Upload(id) => id,
+        }
+    }
+}
 
 /// The checkpoint that a restart begins with, as the store knows it.
 #[derive(Debug, Clone)]
 pub struct RestartSource {
-    /// Its id.
-    pub checkpoint: String,
+    /// Where it lies.
+    pub origin: Origin,
     /// The resolved body of the job that wrote it.
     pub resolved: Value,
-    /// Its job.
-    pub job: String,
     /// Instruction set it was written on.
     pub isa: String,
     /// Its step.
@@ -21,10 +39,10 @@ pub struct RestartSource {
 /// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields.
 pub(super) fn parse(
     restart: &Value,
-    find_checkpoint: &mut impl FnMut(&str) -> Option<RestartSource>,
+    sources: &dyn Sources,
     errors: &mut Vec<Violation>,
 ) -> Option<(RestartSource, Value)> {
-    const KNOWN: [&str; 3] = ["checkpoint", "overrides", "allow_other_isa"];
+    const KNOWN: [&str; 4] = ["checkpoint", "upload", "overrides", "allow_other_isa"];
     let Value::Object(map) = restart else {
         errors.push(Violation::new("/restart", "type", "a restart is an object", restart, json!(KNOWN)));
         return None;
@@ -37,13 +55,33 @@ pub(super) fn parse(
             errors.push(violation);
         }
     }
-    let id = map.get("checkpoint").unwrap_or(&Value::Null);
-    let Some(source) = id.as_str().and_then(find_checkpoint) else {
-        let code = if id.is_null() { "required" } else { "not_found" };
-        let detail = "there is no such checkpoint";
-        errors.push(Violation::new("/restart/checkpoint", code, detail, id, json!("the id of a checkpoint, ckpt_…")));
-        return None;
+    let id = |name: &str| map.get(name).filter(|value| !value.is_null());
+    let source = match (id("checkpoint"), id("upload")) {
+        (Some(checkpoint), None) => checkpoint.as_str().and_then(|id| sources.checkpoint(id)).ok_or_else(|| {
+            let allowed = json!("the id of a checkpoint, ckpt_…");
+            Violation::new("/restart/checkpoint", "not_found", "there is no such checkpoint", checkpoint, allowed)
+        }),
+        (None, Some(upload)) => upload.as_str().and_then(|id| sources.uploaded_checkpoint(id)).ok_or_else(|| {
+            let detail = "there is no such upload, or it is no checkpoint that passed its check";
+            let allowed = json!("the id of an upload made with ?as=checkpoint that is ready, upl_…");
+            Violation::new("/restart/upload", "not_found", detail, upload, allowed)
+        }),
+        (None, None) => {
+            let detail = "a restart names a checkpoint or an upload";
+            Err(Violation::new(
+                "/restart/checkpoint",
+                "required",
+                detail,
+                &Value::Null,
+                json!("the id of a checkpoint, ckpt_…"),
+            ))
+        }
+        (Some(_), Some(upload)) => {
+            let detail = "a restart begins with a checkpoint or with an upload; give one of them";
+            Err(Violation::new("/restart/upload", "conflict", detail, upload, Value::Null))
+        }
     };
+    let source = source.map_err(|violation| errors.push(violation)).ok()?;
     let allow = map.get("allow_other_isa").unwrap_or(&Value::Null);
     if !(allow.is_null() || allow.is_boolean()) {
         errors.push(Violation::new("/restart/allow_other_isa", "type", "true or false", allow, json!([true, false])));

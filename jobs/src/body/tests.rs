@@ -1,10 +1,47 @@
-use super::{Allowance, RestartSource, Wishes, parse};
+use super::{Allowance, NoSources, Origin, RestartSource, Sources, Wishes, parse};
+use crate::uploads::Purpose;
 use serde_json::{Value, json};
 
 const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30, local_files: false };
 
+/// Knows one checkpoint of a vortex.
+struct OneCheckpoint;
+
+impl Sources for OneCheckpoint {
+    fn checkpoint(&self, _: &str) -> Option<RestartSource> {
+        let first = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok()?;
+        let origin = Origin::Checkpoint("ckpt_1".into());
+        Some(RestartSource { origin, resolved: first.resolved, isa: crate::build::isa(), step: 240 })
+    }
+
+    fn uploaded_checkpoint(&self, _: &str) -> Option<RestartSource> {
+        None
+    }
+
+    fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
+        Some((if id == "upl_places" { Purpose::Queries } else { Purpose::Points }, 5000))
+    }
+}
+
+#[test]
+fn points_come_from_uploads_of_the_right_purpose() {
+    let scene = |shape: &str, places: &str| {
+        json!({"scene": {"kind": "redistance", "spacing": 0.05, "shape": {"type": "points", "upload": shape},
+               "queries": {"type": "points", "upload": places}}})
+    };
+    let job = parse(&scene("upl_points", "upl_places"), ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(job.uploads, ["upl_points", "upl_places"]);
+    assert_eq!(job.forecast.estimate.particles, 5000);
+    let found = parse(&scene("upl_places", "upl_places"), ALLOWANCE, &OneCheckpoint).err().unwrap();
+    assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/shape", "not_found"));
+    let both = json!({"scene": {"kind": "redistance", "shape": {"type": "points", "upload": "a", "file": "b"}}});
+    assert_eq!(parse(&both, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "conflict");
+    let none = json!({"scene": {"kind": "vortex", "shape": "points"}});
+    assert_eq!(parse(&none, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "required");
+}
+
 fn errors(body: &Value) -> Vec<(String, String)> {
-    match parse(body, ALLOWANCE, |_| None) {
+    match parse(body, ALLOWANCE, &NoSources) {
         Ok(_) => Vec::new(),
         Err(found) => found.into_iter().map(|v| (v.pointer, v.code.to_owned())).collect(),
     }
@@ -13,15 +50,15 @@ fn errors(body: &Value) -> Vec<(String, String)> {
 #[test]
 fn files_of_this_machine_are_for_the_foreground_alone() {
     let spec = json!({"scene": {"kind": "redistance", "shape": {"type": "points", "file": "/etc/passwd"}}});
-    let found = parse(&spec, ALLOWANCE, |_| None).err().unwrap();
+    let found = parse(&spec, ALLOWANCE, &NoSources).err().unwrap();
     assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/shape", "not_here"));
     let foreground = Allowance { local_files: true, ..ALLOWANCE };
-    assert!(parse(&spec, foreground, |_| None).is_ok());
+    assert!(parse(&spec, foreground, &NoSources).is_ok());
 }
 
 #[test]
 fn every_default_stands_in_the_resolved_body() {
-    let body = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, |_| None).ok().unwrap();
+    let body = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok().unwrap();
     let scene = &body.resolved["scene"];
     assert_eq!(scene["field"], "dual");
     assert_eq!(scene["redistance"]["type"], "for_output");
@@ -31,7 +68,7 @@ fn every_default_stands_in_the_resolved_body() {
     assert_eq!(body.resolved["checkpoint"]["every_wall_s"], 60.0);
     assert!(Wishes::of(&body.resolved).is_ok());
     // What is resolved is a body of its own with the same meaning.
-    let again = parse(&json!({"scene": scene}), ALLOWANCE, |_| None).ok().unwrap();
+    let again = parse(&json!({"scene": scene}), ALLOWANCE, &NoSources).ok().unwrap();
     assert_eq!(&again.resolved["scene"], scene);
 }
 
@@ -54,7 +91,7 @@ fn all_errors_come_at_once_with_their_places() {
         assert!(found.iter().any(|(p, c)| p == expected.0 && c == expected.1), "{expected:?} not in {found:?}");
     }
     let suggestions: Vec<String> =
-        parse(&body, ALLOWANCE, |_| None).err().unwrap().into_iter().filter_map(|v| v.did_you_mean).collect();
+        parse(&body, ALLOWANCE, &NoSources).err().unwrap().into_iter().filter_map(|v| v.did_you_mean).collect();
     for name in ["name", "band_h", "single_vortex"] {
         assert!(suggestions.iter().any(|s| s == name), "{name} not in {suggestions:?}");
     }
@@ -81,21 +118,11 @@ fn more_particles_than_memory_names_both_fields() {
 
 #[test]
 fn restarts_change_only_what_is_safe() {
-    let source = |_: &str| {
-        let first = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, |_| None).ok()?;
-        Some(RestartSource {
-            checkpoint: "ckpt_1".into(),
-            resolved: first.resolved,
-            job: "job_1".into(),
-            isa: crate::build::isa(),
-            step: 240,
-        })
-    };
     let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/end_time": 12.0}}});
-    let job = parse(&body, ALLOWANCE, source).ok().unwrap();
-    assert_eq!(job.estimate.steps, 360);
+    let job = parse(&body, ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(job.forecast.estimate.steps, 360);
     let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/spacing": 0.1}}});
-    assert_eq!(parse(&body, ALLOWANCE, source).err().unwrap()[0].code, "not_restart_safe");
+    assert_eq!(parse(&body, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "not_restart_safe");
     let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/end_time": 4.0}}});
-    assert_eq!(parse(&body, ALLOWANCE, source).err().unwrap()[0].code, "range");
+    assert_eq!(parse(&body, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "range");
 }

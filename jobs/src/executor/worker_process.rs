@@ -40,6 +40,14 @@ fn listen(control: Control) -> io::Result<()> {
     Ok(())
 }
 
+/// Ends this process when its standard input does: whoever holds the other end has gone.
+///
+/// # Errors
+/// When no thread can be started.
+pub fn end_with_input() -> io::Result<()> {
+    listen(Control::default())
+}
+
 fn pulse() -> io::Result<()> {
     std::thread::Builder::new().name("pulse".to_owned()).spawn(|| {
         loop {

@@ -1,13 +1,22 @@
 //! How far a run is, how fast it goes, what it costs.
 
+use crate::forecast::TimeForecast;
 use crate::process;
 use crate::records::{HealthRecord, Progress, Usage};
+use meniscus::scenes::work_estimate::REST;
 use meniscus::simulation::Simulation;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Least time between two records.
 const INTERVAL: Duration = Duration::from_millis(400);
+
+/// CPU seconds of a phase that comes at some moments.
+struct Moment {
+    spent: f64,
+    /// As forecast for the whole run.
+    all: f64,
+}
 
 /// Measures and reports.
 pub struct ProgressMeter {
@@ -18,13 +27,16 @@ pub struct ProgressMeter {
     own_phases: BTreeMap<&'static str, f64>,
     first_step: Option<u64>,
     stepping_since: Instant,
+    /// CPU seconds of phases at moments when the stepping began.
+    moments_before: f64,
+    forecast: Option<TimeForecast>,
     last: Option<Instant>,
 }
 
 impl ProgressMeter {
     /// For an attempt that adds to what earlier ones cost.
     #[must_use]
-    pub fn new(baseline: Usage, baseline_phases: BTreeMap<String, f64>) -> Self {
+    pub fn new(baseline: Usage, baseline_phases: BTreeMap<String, f64>, forecast: Option<TimeForecast>) -> Self {
         let now = Instant::now();
         Self {
             baseline,
@@ -34,6 +46,8 @@ impl ProgressMeter {
             own_phases: BTreeMap::new(),
             first_step: None,
             stepping_since: now,
+            moments_before: 0.0,
+            forecast,
             last: None,
         }
     }
@@ -68,12 +82,50 @@ impl ProgressMeter {
         total
     }
 
+    /// What phases that come at some moments have cost and will cost; empty without a forecast.
+    fn moments(&self, simulation: &dyn Simulation) -> Vec<Moment> {
+        let Some(forecast) = &self.forecast else { return Vec::new() };
+        let booked = self.phases(simulation);
+        let rest = (self.usage().cpu_s - booked.values().sum::<f64>()).max(0.0);
+        let spent = |phase: &String| if phase == REST { rest } else { booked.get(phase).copied().unwrap_or(0.0) };
+        forecast.moments.iter().map(|(phase, all)| Moment { spent: spent(phase), all: *all }).collect()
+    }
+
+    /// Seconds to the end, and what they rest on: the steps that are left at the speed so far, and what the forecast has
+    /// beside the steps (errors, frames) and was not spent yet, in the proportion that steps have to their forecast.
+    fn time_left(
+        &self,
+        simulation: &dyn Simulation,
+        done: u64,
+        left: u64,
+        seconds: f64,
+    ) -> (Option<f64>, Option<String>) {
+        let moments = self.moments(simulation);
+        let clock_per_cpu = self.forecast.as_ref().map_or(1.0, |f| f.wall_s / f.cpu_s.max(1e-9));
+        let beside = moments.iter().map(|moment| moment.spent).sum::<f64>() - self.moments_before;
+        let per_step = (seconds - beside * clock_per_cpu).max(0.02 * seconds) / done as f64;
+        let forecast_per_step = self.forecast.as_ref().map_or(0.0, |forecast| {
+            let stepping = forecast.cpu_s - moments.iter().map(|moment| moment.all).sum::<f64>();
+            stepping * clock_per_cpu / simulation.end().step.max(1) as f64
+        });
+        let pace = if forecast_per_step > 0.0 { (per_step / forecast_per_step).clamp(0.5, 3.0) } else { 1.0 };
+        let to_come: f64 = moments.iter().map(|moment| (moment.all - moment.spent).max(0.0)).sum();
+        let eta = left as f64 * per_step + to_come * clock_per_cpu * pace;
+        let basis = if moments.is_empty() {
+            format!("mean speed of the last {done} steps")
+        } else {
+            format!("mean speed of the last {done} steps, and the forecast of output and errors still to come")
+        };
+        (Some(eta), Some(basis))
+    }
+
     /// A record of this moment, at most every 0.4 s unless it `must` be made.
     pub fn observe(&mut self, simulation: &dyn Simulation, must: bool) -> Option<Progress> {
         let clock = simulation.clock();
         if self.first_step.is_none() {
             self.first_step = Some(clock.step);
             self.stepping_since = Instant::now();
+            self.moments_before = self.moments(simulation).iter().map(|moment| moment.spent).sum();
         } else if !must && self.last.is_some_and(|last| last.elapsed() < INTERVAL) {
             return None;
         }
@@ -82,6 +134,12 @@ impl ProgressMeter {
         let done = clock.step - self.first_step.unwrap_or(0);
         let seconds = self.stepping_since.elapsed().as_secs_f64();
         let speed = (done > 0 && seconds > 0.0).then(|| done as f64 / seconds);
+        let left = end.step - clock.step;
+        let (eta_s, eta_basis) = match speed {
+            Some(_) if left == 0 => (Some(0.0), None),
+            Some(_) => self.time_left(simulation, done, left, seconds),
+            None => (None, None),
+        };
         let health = simulation.health();
         Some(Progress {
             fraction: clock.step as f64 / end.step.max(1) as f64,
@@ -91,8 +149,8 @@ impl ProgressMeter {
             steps_per_s: speed,
             particles: simulation.particle_count() as u64,
             phase: if simulation.is_finished() { "finishing" } else { "stepping" }.to_owned(),
-            eta_s: speed.map(|speed| (end.step - clock.step) as f64 / speed),
-            eta_basis: speed.map(|_| format!("mean speed of the last {done} steps")),
+            eta_s,
+            eta_basis,
             health: HealthRecord {
                 finite: health.finite,
                 max_cfl: health.max_cfl,

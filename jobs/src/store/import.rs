@@ -1,12 +1,15 @@
 //! Publishing a worker's records: each is taken exactly once, together with the offset behind it, and only while the
 //! job is at the record's attempt.
 
-use super::{Store, StoreError, events, rows};
+use super::{Store, StoreError, calibration, events, rows};
+use crate::calibration::measured;
 use crate::records::{self, CheckpointRecord, Line, Progress, Record, Usage, Verdict};
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
+/// The file of a finished run's errors and cost.
+pub const REPORT: &str = "report.json";
 /// Least time between two progress events of a job.
 const PROGRESS_EVENT_INTERVAL: Duration = Duration::from_secs(1);
 
@@ -51,6 +54,7 @@ impl Store {
         };
         let end = *end;
         let mut imported = Imported { any: true, ..Imported::default() };
+        let of = Attempt { job, study: row.study.as_deref(), epoch };
         self.write(|transaction| -> Result<(), StoreError> {
             // The epoch and the offset are checked again inside the transaction: this is the fence.
             let changed = transaction
@@ -77,19 +81,19 @@ impl Store {
                     }
                     Record::Checkpoint(checkpoint) => {
                         imported.has_checkpoint = true;
-                        take_checkpoint(transaction, job, epoch, &checkpoint)?;
+                        take_checkpoint(transaction, &of, &checkpoint)?;
                     }
-                    other => take(transaction, job, epoch, &other)?,
+                    other => self.take(transaction, &of, &other)?,
                 }
             }
             if let Some(progress) = latest {
                 let due = pace.last.is_none_or(|last| last.elapsed() >= PROGRESS_EVENT_INTERVAL);
-                take_progress(transaction, job, epoch, &progress, due || imported.verdict.is_some())?;
+                take_progress(transaction, &of, &progress, due || imported.verdict.is_some())?;
                 if due {
                     pace.last = Some(Instant::now());
                 }
             } else if imported.verdict.is_some() {
-                flush_progress(transaction, job, epoch)?;
+                flush_progress(transaction, &of)?;
             }
             Ok(())
         })?;
@@ -156,71 +160,104 @@ impl Store {
     }
 }
 
-fn take(transaction: &Transaction, job: &str, epoch: u64, record: &Record) -> Result<(), StoreError> {
-    match record {
-        Record::Started { frames, pid, step, .. } => {
-            // Frames after the checkpoint are written again; until then they are not part of the job.
-            let paths: Vec<String> = {
-                let mut statement = transaction
-                    .prepare_cached("SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path")?;
-                let rows = statement.query_map([job], |row| row.get(0))?;
-                rows.collect::<Result<_, _>>()?
-            };
-            for path in paths.iter().skip(*frames as usize) {
-                transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
-            }
-            transaction.execute("UPDATE jobs SET worker_pid = ?2 WHERE id = ?1", params![job, pid])?;
-            // Checkpoints of steps that are to come again were refused by the worker.
-            transaction.execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, *step as i64])?;
-        }
-        Record::File(file) => {
-            transaction
-                .prepare_cached(
-                    "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
-                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-                )?
-                .execute(params![
-                    job,
-                    file.path,
-                    epoch as i64,
-                    file.size_bytes as i64,
-                    file.sha256,
-                    file.media_type,
-                    file.time,
-                    file.step.map(|step| step as i64),
-                ])?;
-            if file.step.is_some() {
-                let data =
-                    json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
-                events::append(transaction, job, epoch, "frame", &data)?;
-            }
-        }
-        Record::Warning { code, message } => {
-            let warnings: String =
-                transaction.query_row("SELECT warnings FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
-            let mut warnings: Vec<String> = serde_json::from_str(&warnings)?;
-            warnings.push(message.clone());
-            transaction.execute(
-                "UPDATE jobs SET warnings = ?2 WHERE id = ?1",
-                params![job, serde_json::to_string(&warnings)?],
-            )?;
-            events::append(transaction, job, epoch, "warning", &json!({"code": code, "message": message}))?;
-        }
-        Record::Finding { name, message, time } => {
-            let data = json!({"name": name, "message": message, "time": time});
-            events::append(transaction, job, epoch, "finding", &data)?;
-        }
-        Record::Progress(_) | Record::Checkpoint(_) | Record::Verdict(_) => {}
-    }
-    Ok(())
+/// Whose records are taken.
+struct Attempt<'a> {
+    job: &'a str,
+    study: Option<&'a str>,
+    epoch: u64,
 }
 
-fn take_checkpoint(
-    transaction: &Transaction,
-    job: &str,
-    epoch: u64,
-    checkpoint: &CheckpointRecord,
-) -> Result<(), StoreError> {
+impl Attempt<'_> {
+    fn tell(&self, transaction: &Transaction, kind: &str, data: &serde_json::Value) -> Result<(), StoreError> {
+        Ok(events::append(transaction, self.job, self.study, self.epoch, kind, data)?)
+    }
+}
+
+impl Store {
+    /// Keeps the errors and the cost of a finished run in its row, so that tables of thousands open no file.
+    fn keep_results(&self, transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
+        let directory = crate::order::attempt_directory(&self.job_directory(of.job), of.epoch);
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(directory.join(REPORT))?)?;
+        let results = json!({"errors": report["errors"], "cost": report["cost"]});
+        // Runs that began in the middle or were cut off tell nothing about whole ones.
+        if let Some(row) =
+            rows::job(transaction, of.job)?.filter(|row| row.attempt == 1 && row.restarted_from.is_none())
+        {
+            let threads = row.resolved["limits"]["threads"].as_u64().unwrap_or(1);
+            calibration::add(transaction, &measured(&row.estimate, &report["cost"], threads))?;
+        }
+        transaction.execute("UPDATE jobs SET results = ?2 WHERE id = ?1", params![of.job, results.to_string()])?;
+        Ok(())
+    }
+
+    fn take(&self, transaction: &Transaction, of: &Attempt, record: &Record) -> Result<(), StoreError> {
+        let Attempt { job, epoch, .. } = *of;
+        match record {
+            Record::Started { frames, pid, step, .. } => {
+                // Frames after the checkpoint are written again; until then they are not part of the job.
+                let paths: Vec<String> = {
+                    let mut statement = transaction.prepare_cached(
+                        "SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path",
+                    )?;
+                    let rows = statement.query_map([job], |row| row.get(0))?;
+                    rows.collect::<Result<_, _>>()?
+                };
+                for path in paths.iter().skip(*frames as usize) {
+                    transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
+                }
+                transaction.execute("UPDATE jobs SET worker_pid = ?2 WHERE id = ?1", params![job, pid])?;
+                // Checkpoints of steps that are to come again were refused by the worker.
+                transaction
+                    .execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, *step as i64])?;
+            }
+            Record::File(file) => {
+                transaction
+                    .prepare_cached(
+                        "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                    )?
+                    .execute(params![
+                        job,
+                        file.path,
+                        epoch as i64,
+                        file.size_bytes as i64,
+                        file.sha256,
+                        file.media_type,
+                        file.time,
+                        file.step.map(|step| step as i64),
+                    ])?;
+                if file.path == REPORT {
+                    self.keep_results(transaction, of)?;
+                }
+                if file.step.is_some() {
+                    let data =
+                        json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
+                    of.tell(transaction, "frame", &data)?;
+                }
+            }
+            Record::Warning { code, message } => {
+                let warnings: String =
+                    transaction.query_row("SELECT warnings FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
+                let mut warnings: Vec<String> = serde_json::from_str(&warnings)?;
+                warnings.push(message.clone());
+                transaction.execute(
+                    "UPDATE jobs SET warnings = ?2 WHERE id = ?1",
+                    params![job, serde_json::to_string(&warnings)?],
+                )?;
+                of.tell(transaction, "warning", &json!({"code": code, "message": message}))?;
+            }
+            Record::Finding { name, message, time } => {
+                let data = json!({"name": name, "message": message, "time": time});
+                of.tell(transaction, "finding", &data)?;
+            }
+            Record::Progress(_) | Record::Checkpoint(_) | Record::Verdict(_) => {}
+        }
+        Ok(())
+    }
+}
+
+fn take_checkpoint(transaction: &Transaction, of: &Attempt, checkpoint: &CheckpointRecord) -> Result<(), StoreError> {
+    let Attempt { job, epoch, .. } = *of;
     transaction
         .prepare_cached(
             "INSERT OR REPLACE INTO checkpoints (id, job, attempt, path, step, time, size_bytes, sha256, created_at, isa, build)
@@ -241,11 +278,12 @@ fn take_checkpoint(
         ])?;
     transaction.execute("UPDATE jobs SET checkpoint_since = 1 WHERE id = ?1", [job])?;
     let data = json!({"id": checkpoint.id, "step": checkpoint.step, "time": checkpoint.time, "size_bytes": checkpoint.size_bytes});
-    Ok(events::append(transaction, job, epoch, "checkpoint", &data)?)
+    of.tell(transaction, "checkpoint", &data)
 }
 
 /// The last progress as an event, if the coalescing held it back: the end of a run is never missing.
-fn flush_progress(transaction: &Transaction, job: &str, epoch: u64) -> Result<(), StoreError> {
+fn flush_progress(transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
+    let job = of.job;
     let Some(row) = rows::job(transaction, job)? else { return Ok(()) };
     let told: Option<u64> = transaction
         .query_row(
@@ -257,26 +295,26 @@ fn flush_progress(transaction: &Transaction, job: &str, epoch: u64) -> Result<()
         .flatten()
         .map(|step| step as u64);
     if row.progress_count > 0 && told != Some(row.progress.step) {
-        append_progress(transaction, job, epoch, &row.progress)?;
+        append_progress(transaction, of, &row.progress)?;
     }
     Ok(())
 }
 
-fn append_progress(transaction: &Transaction, job: &str, epoch: u64, progress: &Progress) -> Result<(), StoreError> {
+fn append_progress(transaction: &Transaction, of: &Attempt, progress: &Progress) -> Result<(), StoreError> {
     let data = json!({
         "fraction": progress.fraction, "time": progress.time, "step": progress.step,
         "steps_per_s": progress.steps_per_s, "eta_s": progress.eta_s,
     });
-    Ok(events::append(transaction, job, epoch, "progress", &data)?)
+    of.tell(transaction, "progress", &data)
 }
 
 fn take_progress(
     transaction: &Transaction,
-    job: &str,
-    epoch: u64,
+    of: &Attempt,
     progress: &Progress,
     is_event: bool,
 ) -> Result<(), StoreError> {
+    let job = of.job;
     let before = rows::job(transaction, job)?.map(|row| row.progress.fraction).unwrap_or_default();
     // The fraction never falls, also where an attempt repeats what a lost one had done.
     let mut shown = progress.clone();
@@ -285,7 +323,7 @@ fn take_progress(
         .prepare_cached("UPDATE jobs SET progress = ?2, usage = ?3, progress_count = progress_count + 1 WHERE id = ?1")?
         .execute(params![job, serde_json::to_string(&shown)?, serde_json::to_string(&progress.usage)?])?;
     if is_event {
-        append_progress(transaction, job, epoch, &shown)?;
+        append_progress(transaction, of, &shown)?;
     }
     Ok(())
 }

@@ -12,6 +12,8 @@ pub struct JobFilter {
     pub states: Vec<State>,
     /// Of this kind.
     pub kind: Option<String>,
+    /// Points of this study.
+    pub study: Option<String>,
     /// With this name.
     pub name: Option<String>,
     /// With all these labels.
@@ -47,6 +49,7 @@ impl Store {
         }
         let plain = [
             ("kind = ?", &filter.kind),
+            ("study = ?", &filter.study),
             ("name = ?", &filter.name),
             ("created_at > ?", &filter.created_after),
             ("created_at < ?", &filter.created_before),

@@ -4,7 +4,8 @@ use super::StoreError;
 use rusqlite::Connection;
 
 /// The changes in order. A change that has been released is never edited.
-const MIGRATIONS: &[&str] = &["
+const MIGRATIONS: &[&str] = &[
+    "
     CREATE TABLE jobs (
         id TEXT PRIMARY KEY,
         rev INTEGER NOT NULL,
@@ -73,7 +74,86 @@ const MIGRATIONS: &[&str] = &["
         build TEXT NOT NULL
     ) STRICT;
     CREATE INDEX checkpoints_by_job ON checkpoints (job, id);
-"];
+",
+    // Studies, uploads, requests carried out once, calibration; the queue in an index of its own.
+    "
+    ALTER TABLE jobs ADD COLUMN study TEXT;
+    ALTER TABLE jobs ADD COLUMN study_index INTEGER;
+    ALTER TABLE jobs ADD COLUMN superseded INTEGER NOT NULL DEFAULT 0;
+    ALTER TABLE jobs ADD COLUMN retry_of TEXT;
+    ALTER TABLE jobs ADD COLUMN rank REAL NOT NULL DEFAULT 0;
+    ALTER TABLE jobs ADD COLUMN memory_bytes INTEGER NOT NULL DEFAULT 0;
+    ALTER TABLE jobs ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT 0;
+    ALTER TABLE jobs ADD COLUMN results TEXT;
+    UPDATE jobs SET rank = unixepoch(created_at) - priority * 600.0,
+        memory_bytes = COALESCE(json_extract(estimate, '$.memory_bytes'), 0),
+        disk_bytes = COALESCE(json_extract(estimate, '$.disk_bytes'), 0);
+    DROP INDEX jobs_by_queue;
+    CREATE INDEX jobs_queued ON jobs (rank, id, study, memory_bytes, disk_bytes) WHERE state = 'queued';
+    CREATE INDEX jobs_by_state ON jobs (state, id);
+    CREATE INDEX jobs_by_study ON jobs (study, study_index, id) WHERE study IS NOT NULL;
+    CREATE INDEX jobs_by_start ON jobs (restarted_from) WHERE restarted_from IS NOT NULL;
+    CREATE TABLE studies (
+        id TEXT PRIMARY KEY,
+        rev INTEGER NOT NULL DEFAULT 1,
+        name TEXT,
+        labels TEXT NOT NULL,
+        base TEXT NOT NULL,
+        sweep TEXT NOT NULL,
+        axes TEXT NOT NULL,
+        points INTEGER NOT NULL,
+        max_parallel INTEGER,
+        on_failure TEXT NOT NULL,
+        stopping INTEGER NOT NULL DEFAULT 0,
+        estimate TEXT NOT NULL,
+        created_at TEXT NOT NULL
+    ) STRICT;
+    CREATE TABLE study_events (
+        study TEXT NOT NULL,
+        id INTEGER NOT NULL,
+        job TEXT NOT NULL,
+        event INTEGER NOT NULL,
+        PRIMARY KEY (study, id)
+    ) STRICT, WITHOUT ROWID;
+    CREATE TABLE uploads (
+        id TEXT PRIMARY KEY,
+        purpose TEXT NOT NULL,
+        state TEXT NOT NULL,
+        reason TEXT,
+        found TEXT,
+        name TEXT,
+        size_bytes INTEGER NOT NULL,
+        sha256 TEXT NOT NULL,
+        created_at TEXT NOT NULL,
+        checked_at TEXT
+    ) STRICT;
+    CREATE TABLE inputs (
+        job TEXT NOT NULL,
+        upload TEXT NOT NULL,
+        PRIMARY KEY (job, upload)
+    ) STRICT, WITHOUT ROWID;
+    CREATE INDEX inputs_by_upload ON inputs (upload);
+    CREATE TABLE answers (
+        owner TEXT NOT NULL,
+        key TEXT NOT NULL,
+        request_sha256 TEXT NOT NULL,
+        status INTEGER NOT NULL,
+        location TEXT,
+        body TEXT NOT NULL,
+        created_at TEXT NOT NULL,
+        PRIMARY KEY (owner, key)
+    ) STRICT, WITHOUT ROWID;
+    CREATE TABLE calibration (
+        build TEXT NOT NULL,
+        machine TEXT NOT NULL,
+        kind TEXT NOT NULL,
+        phase TEXT NOT NULL,
+        work REAL NOT NULL,
+        seconds REAL NOT NULL,
+        PRIMARY KEY (build, machine, kind, phase)
+    ) STRICT, WITHOUT ROWID;
+",
+];
 
 /// Makes the changes that are missing, each in a transaction of its own.
 ///

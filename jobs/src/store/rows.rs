@@ -72,6 +72,14 @@ pub struct JobRow {
     pub restarted_from: Option<String>,
     /// Digest of that checkpoint's file.
     pub restart_sha256: Option<String>,
+    /// Study that it is a point of.
+    pub study: Option<String>,
+    /// Number of the point.
+    pub study_index: Option<u64>,
+    /// Job that it repeats.
+    pub retry_of: Option<String>,
+    /// Errors and cost, once it has succeeded.
+    pub results: Option<Value>,
 }
 
 /// A published file.
@@ -122,7 +130,7 @@ pub struct CheckpointRow {
     pub build: String,
 }
 
-fn json<T: serde::de::DeserializeOwned + Default>(row: &Row, column: &str) -> rusqlite::Result<T> {
+pub(super) fn json<T: serde::de::DeserializeOwned + Default>(row: &Row, column: &str) -> rusqlite::Result<T> {
     let text: Option<String> = row.get(column)?;
     text.map_or_else(
         || Ok(T::default()),
@@ -168,6 +176,10 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         leg_wall_s: row.get("leg_wall_s")?,
         restarted_from: row.get("restarted_from")?,
         restart_sha256: row.get("restart_sha256")?,
+        study: row.get("study")?,
+        study_index: row.get::<_, Option<i64>>("study_index")?.map(|index| index as u64),
+        retry_of: row.get("retry_of")?,
+        results: json(row, "results")?,
     })
 }
 

@@ -3,7 +3,7 @@
 use super::import::ProgressPace;
 use super::settle::Loss;
 use super::{Change, ChangeError, JobFilter, JobRow, Store};
-use crate::body::{self, Allowance};
+use crate::body::{self, Allowance, NoSources};
 use crate::job::{Reason, State, Trigger};
 use crate::order::attempt_directory;
 use crate::records::{CheckpointRecord, FileRecord, Progress, Record, RecordFile, RecordSink, Verdict};
@@ -19,7 +19,8 @@ fn submit(store: &Store, extra: &serde_json::Value) -> JobRow {
     let mut spec = json!({"scene": {"kind": "redistance"}});
     spec.as_object_mut().unwrap().extend(extra.as_object().unwrap().clone());
     let allowance = Allowance { threads: 2, memory_bytes: 1 << 32, local_files: false };
-    store.submit(&body::parse(&spec, allowance, |_| None).ok().unwrap()).unwrap()
+    let body = body::parse(&spec, allowance, &NoSources).ok().unwrap();
+    store.submit_row(&body)
 }
 
 fn records(store: &Store, job: &JobRow, epoch: u64) -> RecordFile {

@@ -1,6 +1,6 @@
 //! Changing the state of a job: the table of [`crate::job`] applied as a compare-and-set.
 
-use super::{JobRow, Store, StoreError, events, rows};
+use super::{JobRow, Store, StoreError, events, rows, studies};
 use crate::job::{Reason, State, Trigger};
 use rusqlite::{Transaction, params};
 use serde_json::json;
@@ -56,25 +56,26 @@ impl Store {
         self.write(|transaction| apply(transaction, id, trigger, change))
     }
 
-    /// Takes the next job of the queue whose memory and disk (in bytes) fit, as a new attempt. Durable before any worker starts.
+    /// Takes the next job of the queue whose memory and disk (in bytes) fit and whose study has a free place, as a new
+    /// attempt. Durable before any worker starts.
     ///
     /// # Errors
     /// [`StoreError`].
     pub fn claim(&self, fits: impl Fn(u64, u64) -> bool) -> Result<Option<JobRow>, StoreError> {
         let next: Option<String> = {
             let connection = self.read();
+            let full = studies::without_a_free_place(&connection)?;
+            // The index of the queue has every column that is asked for.
             let mut statement = connection.prepare_cached(
-                "SELECT id, json_extract(estimate, '$.memory_bytes'), json_extract(estimate, '$.disk_bytes') FROM jobs WHERE state = 'queued'
-                 ORDER BY priority DESC, id",
+                "SELECT id, study, memory_bytes, disk_bytes FROM jobs WHERE state = 'queued' ORDER BY rank, id",
             )?;
             let mut found = None;
-            let rows = statement.query_map([], |row| {
-                Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)? as u64, row.get::<_, i64>(2)? as u64))
-            })?;
-            for row in rows {
-                let (id, memory, disk) = row?;
-                if fits(memory, disk) {
-                    found = Some(id);
+            let mut rows = statement.query([])?;
+            while let Some(row) = rows.next()? {
+                let study: Option<String> = row.get(1)?;
+                let is_held_back = study.is_some_and(|study| full.contains(&study));
+                if !is_held_back && fits(row.get::<_, i64>(2)? as u64, row.get::<_, i64>(3)? as u64) {
+                    found = Some(row.get(0)?);
                     break;
                 }
             }
@@ -205,8 +206,15 @@ pub(super) fn apply(
     if changed != 1 {
         return Err(ChangeError::Stale);
     }
+    let told = reason.map_or("", Reason::word);
+    metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => told).increment(1);
     let attempt = job.attempt + u64::from(is_claim);
     let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
-    events::append(transaction, id, attempt, "state", &data)?;
+    events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
+    if to == State::Failed
+        && let Some(study) = &job.study
+    {
+        studies::note_failure(transaction, study)?;
+    }
     rows::job(transaction, id)?.ok_or(ChangeError::NotFound)
 }

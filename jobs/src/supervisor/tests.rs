@@ -1,7 +1,7 @@
 //! Limits and losses, with processes that stand in for workers because real ones keep to their limits.
 
 use super::{Settings, Supervisor};
-use crate::body::{self, Allowance};
+use crate::body::{self, Allowance, NoSources};
 use crate::executor::{Executor, Exit, Worker};
 use crate::job::{Reason, State};
 use crate::store::{JobRow, Store};
@@ -60,9 +60,10 @@ fn end_of(stand_in: StandIn, until: impl Fn(&JobRow) -> bool) -> JobRow {
     let directory = tempfile::tempdir().unwrap();
     let store = Arc::new(Store::open(directory.path()).unwrap());
     let spec = json!({"scene": {"kind": "redistance"}, "limits": {"memory_bytes": 64_000_000}});
-    let body =
-        body::parse(&spec, Allowance { threads: 1, memory_bytes: 1 << 33, local_files: false }, |_| None).ok().unwrap();
-    let id = store.submit(&body).unwrap().id;
+    let body = body::parse(&spec, Allowance { threads: 1, memory_bytes: 1 << 33, local_files: false }, &NoSources)
+        .ok()
+        .unwrap();
+    let id = store.submit_row(&body).id;
     let supervisor = Supervisor::new(Arc::clone(&store), Box::new(stand_in), Settings::with_slots(1));
     let handle = supervisor.handle();
     let thread = std::thread::spawn(move || supervisor.run());

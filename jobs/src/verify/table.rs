@@ -1,6 +1,6 @@
 //! Outcomes as lines of a table and as a document.
 
-use crate::{clock, report};
+use crate::{clock, process};
 use meniscus::scene::rows::{Figure, Reach, Row};
 use std::fmt::{Display, Formatter, Write};
 
@@ -87,7 +87,7 @@ pub(super) fn document(outcomes: &[Outcome], figures: &[Figure]) -> String {
     let kinds = kinds.join(",");
     let mut text = String::new();
     let date = clock::now();
-    let machine = report::cpu_name().unwrap_or_else(|| "unknown".to_owned());
+    let machine = process::cpu_name().unwrap_or_else(|| "unknown".to_owned());
     let (build, isa) = (crate::build::name(), crate::build::isa());
     let missed = outcomes.iter().filter(|outcome| !outcome.is_met).count();
     // Writing to a String cannot fail.

@@ -250,3 +250,12 @@ pub fn rows() -> Rows {
     };
     Rows { document: "pcp", rows, figures: vec![figure] }
 }
+
+/// Short scenes by which a machine is measured.
+pub(super) fn calibration() -> Vec<Value> {
+    vec![
+        json!({"kind": "redistance", "spacing": 0.0078125, "repeat": 20}),
+        json!({"kind": "redistance", "dimension": 3, "spacing": 0.04, "repeat": 2}),
+        json!({"kind": "redistance", "spacing": 0.0078125, "method": "remesh"}),
+    ]
+}

@@ -4,14 +4,15 @@ use super::parameters::Written;
 use crate::closest_point::PcpMethod;
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Surface, Vector};
-use crate::scene::cloud::{self, CloudReference};
+use crate::scene::cloud::{self, CloudReference, CloudSizes};
+use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
-use crate::scenes::{pcp_parameters, shapes};
+use crate::scenes::{pcp_parameters, shapes, work_estimate};
 use crate::schemes::static_redistancing::{
     InitialLevel, RemeshingKernel, StaticParts, StaticRedistancing, StaticSystem, grid_method,
 };
-use crate::simulation::Simulation;
+use crate::simulation::{OutputPlan, Simulation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -45,12 +46,12 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         json!({"type": "ellipsoid", "center": null, "semi_axes": [0.75, 0.5, 0.5]})
     };
     let shape = written.shape.clone().unwrap_or(default_shape);
-    let of_points = cloud::reference(&shape, "/shape");
+    let of_points = cloud::named(&shape, "/shape", &mut violations);
     let surface = match &of_points {
-        Some(_) => None,
-        None => shapes::surface::<D>(&shape, "/shape").map_err(|found| violations.extend(found)).ok(),
+        _ if shape["type"] == "points" => None,
+        _ => shapes::surface::<D>(&shape, "/shape").map_err(|found| violations.extend(found)).ok(),
     };
-    let asked = cloud::reference(&written.queries, "/queries");
+    let asked = cloud::named(&written.queries, "/queries", &mut violations);
     if asked.is_some() && written.repeat > 1 {
         let detail = "points that are only asked about have no level to be redistanced again";
         violations.push(Violation::new("/repeat", "conflict", detail, &json!(written.repeat), json!(1)));
@@ -190,11 +191,13 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         self.clouds.clone()
     }
 
-    fn estimate(&self) -> Estimate {
+    fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
         let reach = self.half_band.max(self.method.reach_h::<D>() * self.lattice.spacing) + beyond;
-        let particles = shapes::surface::<D>(&self.shape, "/shape")
-            .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing));
+        let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
+            shapes::surface::<D>(&self.shape, "/shape")
+                .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing))
+        });
         Estimate {
             particles,
             steps: self.repeats,
@@ -202,6 +205,20 @@ impl<const D: usize> Scene for RedistanceScene<D> {
             end_time: self.repeats as f64,
             memory_bytes: memory_bytes::<D>(particles, &self.method),
         }
+    }
+
+    fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork> {
+        let Estimate { particles, steps, end_time, .. } = self.estimate(sizes);
+        let particles = particles as f64;
+        let reach_h = self.half_band / self.lattice.spacing;
+        let reach_h = reach_h.max(self.method.reach_h::<D>());
+        let times = self.repeats as f64;
+        let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, times, Course::EveryStep);
+        if self.remeshing.is_some() {
+            work.push(PhaseWork::every_step("remeshing", particles * times));
+        }
+        work.extend(work_estimate::around(particles, steps, end_time, plan));
+        work
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {

@@ -132,3 +132,14 @@ pub fn rows() -> Rows {
     ];
     Rows { document: "pcp", rows, figures }
 }
+
+/// Short scenes by which a machine is measured.
+pub(super) fn calibration() -> Vec<Value> {
+    let vortex = json!({"type": "single_vortex", "period": 2});
+    vec![
+        json!({"kind": "vortex", "spacing": 0.015625, "flow": vortex, "end_time": 2, "steps": 60}),
+        json!({"kind": "vortex", "spacing": 0.015625, "field": "overwrite", "flow": vortex, "end_time": 2, "steps": 60}),
+        json!({"kind": "vortex", "dimension": 3, "spacing": 0.04, "flow": {"type": "vortex_3d", "period": 1},
+               "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15}, "end_time": 1, "steps": 20}),
+    ]
+}

@@ -6,15 +6,16 @@ use crate::geometry::flows::{Rotation, SingleVortex, Translation, Vortex3d};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{self, Vector};
 use crate::scene::check;
-use crate::scene::cloud::{self, CloudReference};
+use crate::scene::cloud::{self, CloudReference, CloudSizes};
+use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::dimension::in_dimension;
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
-use crate::scenes::{pcp_parameters, shapes};
+use crate::scenes::{pcp_parameters, shapes, work_estimate};
 use crate::schemes::advected_level_set::{
-    AdvectedLevelSet, AdvectedParts, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen, Start,
+    AdvectedLevelSet, AdvectedParts, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen, Start, front_points,
 };
-use crate::simulation::Simulation;
+use crate::simulation::{OutputPlan, Simulation};
 use crate::time::{FixedStep, PathIntegrator};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -54,8 +55,9 @@ pub(super) fn understand(parameters: &Value) -> Understood {
 
 fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let mut violations = Vec::new();
-    let of_points = cloud::reference(&written.shape, "/shape");
-    let surface = if of_points.is_some() { None } else { Some(shapes::surface::<D>(&written.shape, "/shape")) };
+    let of_points = cloud::named(&written.shape, "/shape", &mut violations);
+    let surface =
+        if written.shape["type"] == "points" { None } else { Some(shapes::surface::<D>(&written.shape, "/shape")) };
     match surface {
         None => {}
         Some(Ok(surface)) => {
@@ -221,7 +223,19 @@ impl<const D: usize> VortexScene<D> {
     fn reach(&self) -> f64 {
         self.half_band.max(self.method.even_reach_h::<D>() * self.lattice.spacing)
     }
+
+    /// Points of the exact front, about.
+    fn front_points(&self) -> f64 {
+        let surface = shapes::surface::<D>(&self.shape, "/shape");
+        surface.map_or(0.0, |surface| {
+            let (low, high) = surface.bounding_box();
+            front_points((high - low).max(), self.lattice.spacing)
+        })
+    }
 }
+
+/// Units of work of a tight path through one unit of time, against the distance of one particle from a known shape.
+const PATH: f64 = 100.0;
 
 impl<const D: usize> Scene for VortexScene<D> {
     fn resolved(&self) -> Value {
@@ -240,9 +254,11 @@ impl<const D: usize> Scene for VortexScene<D> {
         self.clouds.clone()
     }
 
-    fn estimate(&self) -> Estimate {
-        let particles = shapes::surface::<D>(&self.shape, "/shape")
-            .map_or(0, |surface| band_particles(surface.as_ref(), self.reach(), self.lattice.spacing));
+    fn estimate(&self, sizes: &CloudSizes) -> Estimate {
+        let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
+            shapes::surface::<D>(&self.shape, "/shape")
+                .map_or(0, |surface| band_particles(surface.as_ref(), self.reach(), self.lattice.spacing))
+        });
         Estimate {
             particles,
             steps: self.fixed.steps,
@@ -250,6 +266,39 @@ impl<const D: usize> Scene for VortexScene<D> {
             end_time: self.end_time,
             memory_bytes: memory_bytes::<D>(particles, &self.method),
         }
+    }
+
+    fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork> {
+        let Estimate { particles, steps, end_time, .. } = self.estimate(sizes);
+        let particles = particles as f64;
+        let stages = match self.integrator {
+            PathIntegrator::Rk4 => 4.0,
+            PathIntegrator::TvdRk2 => 2.0,
+            PathIntegrator::Dopri5 { .. } => 14.0,
+        };
+        let flow = flow::<D>(&self.flow).ok();
+        let turn = flow.as_ref().and_then(|flow| flow.return_time());
+        let halfway = turn.map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
+        let (times, course) = match self.when {
+            RedistanceWhen::Every(every) => ((steps / every.max(1)) as f64, Course::EveryStep),
+            RedistanceWhen::ForOutput => {
+                let frames = work_estimate::frames(steps, end_time, plan) - 1.0;
+                (frames + f64::from(u8::from(halfway.is_some())), Course::Moments)
+            }
+        };
+        let reach_h = self.reach() / self.lattice.spacing;
+        let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, times, course);
+        work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages));
+        work.push(PhaseWork { phase: "measure", units: particles * times, course });
+        // At these times the exact front is carried along; a flow that is back or rigid needs none.
+        let is_returned = turn.is_some_and(|turn| (end_time / turn - (end_time / turn).round()).abs() < 1e-9);
+        let is_rigid = flow.as_ref().is_some_and(|flow| flow.is_rigid());
+        let at_end = if is_returned { 0.0 } else { end_time };
+        let path = if is_rigid { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
+        let points = if D == 2 { self.front_points() } else { 0.0 };
+        work.push(PhaseWork::at_moments("errors", particles + (points + particles) * path * PATH));
+        work.extend(work_estimate::around(particles, steps, end_time, plan));
+        work
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {

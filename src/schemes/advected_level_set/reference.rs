@@ -41,6 +41,17 @@ const MOST_POINTS: f64 = 2e5;
 /// Points of the front per spacing of the particles, so that the chords' error stays far below the method's.
 const POINTS_PER_SPACING: f64 = 200.0;
 
+/// Distance of the points of the front about a shape of some extent.
+fn front_spacing(extent: f64, spacing: f64) -> f64 {
+    (spacing / POINTS_PER_SPACING).max(4.0 * extent / MOST_POINTS)
+}
+
+/// How many points a front will have, about: as many as that of a circle of this extent.
+#[must_use]
+pub fn front_points(extent: f64, spacing: f64) -> f64 {
+    std::f64::consts::PI * extent / front_spacing(extent, spacing)
+}
+
 impl<const D: usize> ExactMotion<D> {
     /// A surface at time 0, where it is known, and its flow.
     #[must_use]
@@ -80,8 +91,7 @@ impl<const D: usize> ExactMotion<D> {
             return Ok(Some(ExactFront { motion: self, surface, time, advected: None }));
         }
         let (low, high) = surface.bounding_box();
-        let perimeter = 4.0 * (high - low).max();
-        let outline = surface.outline((spacing / POINTS_PER_SPACING).max(perimeter / MOST_POINTS));
+        let outline = surface.outline(front_spacing((high - low).max(), spacing));
         if outline.is_empty() {
             return Ok(None);
         }

@@ -1,6 +1,5 @@
 //! Error over spacing and over CPU time, log-log, one line a method (SVG).
 
-use meniscus::scene::rows::Figure;
 use plotters::coord::Shift;
 use plotters::prelude::{
     ChartBuilder, Circle, DrawingArea, IntoDrawingArea, IntoFont, IntoLogRange, Palette, Palette99, PathElement,
@@ -8,7 +7,6 @@ use plotters::prelude::{
 };
 use plotters::style::{BLACK, Color};
 use std::ops::Range;
-use std::path::Path;
 
 /// One run.
 #[derive(Debug, Clone, Copy)]
@@ -29,25 +27,41 @@ fn style(k: usize) -> ShapeStyle {
 /// Labels and runs.
 pub type Lines = Vec<(String, Vec<Point>)>;
 
-/// Draws both pictures side by side.
+/// Both pictures side by side, as SVG; `seconds` names what was timed.
 ///
 /// # Errors
-/// A message when the file cannot be written.
-pub fn draw(path: &Path, figure: &Figure, lines: &[(String, Vec<Point>)]) -> Result<(), String> {
-    let root = SVGBackend::new(path, (1480, 560)).into_drawing_area();
-    root.fill(&WHITE).map_err(|e| e.to_string())?;
-    let root = root.titled(figure.title, ("sans-serif", 22)).map_err(|e| e.to_string())?;
-    let (charts, legend) = root.split_horizontally(1200);
-    let panels = charts.split_evenly((1, 2));
-    panel(&panels[0], lines, "spacing h", |p| p.spacing)?;
-    panel(&panels[1], lines, "CPU seconds of redistancing", |p| p.seconds)?;
-    for (k, (label, _)) in lines.iter().enumerate() {
-        let y = 60 + 24 * k as i32;
-        legend.draw(&PathElement::new(vec![(8, y), (34, y)], style(k))).map_err(|e| e.to_string())?;
-        let font = ("sans-serif", 15).into_font();
-        legend.draw(&Text::new(label.clone(), (42, y - 8), font)).map_err(|e| e.to_string())?;
+/// A message when it cannot be drawn.
+pub fn draw(title: &str, seconds: &str, lines: &[(String, Vec<Point>)]) -> Result<String, String> {
+    let mut text = String::new();
+    {
+        let root = SVGBackend::with_string(&mut text, (1480, 560)).into_drawing_area();
+        root.fill(&WHITE).map_err(|e| e.to_string())?;
+        let root = root.titled(title, ("sans-serif", 22)).map_err(|e| e.to_string())?;
+        let (charts, legend) = root.split_horizontally(1200);
+        let panels = charts.split_evenly((1, 2));
+        panel(&panels[0], lines, "spacing h", |p| p.spacing)?;
+        panel(&panels[1], lines, seconds, |p| p.seconds)?;
+        for (k, (label, _)) in lines.iter().enumerate() {
+            let y = 60 + 24 * k as i32;
+            legend.draw(&PathElement::new(vec![(8, y), (34, y)], style(k))).map_err(|e| e.to_string())?;
+            let font = ("sans-serif", 15).into_font();
+            legend.draw(&Text::new(label.clone(), (42, y - 8), font)).map_err(|e| e.to_string())?;
+        }
+        root.present().map_err(|e| e.to_string())?;
     }
-    root.present().map_err(|e| e.to_string())
+    Ok(text)
+}
+
+/// The order p of errors ~ h^p by least squares over the logarithms; None of fewer than two spacings.
+#[must_use]
+pub fn fitted_order(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> =
+        points.iter().filter(|(h, e)| *h > 0.0 && *e > 0.0).map(|(h, e)| (h.ln(), e.ln())).collect();
+    let n = logs.len() as f64;
+    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
+    let bottom: f64 = logs.iter().map(|p| (p.0 - mx).powi(2)).sum();
+    let top: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+    (bottom > 1e-12).then(|| top / bottom)
 }
 
 /// The range of positive values with some room; decades at least.

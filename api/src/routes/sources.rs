@@ -1,0 +1,46 @@
+//! Checkpoints and uploads as the store knows them.
+
+use crate::error::ApiError;
+use meniscus_jobs::body::{RestartSource, Sources};
+use meniscus_jobs::store::{Store, StoreError};
+use meniscus_jobs::uploads::Purpose;
+use std::cell::RefCell;
+
+/// Looks things up; remembers when the store failed, since that is not the same as "not there".
+pub(crate) struct StoreSources<'a> {
+    store: &'a Store,
+    failure: RefCell<Option<StoreError>>,
+}
+
+impl<'a> StoreSources<'a> {
+    pub(crate) fn new(store: &'a Store) -> Self {
+        Self { store, failure: RefCell::new(None) }
+    }
+
+    /// Whether the store failed while it was asked.
+    pub(crate) fn check(&self) -> Result<(), ApiError> {
+        self.failure.take().map_or(Ok(()), |error| Err(error.into()))
+    }
+
+    fn found<T>(&self, found: Result<Option<T>, StoreError>) -> Option<T> {
+        found.unwrap_or_else(|error| {
+            self.failure.replace(Some(error));
+            None
+        })
+    }
+}
+
+impl Sources for StoreSources<'_> {
+    fn checkpoint(&self, id: &str) -> Option<RestartSource> {
+        self.found(self.store.restart_source(id))
+    }
+
+    fn uploaded_checkpoint(&self, id: &str) -> Option<RestartSource> {
+        self.found(self.store.uploaded_restart(id))
+    }
+
+    fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
+        let row = self.found(self.store.upload(id)).filter(|row| row.state == "ready")?;
+        Some((row.purpose, row.found["points"].as_u64()?))
+    }
+}

@@ -1,0 +1,141 @@
+//! What a unit of work takes, by phase: kept per build and machine, begun by a few short runs, refined by every job
+//! that finishes.
+
+use crate::forecast::{TimeForecast, is_at_moments};
+use crate::{local_run, process};
+use meniscus::scene::PhaseWork;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Work and the CPU seconds that it took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Units.
+    pub work: f64,
+    /// CPU seconds.
+    pub seconds: f64,
+}
+
+/// What was measured of one phase of one family of runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PhaseMeasured {
+    /// Kind and dimension.
+    pub family: String,
+    /// Phase.
+    pub phase: String,
+    /// How much.
+    pub measured: Measured,
+}
+
+/// Everything that was measured on this machine with this build.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Calibration {
+    known: BTreeMap<(String, String), Measured>,
+}
+
+/// The weight that earlier runs keep when a new one comes.
+pub const MEMORY: f64 = 0.7;
+/// The phase that relates the clock to CPU seconds, for a number of threads.
+fn wall(threads: u64) -> String {
+    format!("wall@{threads}")
+}
+
+impl Calibration {
+    /// From what was kept.
+    #[must_use]
+    pub fn new(kept: impl IntoIterator<Item = PhaseMeasured>) -> Self {
+        Self { known: kept.into_iter().map(|one| ((one.family, one.phase), one.measured)).collect() }
+    }
+
+    /// Whether anything is known.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.known.is_empty()
+    }
+
+    /// Seconds of a unit: of this family, else over all.
+    fn seconds_per_unit(&self, family: &str, phase: &str) -> Option<f64> {
+        let ratio = |m: Measured| (m.work > 0.0).then_some(m.seconds / m.work);
+        if let Some(found) = self.known.get(&(family.to_owned(), phase.to_owned())).and_then(|m| ratio(*m)) {
+            return Some(found);
+        }
+        let alike = self.known.iter().filter(|((_, name), _)| name == phase).map(|(_, m)| *m);
+        ratio(
+            alike.fold(Measured::default(), |a, b| Measured { work: a.work + b.work, seconds: a.seconds + b.seconds }),
+        )
+    }
+
+    /// The time of a run; None while a phase that it has was never measured.
+    #[must_use]
+    pub fn time(&self, family: &str, work: &[PhaseWork], threads: u64) -> Option<TimeForecast> {
+        let mut forecast = TimeForecast::default();
+        for phase in work.iter().filter(|phase| phase.units > 0.0) {
+            let seconds = phase.units * self.seconds_per_unit(family, phase.phase)?;
+            forecast.cpu_s += seconds;
+            if is_at_moments(phase) {
+                *forecast.moments.entry(phase.phase.to_owned()).or_insert(0.0) += seconds;
+            }
+        }
+        let clock = self.seconds_per_unit(family, &wall(threads)).unwrap_or(1.0 / threads as f64);
+        forecast.wall_s = forecast.cpu_s * clock;
+        let own = self.known.keys().any(|(known, _)| known == family);
+        forecast.basis = if own {
+            format!("measured {family} runs of this build on this machine, by phase")
+        } else {
+            "measured runs of other kinds of this build on this machine, by phase".to_owned()
+        };
+        Some(forecast)
+    }
+}
+
+/// What a finished run tells: its work as forecast, and the phases of its report.
+#[must_use]
+pub fn measured(estimate: &Value, cost: &Value, threads: u64) -> Vec<PhaseMeasured> {
+    let family = estimate["family"].as_str().unwrap_or_default().to_owned();
+    let Some(work) = estimate["work"].as_object() else { return Vec::new() };
+    let booked = cost["phases"].as_object();
+    let seconds = |phase: &str| booked.and_then(|b| b.get(phase)).and_then(Value::as_f64).unwrap_or(0.0);
+    let cpu_s = cost["cpu_s"].as_f64().unwrap_or(0.0);
+    let rest = cpu_s - booked.into_iter().flatten().filter_map(|(_, v)| v.as_f64()).sum::<f64>();
+    let mut found: Vec<PhaseMeasured> = work
+        .iter()
+        .filter_map(|(phase, units)| Some((phase, units.as_f64().filter(|units| *units > 0.0)?)))
+        .map(|(phase, work)| {
+            let seconds = if phase == meniscus::scenes::work_estimate::REST { rest.max(0.0) } else { seconds(phase) };
+            PhaseMeasured { family: family.clone(), phase: phase.clone(), measured: Measured { work, seconds } }
+        })
+        .collect();
+    if let Some(wall_s) = cost["wall_s"].as_f64().filter(|_| cpu_s > 0.0) {
+        let measured = Measured { work: cpu_s, seconds: wall_s };
+        found.push(PhaseMeasured { family, phase: wall(threads), measured });
+    }
+    found
+}
+
+/// The name of this machine for calibration: processor and number of cores.
+#[must_use]
+pub fn machine() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{} x {cores}", process::cpu_name().unwrap_or_else(|| "unknown".to_owned()))
+}
+
+/// Measures this machine by the short runs that every kind of scene names, in a directory that is emptied again.
+///
+/// # Errors
+/// A sentence that names the run.
+pub fn measure_here(directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
+    let mut found = Vec::new();
+    for kind in meniscus::scenes::SCENES {
+        for scene in (kind.calibration)() {
+            let body = local_run::run(&scene, directory, threads).map_err(|cause| format!("{scene}: {cause}"))?;
+            let report = std::fs::read(directory.join("report.json")).map_err(|error| error.to_string())?;
+            let report: Value = serde_json::from_slice(&report).map_err(|error| error.to_string())?;
+            found.extend(measured(&body.forecast.to_json(), &report["cost"], threads));
+        }
+    }
+    // Only what has just been made here.
+    let _ = std::fs::remove_dir_all(directory);
+    Ok(found)
+}

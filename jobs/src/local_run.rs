@@ -1,0 +1,59 @@
+//! One scene in this process, on so many threads, for its report alone.
+
+use crate::body::{self, Allowance, JobBody, NoSources};
+use crate::observers::Control;
+use crate::order::Order;
+use crate::records::{Record, RecordSink, Usage, Verdict};
+use crate::{process, worker};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// Runs a scene into a directory, which is emptied before, and returns how it was understood.
+///
+/// # Errors
+/// A sentence.
+pub fn run(scene: &Value, directory: &Path, threads: u64) -> Result<JobBody, String> {
+    let system = |error: io::Error| error.to_string();
+    if directory.exists() {
+        fs::remove_dir_all(directory).map_err(system)?;
+    }
+    fs::create_dir_all(directory).map_err(system)?;
+    let memory_bytes = process::total_memory().unwrap_or(4 << 30) / 5 * 4;
+    let allowance = Allowance { threads, memory_bytes, local_files: false };
+    let body = body::parse(&json!({"scene": scene}), allowance, &NoSources).map_err(|violations| {
+        violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
+    })?;
+    let order = Order {
+        job: "local".to_owned(),
+        epoch: 1,
+        body: body.resolved.clone(),
+        attempts_directory: directory.to_owned(),
+        may_start_afresh: true,
+        checkpoints: Vec::new(),
+        inputs: BTreeMap::new(),
+        time: None,
+        usage: Usage::default(),
+    };
+    match worker::run_attempt(&order, directory, &Control::default(), &mut Silent) {
+        Verdict::Succeeded => {
+            // The report is what is wanted; frames of large runs would fill the disk.
+            for part in ["frames", "checkpoints"] {
+                let _ = fs::remove_dir_all(directory.join(part));
+            }
+            Ok(body)
+        }
+        Verdict::Failed { message, .. } => Err(message),
+        other => Err(format!("ended as {other:?}")),
+    }
+}
+
+struct Silent;
+
+impl RecordSink for Silent {
+    fn put(&mut self, _record: &Record, _durable: bool) -> io::Result<()> {
+        Ok(())
+    }
+}

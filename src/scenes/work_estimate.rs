@@ -1,0 +1,61 @@
+//! What redistancing, output and the rest of a run cost, in units of about one inner loop's turn.
+
+use crate::closest_point::PcpMethod;
+use crate::closest_point::method::NeighborhoodChoice;
+use crate::polynomials::multi_index::term_count;
+use crate::scene::work::{Course, PhaseWork};
+use crate::simulation::OutputPlan;
+
+/// Everything that is not booked to a phase: reading, building the particles, writing the report and the picture.
+pub const REST: &str = "rest";
+
+/// Redistancings of `particles` in a band of half width `reach_h` spacings, `times` over.
+#[must_use]
+pub fn redistancing<const D: usize>(
+    method: &PcpMethod,
+    particles: f64,
+    reach_h: f64,
+    times: f64,
+    course: Course,
+) -> Vec<PhaseWork> {
+    let terms = term_count::<D>(method.degree) as f64;
+    let moments = term_count::<D>(2 * method.degree) as f64;
+    let samples = particles * (method.sample_threshold_h / reach_h).min(1.0);
+    let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
+    let neighbors = ball * method.even_cutoff_h::<D>().powi(D as i32);
+    // Material fits are of the level and of every coordinate.
+    let fields = if let NeighborhoodChoice::Material { .. } = method.neighborhood { 1.0 + D as f64 } else { 1.0 };
+    // Moments and right-hand sides by the neighbour, the factorisation, and the gathering of neighbours.
+    let fit = neighbors * (moments + fields * terms + 16.0) + terms.powi(3) / 6.0 + fields * terms.powi(2);
+    // A few Newton steps with gradient and Hessian, and the search for the nearest sample.
+    let query = 64.0 + fields * terms * (4.0 + D as f64);
+    let phase = |phase: &'static str, units: f64| PhaseWork { phase, units: units * times, course };
+    vec![
+        phase("redistancing/detection", particles),
+        phase("redistancing/regression", samples * fit),
+        phase("redistancing/query", particles * query),
+        phase("redistancing/store", particles),
+    ]
+}
+
+/// Frames of a run, the first and the last included.
+#[must_use]
+pub fn frames(steps: u64, end_time: f64, plan: &OutputPlan) -> f64 {
+    let every = plan.every_time.unwrap_or(f64::INFINITY);
+    let between = (end_time / every - 1e-9).floor().min(steps as f64 - 1.0);
+    between.max(0.0) + 2.0
+}
+
+/// Frames, one checkpoint and everything else that is done once, for a run of so many particles and steps.
+#[must_use]
+pub fn around(particles: f64, steps: u64, end_time: f64, plan: &OutputPlan) -> [PhaseWork; 3] {
+    let frames = frames(steps, end_time, plan);
+    [
+        PhaseWork::at_moments("output", frames * (particles + FRAME_OVERHEAD)),
+        PhaseWork::at_moments("checkpoint", particles + FRAME_OVERHEAD),
+        PhaseWork::at_moments(REST, particles + FRAME_OVERHEAD),
+    ]
+}
+
+/// Particles whose writing takes as long as a file's opening and closing.
+const FRAME_OVERHEAD: f64 = 6000.0;

@@ -1,0 +1,121 @@
+//! `kill -9` of the service and of workers at random moments.
+
+use crate::common::Expected;
+use crate::support::{Service, chance, eventually, signal, steady_job};
+use rustix::process::Signal;
+use serde_json::json;
+use std::time::Duration;
+
+/// Kills of the service under load: no acknowledged job is lost, doubled or stuck, and all data are those of an
+/// undisturbed run.
+pub fn of_the_service(count: u64, seed: u64) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    let mut service = Service::start(directory.path(), &["--slots", "2"]);
+    let body = steady_job();
+    let expected = Expected::of(&service, &body);
+    let mut acknowledged: Vec<String> = (0..3).map(|_| service.submit(&body)).collect();
+    let mut open = acknowledged.clone();
+    for kill in 0..count {
+        std::thread::sleep(Duration::from_secs_f64(0.4 * chance(seed, kill)));
+        if kill % 7 == 3 {
+            // Killed right after the 201.
+            acknowledged.push(service.submit(&body));
+            open.extend(acknowledged.last().cloned());
+        }
+        let workers: Vec<u32> = open.iter().filter_map(|id| service.worker(id)).collect();
+        service.kill();
+        eventually("orphans are gone by the closed pipe alone", Duration::from_secs(5), || {
+            let alive = |pid: &u32| {
+                std::fs::read_to_string(format!("/proc/{pid}/status")).is_ok_and(|s| !s.contains("State:\tZ"))
+            };
+            (!workers.iter().any(alive)).then_some(())
+        });
+        service.restart();
+        open.retain(|id| service.job(id)["state"] != "succeeded");
+        if open.len() < 2 {
+            acknowledged.push(service.submit(&body));
+            open.extend(acknowledged.last().cloned());
+        }
+    }
+    for id in &acknowledged {
+        let job = service.wait_for(id, &["succeeded"]);
+        expected.check(&service, id);
+        assert_eq!(job["health"]["warnings"], json!([]), "a restart of the service is no fault of the job");
+    }
+    // None doubled: the store knows these and the undisturbed one.
+    let all = service.get("/v1/jobs?limit=500").json();
+    assert_eq!(all["items"].as_array().unwrap().len(), acknowledged.len() + 1);
+    assert!(service.stop(), "the service did not end well");
+    service.fsck();
+    format!("{count} kills of the service, {} jobs acknowledged and finished, all data identical", acknowledged.len())
+}
+
+/// Kills of workers: at most what came after the last checkpoint is done again, and the final data are identical.
+pub fn of_workers(count: u64, seed: u64) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    let service = Service::start(directory.path(), &["--slots", "2", "--threads", "2"]);
+    let body = steady_job();
+    let expected = Expected::of(&service, &body);
+    let mut kills = 0;
+    let mut round = 0;
+    let mut repeated = 0_u64;
+    let mut jobs = 0;
+    // Two deaths a job at most: a third without a new checkpoint would rightly fail it.
+    while kills < count {
+        let ids: Vec<String> = (0..2).map(|_| service.submit(&body)).collect();
+        for (k, id) in ids.iter().enumerate() {
+            for death in 0..2 {
+                let attempt = service.job(id)["attempt"].as_u64().unwrap().max(1);
+                service.wait_for(id, &["running", "succeeded"]);
+                let moment = chance(seed, round * 100 + 10 * k as u64 + death);
+                std::thread::sleep(Duration::from_secs_f64(0.5 * moment));
+                if let Some(pid) = service.worker(id) {
+                    signal(pid, Signal::KILL);
+                    kills += 1;
+                    eventually("the next attempt runs", Duration::from_secs(20), || {
+                        let job = service.job(id);
+                        (job["attempt"].as_u64().unwrap() > attempt || job["state"] == "succeeded").then_some(())
+                    });
+                }
+            }
+        }
+        for id in &ids {
+            service.wait_for(id, &["succeeded"]);
+            expected.check(&service, id);
+            repeated = repeated.max(most_repeated(&service, id));
+            jobs += 1;
+        }
+        round += 1;
+        assert!(round < 2 * count.max(20), "only {kills} kills found a worker");
+    }
+    format!("{kills} kills of workers in {jobs} jobs, at most {repeated} steps done again, all data identical")
+}
+
+/// The most steps that an attempt of a job did again: what it had come to, less where the next one began. No attempt
+/// begins before the newest checkpoint that was announced.
+fn most_repeated(service: &Service, id: &str) -> u64 {
+    let events = service.events(id);
+    let mut announced = std::collections::BTreeMap::new();
+    let mut reached = std::collections::BTreeMap::new();
+    for event in &events {
+        let attempt = event["attempt"].as_u64().unwrap();
+        if let Some(step) = event["data"]["step"].as_u64() {
+            let best = if event["type"] == "checkpoint" { &mut announced } else { &mut reached };
+            let entry: &mut u64 = best.entry(attempt).or_default();
+            *entry = step.max(*entry);
+        }
+    }
+    let log = service.get(&format!("/v1/jobs/{id}/log")).text();
+    let starts: Vec<u64> = log
+        .lines()
+        .filter_map(|line| line.split("start at step ").nth(1)?.split(',').next()?.trim().parse().ok())
+        .collect();
+    let mut most = 0;
+    for (attempt, start) in (1_u64..).zip(&starts) {
+        let before =
+            |map: &std::collections::BTreeMap<u64, u64>| map.range(..attempt).map(|(_, s)| *s).max().unwrap_or(0);
+        assert!(*start >= before(&announced), "{id}: attempt {attempt} began at {start}, before a checkpoint");
+        most = most.max(before(&reached).saturating_sub(*start));
+    }
+    most
+}
