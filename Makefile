@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
-.PHONY: help build demo test check setup clean
+.PHONY: help build demo test soak load check check-deploy setup clean
 
 # Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
 ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
@@ -18,6 +18,9 @@ help:
 	@echo "make test   build and run all tests"
 	@echo "make build  the release binary, $(TARGET)/release/meniscus"
 	@echo "make check  format and lints"
+	@echo "make soak   the promises by the hundred: COUNT=1000 is all, ONLY=name,name picks; counts add up over runs"
+	@echo "make load   how fast the service answers under load, beside what was promised"
+	@echo "make check-deploy  the files in deploy/, as far as this machine can"
 
 # Installs what is missing, and nothing where nothing is missing.
 setup:
@@ -45,5 +48,18 @@ check:
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets -- -D warnings
 
+# Promises kept under faults, COUNT thousandths of their full number in this run; soak-output/totals.json has all runs.
+COUNT ?= 20
+soak: setup
+	cargo build --profile test --locked -p meniscus-api
+	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_SOAK=1 COUNT=$(COUNT) ONLY=$(ONLY) \
+	cargo test --locked --test soak -- --nocapture
+
+load: build
+	MENISCUS_BIN="$(abspath $(TARGET)/release/meniscus)" cargo bench --locked --bench service
+
+check-deploy:
+	deploy/check.sh
+
 clean:
-	rm -rf $(TARGET) $(VENV) demo-output
+	rm -rf $(TARGET) $(VENV) demo-output soak-output

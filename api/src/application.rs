@@ -3,6 +3,7 @@
 use crate::calibration;
 use crate::config::Config;
 use crate::router;
+use crate::shown::ShownJobs;
 use crate::telemetry;
 use meniscus_jobs::executor::local::LocalExecutor;
 use meniscus_jobs::lock::{DirectoryLock, LockError};
@@ -35,6 +36,8 @@ pub struct Application {
     pub ready: Arc<AtomicBool>,
     /// Whether a shutdown has begun: the store can still be read.
     pub draining: Arc<AtomicBool>,
+    /// Jobs as they were last shown.
+    pub shown: ShownJobs,
     /// Archives that may be under way at once; each holds a thread for as long as its reader takes.
     pub archives: Arc<Semaphore>,
     /// Turns true when the service stops; long answers end then.
@@ -55,6 +58,8 @@ pub enum ServeError {
     Io(#[from] std::io::Error),
 }
 
+/// Time between two looks at the store's log.
+const LOG_INTERVAL: Duration = Duration::from_millis(250);
 /// Archives at once.
 const ARCHIVES: usize = 8;
 /// Time that open answers have to end after the supervisor has.
@@ -83,6 +88,7 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
         config: Arc::new(config),
         ready: Arc::new(AtomicBool::new(false)),
         draining: Arc::new(AtomicBool::new(false)),
+        shown: ShownJobs::default(),
         archives: Arc::new(Semaphore::new(ARCHIVES)),
         stopping,
     };
@@ -100,6 +106,7 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
         tracing::info!("ready");
         supervisor.run();
     })?;
+    trim_the_log(&application.store)?;
     if application.config.calibrate {
         calibration::start_where_needed(&application.store, application.config.threads)?;
     }
@@ -129,6 +136,21 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
     let _ = stop.send(true);
     // Whoever still reads slowly is cut off.
     let _ = tokio::time::timeout(LAST_ANSWERS, answers).await;
+    Ok(())
+}
+
+/// Keeps the store's log short, on a thread of its own, for as long as there is a store.
+fn trim_the_log(store: &Arc<Store>) -> std::io::Result<()> {
+    let store = Arc::downgrade(store);
+    std::thread::Builder::new().name("log-trimmer".to_owned()).spawn(move || {
+        loop {
+            std::thread::sleep(LOG_INTERVAL);
+            let Some(store) = store.upgrade() else { return };
+            if let Err(error) = store.trim_log() {
+                tracing::warn!(%error, "the store's log could not be trimmed");
+            }
+        }
+    })?;
     Ok(())
 }
 

@@ -102,6 +102,7 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
         checkpoints,
         inputs: BTreeMap::new(),
         time: None,
+        reserve_bytes: 0,
         usage: Usage::default(),
     };
     let keep = resolved["checkpoint"]["keep"].as_u64().unwrap_or(2) as usize;

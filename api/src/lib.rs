@@ -13,5 +13,6 @@ pub mod file_response;
 pub mod foreground;
 pub mod router;
 pub mod routes;
+pub mod shown;
 pub mod telemetry;
 pub mod views;

@@ -10,7 +10,7 @@ use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::{Json, Router};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 use tower_http::catch_panic::CatchPanicLayer;
@@ -67,14 +67,39 @@ fn documented() -> OpenApiRouter<Application> {
         .routes(routes!(studies::retry))
 }
 
-/// The document as clients read it: a wildcard `{*path}` is axum's spelling of the parameter `{path}`.
+/// The document as clients read it: a wildcard `{*path}` is axum's spelling of the parameter `{path}`, problems have a media
+/// type of their own, and what any request can meet stands with all of them.
 fn published(document: &utoipa::openapi::OpenApi) -> Value {
     let mut document = serde_json::to_value(document).unwrap_or_default();
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
         *paths = std::mem::take(paths).into_iter().map(|(path, item)| (path.replace("{*", "{"), item)).collect();
+        let operations = paths.values_mut().filter_map(Value::as_object_mut).flat_map(|item| item.values_mut());
+        for responses in operations.filter_map(|operation| operation.get_mut("responses")?.as_object_mut()) {
+            let problem = json!({"schema": {"$ref": "#/components/schemas/Problem"}});
+            for (status, what) in ANYWHERE {
+                let answer = json!({"description": what, "content": {"application/json": problem}});
+                responses.entry(status).or_insert(answer);
+            }
+            for content in responses.values_mut().filter_map(|r| r.get_mut("content")?.as_object_mut()) {
+                if content.get("application/json") == Some(&problem) {
+                    content.clear();
+                    content.insert("application/problem+json".to_owned(), problem.clone());
+                }
+            }
+        }
     }
     document
 }
+
+/// Problems that any request can meet.
+const ANYWHERE: [(&str, &str); 6] = [
+    ("400", "the path, the query or the body cannot be read"),
+    ("401", "a token is needed"),
+    ("403", "the token does not allow that, or a page of another origin asks"),
+    ("421", "the service does not answer under this name"),
+    ("500", "the service failed"),
+    ("503", "the service is starting or stopping"),
+];
 
 /// The whole service.
 pub fn router(application: Application) -> Router {
@@ -107,7 +132,12 @@ async fn with_request_id(request: Request, next: Next) -> Response {
     let id = format!("req_{}", Ulid::generate());
     let (method, path, began) = (request.method().clone(), request.uri().path().to_owned(), Instant::now());
     let route = request.extensions().get::<MatchedPath>().map_or("other", MatchedPath::as_str).to_owned();
-    let span = tracing::info_span!("request", request = id, %method, path);
+    let is_reading = method == Method::GET || method == Method::HEAD;
+    let span = if is_reading {
+        tracing::debug_span!("request", request = id, %method, path)
+    } else {
+        tracing::info_span!("request", request = id, %method, path)
+    };
     let mut response = next.run(request).instrument(span.clone()).await;
     let kind = response.headers().get(header::CONTENT_TYPE);
     let is_plain = kind.is_none_or(|kind| kind.as_bytes().starts_with(b"text/plain"));
@@ -130,7 +160,7 @@ async fn with_request_id(request: Request, next: Next) -> Response {
     histogram!("meniscus_http_request_seconds", "route" => route).record(elapsed.as_secs_f64());
     // What changes something is told; reading is told to those who ask for it.
     span.in_scope(|| {
-        if method == Method::GET || method == Method::HEAD {
+        if is_reading {
             tracing::debug!(status, ?elapsed, "answered");
         } else {
             tracing::info!(status, ?elapsed, made, "answered");

@@ -7,7 +7,9 @@ use tracing_subscriber::EnvFilter;
 /// Starts logging. A second call changes nothing.
 pub fn start() {
     let filter = EnvFilter::try_from_env("MENISCUS_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
-    let builder = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // A log that cannot be written (its disk is full) must not end anything: no words about it on standard error.
+    let builder =
+        tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).log_internal_errors(false);
     let json = std::env::var("MENISCUS_LOG_FORMAT").is_ok_and(|format| format == "json");
     // Tests may have set a subscriber of their own.
     let _ = if json { builder.json().try_init() } else { builder.with_ansi(false).try_init() };

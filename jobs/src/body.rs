@@ -183,7 +183,8 @@ pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Resul
     default_limit(&mut limits, "memory_bytes", allowance.memory_bytes, &mut errors);
     let estimate = scene.as_ref().map(|scene| scene.estimate(&sizes));
     if let (Some(estimate), Some(memory)) = (estimate, limits.get("memory_bytes").and_then(Value::as_u64)) {
-        let needed = WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes);
+        // An estimate is good within a quarter.
+        let needed = WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes).saturating_mul(5) / 4;
         if needed > memory {
             let detail = format!(
                 "about {} particles need {needed} bytes, the limit is {memory} (/limits/memory_bytes); a larger spacing or a narrower band needs less",
@@ -223,7 +224,7 @@ pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Resul
         family: format!("{}/{}", of_scene["kind"].as_str().unwrap_or_default(), of_scene["dimension"]),
         threads,
         memory_bytes: WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes),
-        disk_bytes: forecast::disk_bytes(&estimate, &output, &checkpoint),
+        disk_bytes: forecast::disk_bytes(of_scene["dimension"].as_u64().unwrap_or(2), &estimate, &output, &checkpoint),
         time: None,
     };
     let mut resolved = Map::new();

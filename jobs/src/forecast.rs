@@ -75,24 +75,32 @@ pub(crate) fn is_at_moments(phase: &PhaseWork) -> bool {
 }
 
 /// Bytes of all files of a run: its frames, the checkpoints that are kept, and one more that is being written.
-pub(crate) fn disk_bytes(estimate: &Estimate, output: &Map<String, Value>, checkpoint: &Map<String, Value>) -> u64 {
+pub(crate) fn disk_bytes(
+    dimension: u64,
+    estimate: &Estimate,
+    output: &Map<String, Value>,
+    checkpoint: &Map<String, Value>,
+) -> u64 {
     const FILE: u64 = 24 << 10;
     let every = output.get("every_time").and_then(Value::as_f64).unwrap_or(f64::INFINITY);
     let frames = ((estimate.end_time / every).min(estimate.steps as f64) + 2.0) as u64;
     // Topology, position and the fields that were chosen; vectors and numbers weigh alike here.
     let fields = output.get("fields").and_then(Value::as_array).map_or(6, Vec::len) as u64;
-    let frame = 48 + 13 * fields;
+    let frame = 40 + 14 * fields;
     let kept = checkpoint.get("keep").and_then(Value::as_u64).unwrap_or(2);
     let written = if checkpoint.get("every_steps").is_some_and(|every| !every.is_null()) { kept } else { 1 };
     let state = estimate.particles.saturating_mul(STATE_BYTES);
     let frames_bytes = estimate.particles.saturating_mul(frame).saturating_add(FILE).saturating_mul(frames);
     let rows = estimate.steps / output.get("series_every_steps").and_then(Value::as_u64).unwrap_or(10).max(1) + 2;
     let checkpoints_bytes = state.saturating_add(FILE).saturating_mul(written);
+    // A picture shows every particle of the plane three times over, and a slice through those of space.
+    let picture = estimate.particles.saturating_mul(if dimension == 2 { 225 } else { 6 });
     // SQLite's whole numbers end at 2⁶³.
     frames_bytes
         .saturating_add(checkpoints_bytes)
         .saturating_add(rows.saturating_mul(160))
-        .saturating_add(200 << 10)
+        .saturating_add(picture)
+        .saturating_add(40 << 10)
         .min(1 << 62)
 }
 

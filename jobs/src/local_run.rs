@@ -35,6 +35,7 @@ pub fn run(scene: &Value, directory: &Path, threads: u64) -> Result<JobBody, Str
         checkpoints: Vec::new(),
         inputs: BTreeMap::new(),
         time: None,
+        reserve_bytes: 0,
         usage: Usage::default(),
     };
     match worker::run_attempt(&order, directory, &Control::default(), &mut Silent) {

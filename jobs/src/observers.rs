@@ -13,6 +13,7 @@ pub use control::Control;
 
 use crate::breakpoints::pass;
 use crate::checkpoint::Counters;
+use crate::process::free_space;
 use crate::records::{Record, RecordSink};
 use checkpoints::Checkpoints;
 use frames::Frames;
@@ -20,6 +21,7 @@ use meniscus::simulation::run::ObserverError;
 use meniscus::simulation::{Finding, Observer, Request, Simulation};
 use progress::ProgressMeter;
 use series::Series;
+use std::path::PathBuf;
 
 /// All observers of one attempt.
 pub struct Observers<'a> {
@@ -35,6 +37,12 @@ pub struct Observers<'a> {
     pub control: &'a Control,
     /// Where records go.
     pub sink: &'a mut dyn RecordSink,
+    /// Where the attempt writes, and the free space there that it leaves untouched.
+    pub directory: PathBuf,
+    /// Bytes.
+    pub reserve_bytes: u64,
+    /// Whether the run stops because the reserve is reached.
+    pub is_starved: bool,
     /// A restored step whose output was written before; None after it has passed.
     pub restored: Option<u64>,
 }
@@ -67,7 +75,8 @@ impl Observer for Observers<'_> {
                 Ok(())
             })?;
         }
-        let stopping = self.control.is_pausing() && !finished;
+        self.is_starved = !finished && free_space(&self.directory).is_some_and(|free| free < self.reserve_bytes);
+        let stopping = (self.control.is_pausing() || self.is_starved) && !finished;
         let wanted = self.control.take_checkpoint_request() || stopping || finished;
         if !is_repeat && self.checkpoints.is_due(step, wanted) {
             self.series.sync()?;

@@ -31,6 +31,9 @@ pub struct Order {
     /// What the run was forecast to take.
     #[serde(default)]
     pub time: Option<TimeForecast>,
+    /// Free space that the worker leaves untouched: the service needs it to write down what happened.
+    #[serde(default)]
+    pub reserve_bytes: u64,
     /// Cost of the attempts before.
     pub usage: Usage,
 }

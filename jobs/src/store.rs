@@ -17,6 +17,7 @@ pub mod rows;
 pub mod settle;
 pub mod studies;
 pub mod submission;
+mod together;
 pub mod transitions;
 pub mod uploads;
 
@@ -42,6 +43,10 @@ use ulid::Ulid;
 
 /// Name of the file in the data directory.
 pub const FILE_NAME: &str = "meniscus.sqlite";
+/// Size of the log from which on it is trimmed.
+const LONG_LOG_BYTES: u64 = 2 << 20;
+/// Pages of the log at which a commit trims it after all.
+const LONGEST_LOG_PAGES: i64 = 10_000;
 /// Connections for reading.
 const READERS: usize = 4;
 
@@ -49,8 +54,12 @@ const READERS: usize = 4;
 pub struct Store {
     directory: PathBuf,
     writer: Mutex<Connection>,
+    /// Small transactions that wait for the writer.
+    waiting: Mutex<Vec<together::Waiting>>,
     readers: Vec<Mutex<Connection>>,
     next_reader: std::sync::atomic::AtomicUsize,
+    /// Trims the log.
+    trimmer: Mutex<Connection>,
     ids: RisingIds,
     /// Counts changes; waiting clients watch it.
     changes: watch::Sender<u64>,
@@ -71,6 +80,9 @@ pub enum StoreError {
     /// An upload that a scene names was removed in the meantime.
     #[error("the upload is gone")]
     UploadGone,
+    /// A transaction that was shared with others failed.
+    #[error("the store failed: {0}")]
+    Together(String),
     /// A row does not say what it should.
     #[error("a stored value is unreadable: {0}")]
     Json(#[from] serde_json::Error),
@@ -100,8 +112,10 @@ impl Store {
         Ok(Self {
             directory: directory.to_owned(),
             writer: Mutex::new(writer),
+            waiting: Mutex::default(),
             readers,
             next_reader: std::sync::atomic::AtomicUsize::new(0),
+            trimmer: Mutex::new(connect(&path)?),
             ids,
             changes: watch::Sender::new(0),
         })
@@ -151,6 +165,31 @@ impl Store {
 
     fn next_id(&self) -> Ulid {
         self.ids.next()
+    }
+
+    /// What tells two versions of a job apart: its revision and the count of its progress.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn version(&self, id: &str) -> Result<Option<(i64, i64)>, StoreError> {
+        let connection = self.read();
+        Ok(connection
+            .prepare_cached("SELECT rev, progress_count FROM jobs WHERE id = ?1")?
+            .query_row([id], |row| Ok((row.get(0)?, row.get(1)?)))
+            .optional()?)
+    }
+
+    /// Brings what the log has into the store's file, beside everything else: a commit that did it would be late.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn trim_log(&self) -> Result<(), StoreError> {
+        let log = self.directory.join(format!("{FILE_NAME}-wal"));
+        if std::fs::metadata(log).is_ok_and(|meta| meta.len() > LONG_LOG_BYTES) {
+            let trimmer = self.trimmer.lock().unwrap_or_else(PoisonError::into_inner);
+            trimmer.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))?;
+        }
+        Ok(())
     }
 
     /// A job by id.
@@ -270,6 +309,7 @@ pub(crate) fn connect(path: &Path) -> Result<Connection, rusqlite::Error> {
     connection.pragma_update(None, "journal_mode", "WAL")?;
     connection.pragma_update(None, "synchronous", "FULL")?;
     connection.pragma_update(None, "foreign_keys", "ON")?;
+    connection.pragma_update(None, "wal_autocheckpoint", LONGEST_LOG_PAGES)?;
     connection.set_prepared_statement_cache_capacity(64);
     Ok(connection)
 }

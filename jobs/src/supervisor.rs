@@ -115,16 +115,24 @@ pub struct Supervisor {
     space_checked: Instant,
     /// When what is too old was last looked for.
     expired: Option<Instant>,
+    /// Whether something failed in this round.
+    is_troubled: bool,
     /// No worker is started before this time, after one could not be.
     start_again: Instant,
 }
 
 /// Time between two looks at workers without news.
 const TICK: Duration = Duration::from_millis(100);
+/// Least time between two rounds.
+const BREATH: Duration = Duration::from_millis(10);
 /// Time that running jobs have to checkpoint at a shutdown.
 const DRAIN: Duration = Duration::from_secs(15);
 /// Time that a worker has to end after its verdict.
 const LAST_WORDS: Duration = Duration::from_secs(5);
+/// Free space below which a worker's last words may not have been written.
+const ROOM_FOR_A_VERDICT: u64 = 1 << 20;
+/// Time without rounds after one in which something failed.
+const TROUBLE_PAUSE: Duration = Duration::from_millis(400);
 /// Time between two looks for what is kept no longer.
 const EXPIRY_INTERVAL: Duration = Duration::from_secs(600);
 /// Time without starts after one that failed.
@@ -146,6 +154,7 @@ impl Supervisor {
             draining: false,
             space_checked: now,
             expired: None,
+            is_troubled: false,
             start_again: now,
         }
     }
@@ -195,20 +204,36 @@ impl Supervisor {
         let mut drain_until = None;
         loop {
             let wait = if self.running.is_empty() { 5 * TICK } else { TICK };
-            match self.receiver.recv_timeout(wait) {
-                Ok(Message::News) | Err(RecvTimeoutError::Timeout) => {}
-                Ok(Message::Checkpoint(job)) => {
-                    if let Some(running) = self.running.iter_mut().find(|r| r.job == job) {
-                        running.worker.say("checkpoint");
+            let first = self.receiver.recv_timeout(wait);
+            // A thousand submissions in a second are a hundred rounds, not a thousand.
+            std::thread::sleep(BREATH);
+            let mut messages: Vec<Message> = self.receiver.try_iter().collect();
+            match first {
+                Ok(message) => messages.push(message),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => messages.push(Message::Shutdown),
+            }
+            for message in messages {
+                match message {
+                    Message::News => {}
+                    Message::Checkpoint(job) => {
+                        if let Some(running) = self.running.iter_mut().find(|r| r.job == job) {
+                            running.worker.say("checkpoint");
+                        }
                     }
-                }
-                Ok(Message::Shutdown) | Err(RecvTimeoutError::Disconnected) => {
-                    self.draining = true;
-                    drain_until = Some(Instant::now() + DRAIN);
+                    Message::Shutdown => {
+                        self.draining = true;
+                        drain_until = Some(Instant::now() + DRAIN);
+                    }
                 }
             }
             if let Err(error) = self.tick() {
                 tracing::error!(%error, "the supervisor could not finish its round");
+                self.is_troubled = true;
+            }
+            if std::mem::take(&mut self.is_troubled) {
+                // What failed once a tenth of a second ago fails again now.
+                std::thread::sleep(TROUBLE_PAUSE);
             }
             if self.draining && (self.running.is_empty() || drain_until.is_some_and(|end| Instant::now() >= end)) {
                 return;
@@ -226,6 +251,7 @@ impl Supervisor {
                 // One job's trouble is not another's.
                 Err(error) => {
                     tracing::error!(job = self.running[k].job, %error, "a worker could not be attended");
+                    self.is_troubled = true;
                 }
             }
         }
@@ -269,13 +295,19 @@ impl Supervisor {
         }
         let running = &mut self.running[k];
         if let Some(exit) = exit {
-            let reason = if exit.out_of_memory { Reason::WorkerOom } else { Reason::WorkerCrash };
+            // Without room a worker cannot leave a verdict either.
+            let is_full = process::free_space(self.store.directory()).is_some_and(|free| free < ROOM_FOR_A_VERDICT);
+            let loss = match (exit.out_of_memory, is_full) {
+                (true, _) => Loss { reason: Reason::WorkerOom, is_death: true },
+                (false, true) => Loss { reason: Reason::StorageEnospc, is_death: false },
+                (false, false) => Loss { reason: Reason::WorkerCrash, is_death: true },
+            };
             if imported.is_whole {
                 leftovers::remove(&self.store, &running.job)?;
             }
             self.book_disk(k)?;
             let running = &self.running[k];
-            self.store.settle(&running.job, running.epoch, Loss { reason, is_death: true })?;
+            self.store.settle(&running.job, running.epoch, loss)?;
             tracing::info!(job = running.job, attempt = running.epoch, ?exit, "worker ended");
             return Ok(true);
         }
@@ -409,6 +441,7 @@ impl Supervisor {
             may_start_afresh: job.restarted_from.is_none(),
             inputs: self.store.inputs(&job.id)?,
             time: serde_json::from_value(job.estimate["time"].clone()).unwrap_or_default(),
+            reserve_bytes: self.settings.disk_reserve_bytes,
             usage: job.usage,
         })
     }

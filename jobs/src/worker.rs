@@ -164,7 +164,7 @@ fn attempt(
         log.line(&format!("{ending:?} at step {}", simulation.clock().step));
         match ending {
             Ending::Stopped if control.interrupt().is_raised() => Ok(Verdict::Canceled),
-            Ending::Stopped => Ok(Verdict::Paused { reason: None }),
+            Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),
             Ending::Finished => {
                 finish(order, directory, simulation.as_ref(), &mut observers, threads, log)?;
                 Ok(Verdict::Succeeded)
@@ -291,6 +291,9 @@ fn prepare<'a>(
         progress: ProgressMeter::new(order.usage, counters.phases.clone(), order.time.clone()),
         control,
         sink,
+        directory: directory.to_owned(),
+        reserve_bytes: order.reserve_bytes,
+        is_starved: false,
         restored: start.is_own.then_some(start.step),
     })
 }

@@ -2,6 +2,7 @@
 
 use crate::closest_point::PcpMethod;
 use crate::closest_point::method::NeighborhoodChoice;
+use crate::polynomials::Solver;
 use crate::polynomials::multi_index::term_count;
 use crate::scene::work::{Course, PhaseWork};
 use crate::simulation::OutputPlan;
@@ -25,10 +26,14 @@ pub fn redistancing<const D: usize>(
     let neighbors = ball * method.even_cutoff_h::<D>().powi(D as i32);
     // Material fits are of the level and of every coordinate.
     let fields = if let NeighborhoodChoice::Material { .. } = method.neighborhood { 1.0 + D as f64 } else { 1.0 };
-    // Moments and right-hand sides by the neighbour, the factorisation, and the gathering of neighbours.
-    let fit = neighbors * (moments + fields * terms + 16.0) + terms.powi(3) / 6.0 + fields * terms.powi(2);
-    // A few Newton steps with gradient and Hessian, and the search for the nearest sample.
-    let query = 64.0 + fields * terms * (4.0 + D as f64);
+    // By the neighbour: gathering, moments and right-hand sides in vector lanes; the factorisation; or Householder's
+    // reflections. A unit is about a nanosecond, as measured over degrees 3 to 6 in two and three dimensions.
+    let fit = match method.solver {
+        Solver::Moments => neighbors * (40.0 + 0.3 * moments + 0.5 * fields * terms) + 0.02 * terms.powi(3),
+        Solver::Orthogonal => 1.1 * neighbors * terms.powi(2),
+    };
+    // The search for the nearest sample, and a few Newton steps with gradient and Hessian.
+    let query = 300.0 + 5.0 * fields * terms;
     let phase = |phase: &'static str, units: f64| PhaseWork { phase, units: units * times, course };
     vec![
         phase("redistancing/detection", particles),

@@ -7,8 +7,13 @@ mod support;
 
 mod files;
 mod jobs;
+mod access;
+mod contract;
+mod estimates;
 mod readers;
 mod requests;
+mod studies;
+mod uploads;
 mod verify;
 
 use support::Service;

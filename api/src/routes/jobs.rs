@@ -6,8 +6,9 @@ use crate::error::{ApiError, Problem, ProblemItem};
 use crate::routes::{Page, StoreSources, job, with_store};
 use crate::views::{JobList, JobView};
 use axum::Json;
+use axum::body::Bytes;
 use axum::extract::{Path, Query, Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use meniscus::scene::Violation;
 use meniscus::scene::check::closest;
@@ -42,9 +43,8 @@ pub async fn submit(State(application): State<Application>, request: Request) ->
         let mut body = body?;
         body.forecast.time_by(&store.calibration()?);
         check_room(&here, store, 1, body.forecast.disk_bytes)?;
-        let answer =
-            |row: &JobRow| kept(StatusCode::CREATED, Some(format!("/v1/jobs/{}", row.id)), &JobView::from(row.clone()));
-        creation.answer(store.submit(&NewJob::of(&body), creation.once.as_ref(), answer)?)
+        let answer = |row: JobRow| kept(StatusCode::CREATED, Some(format!("/v1/jobs/{}", row.id)), &JobView::from(row));
+        creation.answer(store.submit(NewJob::of(&body), creation.once.clone(), answer)?)
     })
     .await?;
     application.supervisor.wake();
@@ -160,8 +160,9 @@ fn filter(query: &[(String, String)]) -> Result<JobFilter, ApiError> {
     if errors.is_empty() { Ok(filter) } else { Err(ApiError::Invalid(errors)) }
 }
 
-fn tag(row: &JobRow) -> String {
-    format!("\"{}-{}\"", row.rev, row.progress_count)
+/// The entity tag of a version.
+fn tag((rev, progress): (i64, i64)) -> String {
+    format!("\"{rev}-{progress}\"")
 }
 
 /// The revision of a tag `"REV-PROGRESS"`.
@@ -184,26 +185,36 @@ pub async fn get(
     let wait = text(header::HeaderName::from_static("prefer"))
         .and_then(|prefer| prefer.split(',').find_map(|p| p.trim().strip_prefix("wait=")?.parse::<u64>().ok()));
     let mut changes = application.store.watch();
-    let mut row = job(&application, &id).await?;
+    // Two numbers by their key are read in less time than it takes to hand that to another thread.
+    let look = || application.store.version(&id)?.ok_or(ApiError::NotFound("job"));
+    let mut version = look()?;
     if let (Some(known), Some(wait)) = (&known, wait) {
         let mut stopping = application.stopping.clone();
         let deadline = tokio::time::sleep(Duration::from_secs(wait.min(LONGEST_WAIT)));
         tokio::pin!(deadline);
-        while tag_revision(known) == Some(row.rev) {
+        while tag_revision(known) == Some(version.0) {
             tokio::select! {
                 () = &mut deadline => break,
                 _ = stopping.changed() => break,
-                _ = changes.changed() => row = job(&application, &id).await?,
+                _ = changes.changed() => version = look()?,
             }
         }
-        row = job(&application, &id).await?;
-    } else if known.as_deref() == Some(tag(&row).as_str()) {
-        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag(&row))]).into_response());
+        version = look()?;
+    } else if known.as_deref() == Some(tag(version).as_str()) {
+        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag(version))]).into_response());
     }
-    let tag = HeaderValue::from_str(&tag(&row)).map_err(|e| ApiError::Internal(e.to_string()))?;
-    let mut response = Json(JobView::from(row)).into_response();
-    response.headers_mut().insert(header::ETAG, tag);
-    Ok(response)
+    if let Some(bytes) = application.shown.get(&id, version) {
+        return Ok(shown(version, bytes));
+    }
+    let row = job(&application, &id).await?;
+    let version = (row.rev, row.progress_count);
+    let bytes: Bytes = serde_json::to_vec(&JobView::from(row)).map_err(|e| ApiError::Internal(e.to_string()))?.into();
+    application.shown.put(&id, version, bytes.clone());
+    Ok(shown(version, bytes))
+}
+
+fn shown(version: (i64, i64), bytes: Bytes) -> Response {
+    ([(header::CONTENT_TYPE, "application/json".to_owned()), (header::ETAG, tag(version))], bytes).into_response()
 }
 
 /// Deletes a terminal job and its files; never cancels.

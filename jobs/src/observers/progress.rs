@@ -8,6 +8,8 @@ use meniscus::simulation::Simulation;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
+/// Seconds of stepping after which their speed tells that of the machine.
+const TELLING_S: f64 = 1.0;
 /// Least time between two records.
 const INTERVAL: Duration = Duration::from_millis(400);
 
@@ -108,7 +110,9 @@ impl ProgressMeter {
             let stepping = forecast.cpu_s - moments.iter().map(|moment| moment.all).sum::<f64>();
             stepping * clock_per_cpu / simulation.end().step.max(1) as f64
         });
-        let pace = if forecast_per_step > 0.0 { (per_step / forecast_per_step).clamp(0.5, 3.0) } else { 1.0 };
+        // The first steps tell little: caches are cold, files are opened.
+        let is_telling = seconds >= TELLING_S && forecast_per_step > 0.0;
+        let pace = if is_telling { (per_step / forecast_per_step).clamp(0.5, 3.0) } else { 1.0 };
         let to_come: f64 = moments.iter().map(|moment| (moment.all - moment.spent).max(0.0)).sum();
         let eta = left as f64 * per_step + to_come * clock_per_cpu * pace;
         let basis = if moments.is_empty() {

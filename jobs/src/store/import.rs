@@ -108,7 +108,9 @@ impl Store {
         let text = serde_json::to_string(usage)?;
         self.write(|transaction| {
             transaction
-                .prepare_cached("UPDATE jobs SET usage = ?3 WHERE id = ?1 AND attempt = ?2")?
+                .prepare_cached(
+                    "UPDATE jobs SET usage = ?3, progress_count = progress_count + 1 WHERE id = ?1 AND attempt = ?2",
+                )?
                 .execute(params![job, epoch as i64, text])?;
             Ok(())
         })
@@ -241,7 +243,7 @@ impl Store {
                 let mut warnings: Vec<String> = serde_json::from_str(&warnings)?;
                 warnings.push(message.clone());
                 transaction.execute(
-                    "UPDATE jobs SET warnings = ?2 WHERE id = ?1",
+                    "UPDATE jobs SET warnings = ?2, progress_count = progress_count + 1 WHERE id = ?1",
                     params![job, serde_json::to_string(&warnings)?],
                 )?;
                 of.tell(transaction, "warning", &json!({"code": code, "message": message}))?;

@@ -80,6 +80,13 @@ fn lose(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), Chang
     if matches!(reason, Reason::LimitMemory | Reason::WorkerOom) {
         return step(Trigger::Fail, reason, None).map(|_| ());
     }
+    if reason == Reason::StorageEnospc {
+        // It rests until there is room; whoever asked for a pause before keeps it.
+        let kept = row.reason.filter(|asked| *asked == Reason::UserPause).unwrap_or(reason);
+        step(Trigger::Lose, kept, None)?;
+        step(Trigger::Requeue, kept, None)?;
+        return step(Trigger::Pause, kept, None).map(|_| ());
+    }
     // A worker that was ended because it did not rest in time has not died of itself.
     let was_pausing = row.state == State::Pausing;
     let reason = if was_pausing { row.reason.unwrap_or(reason) } else { reason };

@@ -64,17 +64,20 @@ impl Store {
     /// [`StoreError`].
     pub fn submit(
         &self,
-        job: &NewJob,
-        once: Option<&Once>,
-        answer: impl FnOnce(&JobRow) -> KeptAnswer,
+        job: NewJob,
+        once: Option<Once>,
+        answer: impl FnOnce(JobRow) -> KeptAnswer + Send + 'static,
     ) -> Result<Made, StoreError> {
         let id = format!("job_{}", self.next_id());
-        let start = self.prepare_start(&id, job)?;
-        let made = self.make_once(once, |transaction| {
-            insert(transaction, &id, job, start.as_deref())?;
-            let row = rows::job(transaction, &id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
-            Ok(answer(&row))
-        });
+        let start = self.prepare_start(&id, &job)?;
+        let (sha256, new) = (start.clone(), id.clone());
+        let made = self.write_together(Box::new(move |transaction| {
+            once_in(transaction, once.as_ref(), |transaction| {
+                insert(transaction, &new, &job, sha256.as_deref())?;
+                let row = rows::job(transaction, &new)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
+                Ok(answer(row))
+            })
+        }));
         if start.is_some() && !matches!(made, Ok(Made::New(_))) {
             remove_directory(&self.job_directory(&id))?;
         }
@@ -87,16 +90,7 @@ impl Store {
         once: Option<&Once>,
         work: impl FnOnce(&Transaction) -> Result<KeptAnswer, StoreError>,
     ) -> Result<Made, StoreError> {
-        self.write(|transaction| {
-            if let Some(made) = once.map(|once| answers::recall(transaction, once)).transpose()?.flatten() {
-                return Ok(made);
-            }
-            let answer = work(transaction)?;
-            if let Some(once) = once {
-                answers::keep(transaction, once, &answer)?;
-            }
-            Ok(Made::New(answer))
-        })
+        self.write(|transaction| once_in(transaction, once, work))
     }
 
     /// The answer that was given under a client's key before, so that nothing needs to be worked out again.
@@ -133,6 +127,22 @@ impl Store {
         crate::artifacts::sync_directory(&folder)?;
         Ok(Some(sha256))
     }
+}
+
+/// Carries out work in a transaction, unless the client's key says that it was done before.
+fn once_in(
+    transaction: &Transaction,
+    once: Option<&Once>,
+    work: impl FnOnce(&Transaction) -> Result<KeptAnswer, StoreError>,
+) -> Result<Made, StoreError> {
+    if let Some(made) = once.map(|once| answers::recall(transaction, once)).transpose()?.flatten() {
+        return Ok(made);
+    }
+    let answer = work(transaction)?;
+    if let Some(once) = once {
+        answers::keep(transaction, once, &answer)?;
+    }
+    Ok(Made::New(answer))
 }
 
 /// Writes the row, the first event and the inputs of a job.
@@ -189,12 +199,10 @@ pub(super) fn insert(
 impl Store {
     /// Makes a job for a test.
     pub(crate) fn submit_row(&self, body: &JobBody) -> JobRow {
-        let mut made = None;
-        let answer = |row: &JobRow| {
-            made = Some(row.clone());
-            KeptAnswer { status: 201, location: None, body: row.id.clone() }
-        };
-        self.submit(&NewJob::of(body), None, answer).unwrap();
-        made.unwrap()
+        let answer = |row: JobRow| KeptAnswer { status: 201, location: None, body: row.id };
+        match self.submit(NewJob::of(body), None, answer).unwrap() {
+            Made::New(kept) => self.job(&kept.body).unwrap().unwrap(),
+            other => panic!("{other:?}"),
+        }
     }
 }

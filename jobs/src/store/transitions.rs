@@ -2,7 +2,7 @@
 
 use super::{JobRow, Store, StoreError, events, rows, studies};
 use crate::job::{Reason, State, Trigger};
-use rusqlite::{Transaction, params};
+use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 
 /// Why a change was not made.
@@ -53,7 +53,10 @@ impl Store {
     /// # Errors
     /// [`ChangeError`].
     pub fn change(&self, id: &str, trigger: Trigger, change: &Change) -> Result<JobRow, ChangeError> {
-        self.write(|transaction| apply(transaction, id, trigger, change))
+        self.write(|transaction| {
+            apply(transaction, id, trigger, change)?;
+            rows::job(transaction, id)?.ok_or(ChangeError::NotFound)
+        })
     }
 
     /// Takes the next job of the queue whose memory and disk (in bytes) fit and whose study has a free place, as a new
@@ -158,13 +161,8 @@ impl Store {
     }
 }
 
-pub(super) fn apply(
-    transaction: &Transaction,
-    id: &str,
-    trigger: Trigger,
-    change: &Change,
-) -> Result<JobRow, ChangeError> {
-    let job = rows::job(transaction, id)?.ok_or(ChangeError::NotFound)?;
+pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, change: &Change) -> Result<(), ChangeError> {
+    let job = standing(transaction, id)?.ok_or(ChangeError::NotFound)?;
     if change.epoch.is_some_and(|epoch| epoch != job.attempt) {
         return Err(ChangeError::Stale);
     }
@@ -201,7 +199,7 @@ pub(super) fn apply(
             now,
             to.is_terminal(),
             deaths,
-            if trigger == Trigger::Resume { job.usage.wall_s } else { job.leg_wall_s },
+            if trigger == Trigger::Resume { job.wall_s } else { job.leg_wall_s },
         ])?;
     if changed != 1 {
         return Err(ChangeError::Stale);
@@ -216,5 +214,42 @@ pub(super) fn apply(
     {
         studies::note_failure(transaction, study)?;
     }
-    rows::job(transaction, id)?.ok_or(ChangeError::NotFound)
+    Ok(())
+}
+
+/// What a transition needs to know of a job: a study changes ten thousand at once.
+struct Standing {
+    rev: i64,
+    state: State,
+    reason: Option<Reason>,
+    message: Option<String>,
+    attempt: u64,
+    deaths: u32,
+    wall_s: f64,
+    leg_wall_s: f64,
+    study: Option<String>,
+}
+
+fn standing(transaction: &Transaction, id: &str) -> Result<Option<Standing>, ChangeError> {
+    let found = transaction
+        .prepare_cached(
+            "SELECT rev, state, reason, message, attempt, deaths, leg_wall_s, study,
+                 COALESCE(json_extract(usage, '$.wall_s'), 0.0) AS wall_s FROM jobs WHERE id = ?1",
+        )?
+        .query_row([id], |row| {
+            let (state, reason): (String, Option<String>) = (row.get("state")?, row.get("reason")?);
+            Ok(Standing {
+                rev: row.get("rev")?,
+                state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
+                reason: reason.as_deref().and_then(Reason::from_word),
+                message: row.get("message")?,
+                attempt: row.get::<_, i64>("attempt")? as u64,
+                deaths: row.get("deaths")?,
+                wall_s: row.get("wall_s")?,
+                leg_wall_s: row.get("leg_wall_s")?,
+                study: row.get("study")?,
+            })
+        })
+        .optional()?;
+    Ok(found)
 }

@@ -1,0 +1,44 @@
+//! The OpenAPI document against the running service, by schemathesis: whatever fits the document, and much that does not,
+//! gets an answer that the document has, and never a 5xx.
+
+use crate::service;
+use std::process::Command;
+
+#[test]
+fn schemathesis_finds_no_failure() {
+    let Ok(python) = std::env::var("MENISCUS_PYTHON") else {
+        assert!(
+            std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none(),
+            "MENISCUS_PYTHON is not set"
+        );
+        return;
+    };
+    let (_directory, service) = service(&["--slots", "1"]);
+    let examples = std::env::var("MENISCUS_EXAMPLES").unwrap_or_else(|_| "20".to_owned());
+    let tool = std::path::Path::new(&python).with_file_name("schemathesis");
+    let output = Command::new(tool)
+        .arg("run")
+        .arg(format!("{}/openapi.json", service.url))
+        .args([
+            "--max-examples",
+            &examples,
+            "--seed",
+            "1",
+            "--workers",
+            "1",
+            "--no-color",
+            "--phases",
+            "examples,coverage,fuzzing",
+        ])
+        // Streams go on for as long as the service does.
+        .args(["--request-timeout", "20", "--max-response-time", "10"])
+        .args([
+            "--checks",
+            "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance",
+        ])
+        .current_dir(service.data.clone())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+}
