@@ -1,11 +1,6 @@
 //! How fast the service answers, beside what was promised: `make load`, or `cargo bench --bench service`. The release
 //! binary over a real socket, 32 connections from this process, on the same cores as the service and its workers.
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    missing_docs,
-    reason = "a measurement that fails stops, and shows"
-)]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement that fails stops, and shows")]
 
 #[path = "../tests/support/service.rs"]
 #[expect(dead_code, reason = "a part is used")]
@@ -124,7 +119,6 @@ struct Row {
     is_met: bool,
 }
 
-#[expect(clippy::too_many_lines, reason = "one measurement after another, on one store")]
 fn main() {
     if std::env::args().any(|argument| argument == "--list" || argument == "--test") {
         return;

@@ -61,6 +61,9 @@ pub trait Scene: Send + Sync {
     /// Size of the run; `sizes` tells of points that come from outside.
     fn estimate(&self, sizes: &CloudSizes) -> Estimate;
 
+    /// Runs of one family cost about the same for a unit of work: kind, dimension, and what the method makes of them.
+    fn family(&self) -> String;
+
     /// Work of the run by phase, for a plan of output.
     fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork>;
 

@@ -4,7 +4,6 @@
 #![expect(clippy::unwrap_used, reason = "a proof fails by panicking")]
 
 #[path = "faults/common.rs"]
-#[expect(dead_code, reason = "each test target uses a part")]
 mod common;
 #[path = "faults/proofs/mod.rs"]
 mod proofs;

@@ -221,7 +221,7 @@ pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Resul
     let forecast = Forecast {
         estimate,
         work: scene.work(&plan, &sizes),
-        family: format!("{}/{}", of_scene["kind"].as_str().unwrap_or_default(), of_scene["dimension"]),
+        family: scene.family(),
         threads,
         memory_bytes: WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes),
         disk_bytes: forecast::disk_bytes(of_scene["dimension"].as_u64().unwrap_or(2), &estimate, &output, &checkpoint),

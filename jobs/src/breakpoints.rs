@@ -4,13 +4,15 @@
 use std::fs::OpenOptions;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Passages of the place that is wanted, so far.
+static PASSED: AtomicU64 = AtomicU64::new(0);
+
 /// Passes a place. `MENISCUS_BREAK=NAME:N:FILE` ends the process, as `kill -9` would, at the N-th passage of NAME, once:
 /// FILE is made then, and where it is there already nothing happens any more.
 pub fn pass(name: &str) {
     if !cfg!(debug_assertions) {
         return;
     }
-    static PASSED: AtomicU64 = AtomicU64::new(0);
     let Ok(wanted) = std::env::var("MENISCUS_BREAK") else { return };
     let mut parts = wanted.splitn(3, ':');
     let (Some(place), Some(number), Some(file)) = (parts.next(), parts.next(), parts.next()) else { return };

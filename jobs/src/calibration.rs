@@ -42,6 +42,11 @@ fn wall(threads: u64) -> String {
     format!("wall@{threads}")
 }
 
+/// The first two parts of a family's name.
+fn kind_and_dimension(family: &str) -> &str {
+    family.match_indices('/').nth(1).map_or(family, |(end, _)| &family[..end])
+}
+
 impl Calibration {
     /// From what was kept.
     #[must_use]
@@ -55,16 +60,20 @@ impl Calibration {
         self.known.is_empty()
     }
 
-    /// Seconds of a unit: of this family, else over all.
+    /// Seconds of a unit: of this family, else of the same kind in the same dimension, else over all.
     fn seconds_per_unit(&self, family: &str, phase: &str) -> Option<f64> {
         let ratio = |m: Measured| (m.work > 0.0).then_some(m.seconds / m.work);
         if let Some(found) = self.known.get(&(family.to_owned(), phase.to_owned())).and_then(|m| ratio(*m)) {
             return Some(found);
         }
-        let alike = self.known.iter().filter(|((_, name), _)| name == phase).map(|(_, m)| *m);
-        ratio(
-            alike.fold(Measured::default(), |a, b| Measured { work: a.work + b.work, seconds: a.seconds + b.seconds }),
-        )
+        let over = |is_alike: &dyn Fn(&str) -> bool| {
+            let alike = self.known.iter().filter(|((other, name), _)| name == phase && is_alike(other));
+            let add = |a: Measured, b: &Measured| Measured { work: a.work + b.work, seconds: a.seconds + b.seconds };
+            ratio(alike.map(|(_, m)| m).fold(Measured::default(), add))
+        };
+        // The same kind in the same dimension by another method is nearer than anything else.
+        let nearest = kind_and_dimension(family);
+        over(&|other| kind_and_dimension(other) == nearest).or_else(|| over(&|_| true))
     }
 
     /// The time of a run; None while a phase that it has was never measured.

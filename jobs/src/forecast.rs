@@ -1,6 +1,7 @@
 //! What a run will take, before it is made: particles, steps, memory, disk, and time by what was measured before.
 
 use crate::calibration::Calibration;
+use crate::formats::hdf5_file::CHUNK_ROWS;
 use meniscus::scene::work::Course;
 use meniscus::scene::{Estimate, PhaseWork};
 use serde::{Deserialize, Serialize};
@@ -82,6 +83,7 @@ pub(crate) fn disk_bytes(
     checkpoint: &Map<String, Value>,
 ) -> u64 {
     const FILE: u64 = 24 << 10;
+    const CHUNK: u64 = CHUNK_ROWS as u64;
     let every = output.get("every_time").and_then(Value::as_f64).unwrap_or(f64::INFINITY);
     let frames = ((estimate.end_time / every).min(estimate.steps as f64) + 2.0) as u64;
     // Topology, position and the fields that were chosen; vectors and numbers weigh alike here.
@@ -89,8 +91,11 @@ pub(crate) fn disk_bytes(
     let frame = 40 + 14 * fields;
     let kept = checkpoint.get("keep").and_then(Value::as_u64).unwrap_or(2);
     let written = if checkpoint.get("every_steps").is_some_and(|every| !every.is_null()) { kept } else { 1 };
-    let state = estimate.particles.saturating_mul(STATE_BYTES);
-    let frames_bytes = estimate.particles.saturating_mul(frame).saturating_add(FILE).saturating_mul(frames);
+    // Data sets grow by whole chunks: a part of the last stays empty.
+    let rows_of = estimate.particles;
+    let rows_of = if rows_of > CHUNK { rows_of.saturating_add(CHUNK / 4) } else { rows_of };
+    let state = rows_of.saturating_mul(STATE_BYTES);
+    let frames_bytes = rows_of.saturating_mul(frame).saturating_add(FILE).saturating_mul(frames);
     let rows = estimate.steps / output.get("series_every_steps").and_then(Value::as_u64).unwrap_or(10).max(1) + 2;
     let checkpoints_bytes = state.saturating_add(FILE).saturating_mul(written);
     // A picture shows every particle of the plane three times over, and a slice through those of space.

@@ -241,7 +241,7 @@ fn axes(mode: &str, axes: &Value, errors: &mut Vec<Violation>) -> Vec<SweepPoint
         match values.as_array().filter(|values| !values.is_empty()) {
             Some(values) => lists.push((pointer, values)),
             None => {
-                errors.push(Violation::new(at, "type", "an axis has a list of values", values, json!([0.02, 0.01])))
+                errors.push(Violation::new(at, "type", "an axis has a list of values", values, json!([0.02, 0.01])));
             }
         }
     }
@@ -301,8 +301,8 @@ fn understand(
 /// object of that type when something inside it is set.
 fn place_value(body: &mut Value, pointer: &str, value: &Value) -> bool {
     let mut slot = body;
-    let mut parts = pointer.split('/').skip(1).map(|part| part.replace("~1", "/").replace("~0", "~")).peekable();
-    while let Some(part) = parts.next() {
+    let parts = pointer.split('/').skip(1).map(|part| part.replace("~1", "/").replace("~0", "~"));
+    for part in parts {
         if let Value::String(word) = slot {
             *slot = json!({"type": word});
         }

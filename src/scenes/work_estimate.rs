@@ -10,6 +10,18 @@ use crate::simulation::OutputPlan;
 /// Everything that is not booked to a phase: reading, building the particles, writing the report and the picture.
 pub const REST: &str = "rest";
 
+/// What of a method decides what a unit of its work costs.
+#[must_use]
+pub fn method_name(method: &PcpMethod) -> String {
+    let neighborhood = match method.neighborhood {
+        NeighborhoodChoice::Radius { .. } => "radius",
+        NeighborhoodChoice::Nearest { .. } => "nearest",
+        NeighborhoodChoice::Material { .. } => "material",
+    };
+    let solver = if method.solver == Solver::Moments { "moments" } else { "orthogonal" };
+    format!("{neighborhood}/{solver}")
+}
+
 /// Redistancings of `particles` in a band of half width `reach_h` spacings, `times` over.
 #[must_use]
 pub fn redistancing<const D: usize>(
@@ -30,7 +42,7 @@ pub fn redistancing<const D: usize>(
     // reflections. A unit is about a nanosecond, as measured over degrees 3 to 6 in two and three dimensions.
     let fit = match method.solver {
         Solver::Moments => neighbors * (40.0 + 0.3 * moments + 0.5 * fields * terms) + 0.02 * terms.powi(3),
-        Solver::Orthogonal => 1.1 * neighbors * terms.powi(2),
+        Solver::Orthogonal => (if D == 2 { 1.7 } else { 0.9 }) * neighbors * terms.powi(2),
     };
     // The search for the nearest sample, and a few Newton steps with gradient and Hessian.
     let query = 300.0 + 5.0 * fields * terms;

@@ -6,7 +6,6 @@ use crate::support::seed;
 macro_rules! quick {
     ($($name:ident),* $(,)?) => {
         $(#[test]
-        #[expect(clippy::print_stdout, reason = "what was measured belongs to the test")]
         fn $name() {
             let proof = PROOFS.iter().find(|proof| proof.name == stringify!($name)).unwrap();
             println!("{}: {}", proof.name, (proof.run)(proof.quick, seed()));

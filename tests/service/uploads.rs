@@ -146,9 +146,9 @@ fn hostile_files_are_refused_before_anything_else_is_opened() {
         let name = name.trim_end_matches(".h5");
         if inspect("hostile", name, "points")["ready"].is_object() {
             if case["opens_other_files"] == true {
-                opened.push(name.to_owned())
+                opened.push(name.to_owned());
             } else {
-                let_through.push(name.to_owned())
+                let_through.push(name.to_owned());
             }
         }
     }

@@ -25,7 +25,7 @@ pub fn write<T: H5Type>(group: &Group, name: &str, components: usize, values: &[
 }
 
 /// Rows of a chunk at most.
-const CHUNK_ROWS: usize = 1 << 16;
+pub const CHUNK_ROWS: usize = 1 << 16;
 
 /// The bytes of numbers as they stand in the file, for digests (this program runs on little-endian machines only).
 #[must_use]

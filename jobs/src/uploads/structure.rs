@@ -6,6 +6,8 @@
 //! After the HDF5 File Format Specification, version 3.0. Accepted are superblocks 0 to 3, object headers 1 and 2, groups as
 //! symbol tables and as compact links, and compact, contiguous and chunked layouts of numbers.
 
+mod data_set;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -370,29 +372,6 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         }
     }
 
-    fn filters(&self, place: &str, message: &Message) -> Result<(), Refusal> {
-        let torn = || self.damaged(place, message.at, "the filter pipeline is torn");
-        let mut cursor = numbers(&message.data);
-        let version = cursor.number(1).ok_or_else(torn)?;
-        let count = cursor.number(1).ok_or_else(torn)?;
-        if version == 1 {
-            cursor.skip(6).ok_or_else(torn)?;
-        }
-        for _ in 0..count {
-            let id = cursor.number(2).ok_or_else(torn)? as u16;
-            if !FILTERS.contains(&id) {
-                let what = format!("filter {id} (accepted are deflate, shuffle and Fletcher-32)");
-                return Err(self.unaccepted(place, what));
-            }
-            let name = if version == 1 { cursor.number(2).ok_or_else(torn)? as usize } else { 0 };
-            cursor.skip(2).ok_or_else(torn)?;
-            let values = cursor.number(2).ok_or_else(torn)? as usize;
-            let padding = if version == 1 && values % 2 == 1 { 4 } else { 0 };
-            cursor.skip(name.next_multiple_of(8) + 4 * values + padding).ok_or_else(torn)?;
-        }
-        Ok(())
-    }
-
     /// Name and address of a hard link.
     fn link(&self, place: &str, message: &Message) -> Result<(String, u64), Refusal> {
         let torn = || self.damaged(place, message.at, "a link is torn");
@@ -469,93 +448,6 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             other => Err(self.unaccepted(&format!("{place}/{name}"), format!("a link of class {other}"))),
         }
     }
-
-    fn data_set(&self, place: &str, space: &Message, kind: &Message, layout: &Message) -> Result<DataSet, Refusal> {
-        let extent = self.extent(place, space)?;
-        let torn = || self.damaged(place, kind.at, "the data type is torn");
-        let mut cursor = numbers(&kind.data);
-        let class = cursor.number(1).ok_or_else(torn)? & 15;
-        cursor.skip(3).ok_or_else(torn)?;
-        let element_bytes = cursor.number(4).ok_or_else(torn)?;
-        let is_number = matches!(class, 0 | 1) && (1..=8).contains(&element_bytes);
-        if !is_number && !(class == 3 && element_bytes <= 1 << 16) {
-            let what = format!("elements of data type class {class} and {element_bytes} bytes (accepted are numbers)");
-            return Err(self.unaccepted(place, what));
-        }
-        let data_set = DataSet { extent, element_bytes, is_float: class == 1 };
-        if data_set.elements().saturating_mul(element_bytes) > LARGEST_DATA {
-            return Err(self.unaccepted(place, format!("an extent of {:?}", data_set.extent)));
-        }
-        self.layout(place, layout, &data_set)?;
-        Ok(data_set)
-    }
-
-    fn extent(&self, place: &str, space: &Message) -> Result<Vec<u64>, Refusal> {
-        let torn = || self.damaged(place, space.at, "the extent is torn");
-        let mut cursor = numbers(&space.data);
-        let version = cursor.number(1).ok_or_else(torn)?;
-        let rank = cursor.number(1).ok_or_else(torn)?;
-        cursor
-            .skip(match version {
-                1 => 6,
-                2 => 2,
-                _ => return Err(self.unaccepted(place, format!("extent version {version}"))),
-            })
-            .ok_or_else(torn)?;
-        if rank > 4 {
-            return Err(self.unaccepted(place, format!("{rank} dimensions")));
-        }
-        (0..rank).map(|_| cursor.number(8).ok_or_else(torn)).collect()
-    }
-
-    fn layout(&self, place: &str, layout: &Message, data_set: &DataSet) -> Result<(), Refusal> {
-        let torn = || self.damaged(place, layout.at, "the layout is torn");
-        let mut cursor = numbers(&layout.data);
-        let version = cursor.number(1).ok_or_else(torn)?;
-        if !matches!(version, 3 | 4) {
-            return Err(self.unaccepted(place, format!("layout version {version}")));
-        }
-        match cursor.number(1).ok_or_else(torn)? {
-            0 => Ok(()),
-            1 => {
-                let (at, size) = cursor.number(8).zip(cursor.number(8)).ok_or_else(torn)?;
-                let fits = at == UNDEFINED || at.checked_add(size).is_some_and(|end| end <= self.file.size());
-                if fits {
-                    Ok(())
-                } else {
-                    Err(self.damaged(place, layout.at, "its data reach beyond the end of the file"))
-                }
-            }
-            2 => {
-                let width = if version == 3 {
-                    4
-                } else {
-                    cursor.skip(1).ok_or_else(torn)?;
-                    0
-                };
-                let rank = cursor.number(1).ok_or_else(torn)?;
-                let width = if version == 3 {
-                    cursor.skip(8).ok_or_else(torn)?;
-                    width
-                } else {
-                    cursor.number(1).ok_or_else(torn)? as usize
-                };
-                if !(1..=8).contains(&width) || rank as usize != data_set.extent.len() + 1 {
-                    return Err(self.damaged(place, layout.at, "its chunks do not fit its extent"));
-                }
-                let mut bytes = 1_u64;
-                for _ in 0..rank {
-                    bytes = bytes.saturating_mul(cursor.number(width).ok_or_else(torn)?);
-                }
-                if bytes == 0 || bytes > LARGEST_BLOCK {
-                    return Err(self.unaccepted(place, format!("chunks of {bytes} bytes")));
-                }
-                Ok(())
-            }
-            3 => Err(self.unaccepted(place, "a virtual layout (its data lie in other files)")),
-            other => Err(self.unaccepted(place, format!("layout class {other}"))),
-        }
-    }
 }
 
 fn shown(place: &str) -> String {
@@ -563,45 +455,4 @@ fn shown(place: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{Refusal, read};
-    use crate::formats::hdf5_file::write;
-
-    fn sample() -> Vec<u8> {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("x.h5");
-        let file = hdf5::File::create(&path).unwrap();
-        let group = file.create_group("VTKHDF").unwrap();
-        write(&group, "Points", 3, &[0.5; 30]).unwrap();
-        write(&group, "Empty", 1, &[0_u64; 0]).unwrap();
-        for k in 0..40 {
-            file.create_group(&format!("g{k}")).unwrap();
-        }
-        drop(group);
-        file.close().unwrap();
-        std::fs::read(&path).unwrap()
-    }
-
-    #[test]
-    fn our_own_files_are_understood() {
-        let structure = read(sample().as_slice()).unwrap_or_else(|refusal| panic!("{refusal}"));
-        let points = &structure.data_sets["/VTKHDF/Points"];
-        assert_eq!((points.extent.as_slice(), points.element_bytes, points.is_float), ([10, 3].as_slice(), 8, true));
-        assert_eq!(structure.data_sets["/VTKHDF/Empty"].elements(), 0);
-        assert_eq!(structure.groups.len(), 42);
-    }
-
-    #[test]
-    fn whatever_is_cut_or_turned_is_refused_or_understood_and_never_a_panic() {
-        let bytes = sample();
-        for length in 0..bytes.len() {
-            assert!(read(&bytes[..length]).is_err(), "{length}");
-        }
-        for k in (0..bytes.len() * 8).step_by(11) {
-            let mut broken = bytes.clone();
-            broken[k / 8] ^= 1 << (k % 8);
-            let _ = read(broken.as_slice());
-        }
-        assert_eq!(read(b"solid".as_slice()), Err(Refusal::NotHdf5));
-    }
-}
+mod tests;

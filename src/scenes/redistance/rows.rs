@@ -257,5 +257,6 @@ pub(super) fn calibration() -> Vec<Value> {
         json!({"kind": "redistance", "spacing": 0.0078125, "repeat": 20}),
         json!({"kind": "redistance", "dimension": 3, "spacing": 0.04, "repeat": 2}),
         json!({"kind": "redistance", "spacing": 0.0078125, "method": "remesh"}),
+        json!({"kind": "redistance", "preset": "paper", "spacing": 0.0078125, "repeat": 3}),
     ]
 }

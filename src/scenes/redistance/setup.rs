@@ -207,6 +207,10 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         }
     }
 
+    fn family(&self) -> String {
+        format!("redistance/{D}/{}", work_estimate::method_name(&self.method))
+    }
+
     fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = self.estimate(sizes);
         let particles = particles as f64;

@@ -268,6 +268,10 @@ impl<const D: usize> Scene for VortexScene<D> {
         }
     }
 
+    fn family(&self) -> String {
+        format!("vortex/{D}/{}", work_estimate::method_name(&self.method))
+    }
+
     fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = self.estimate(sizes);
         let particles = particles as f64;
@@ -288,11 +292,13 @@ impl<const D: usize> Scene for VortexScene<D> {
         };
         let reach_h = self.reach() / self.lattice.spacing;
         let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, times, course);
-        work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages));
+        // A rigid motion is known without sines of every place.
+        let is_rigid = flow.as_ref().is_some_and(|flow| flow.is_rigid());
+        let pace = if is_rigid { 0.25 } else { 1.0 };
+        work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages * pace));
         work.push(PhaseWork { phase: "measure", units: particles * times, course });
         // At these times the exact front is carried along; a flow that is back or rigid needs none.
         let is_returned = turn.is_some_and(|turn| (end_time / turn - (end_time / turn).round()).abs() < 1e-9);
-        let is_rigid = flow.as_ref().is_some_and(|flow| flow.is_rigid());
         let at_end = if is_returned { 0.0 } else { end_time };
         let path = if is_rigid { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
         let points = if D == 2 { self.front_points() } else { 0.0 };

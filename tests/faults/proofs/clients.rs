@@ -1,6 +1,6 @@
 //! What clients do: read slowly or never, lose their connection, send everything twice.
 
-use crate::support::{Service, chance, endless_job, eventually, steady_job};
+use crate::support::{Answer, Service, chance, endless_job, eventually, steady_job};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Write};
@@ -109,7 +109,7 @@ pub fn one_key(count: u64, seed: u64) -> String {
         let threads: Vec<_> = (0..count).map(|_| scope.spawn(|| send(&service, &body))).collect();
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
     });
-    let texts: BTreeSet<String> = answers.iter().map(|answer| answer.text()).collect();
+    let texts: BTreeSet<String> = answers.iter().map(Answer::text).collect();
     assert_eq!(texts.len(), 1, "{texts:?}");
     assert!(answers.iter().all(|answer| answer.status == 201));
     let replayed = answers.iter().filter(|answer| answer.header("idempotent-replayed") == Some("true")).count() as u64;
