@@ -38,10 +38,8 @@ pub struct ProblemItem {
     /// A sentence fragment for people.
     pub detail: String,
     /// What stands there.
-    #[schema(value_type = Object)]
     pub got: Value,
     /// What would be accepted.
-    #[schema(value_type = Object)]
     pub allowed: Value,
     /// A known name spelled alike.
     #[serde(skip_serializing_if = "Option::is_none")]

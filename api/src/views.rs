@@ -32,10 +32,8 @@ pub struct JobView {
     /// Labels.
     pub labels: BTreeMap<String, String>,
     /// The body as sent.
-    #[schema(value_type = Object)]
     pub spec: Value,
     /// The body with every default.
-    #[schema(value_type = Object)]
     pub resolved: Value,
     /// How far it is.
     pub progress: ProgressView,
@@ -154,7 +152,6 @@ pub struct EventView {
     /// Attempt.
     pub attempt: u64,
     /// Particulars.
-    #[schema(value_type = Object)]
     pub data: Value,
 }
 
@@ -263,14 +260,12 @@ pub struct SceneKindView {
     /// One line.
     pub title: &'static str,
     /// JSON Schema 2020-12 with defaults and ranges.
-    #[schema(value_type = Object)]
     pub schema: Value,
     /// Presets.
     pub presets: Vec<&'static str>,
     /// Fields that a restart may change.
     pub restart_safe: Vec<String>,
     /// A job body that runs in seconds.
-    #[schema(value_type = Object)]
     pub example: Value,
 }
 

@@ -26,10 +26,8 @@ pub struct StudyView {
     /// Share of the points that have ended.
     pub fraction: f64,
     /// The body that all points share.
-    #[schema(value_type = Object)]
     pub base: Value,
     /// The sweep as sent.
-    #[schema(value_type = Object)]
     pub sweep: Value,
     /// Pointers that vary.
     pub axes: Vec<String>,
@@ -38,7 +36,6 @@ pub struct StudyView {
     /// `continue` or `stop`.
     pub on_failure: String,
     /// What all points were estimated to take.
-    #[schema(value_type = Object)]
     pub estimate: Value,
     /// RFC 3339, UTC.
     pub created_at: String,
@@ -59,10 +56,8 @@ pub struct StudyList {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct DryRunView {
     /// The values of every point, by pointer.
-    #[schema(value_type = Vec<Object>)]
     pub points: Vec<Value>,
     /// What all points would take.
-    #[schema(value_type = Object)]
     pub estimate: Value,
 }
 
@@ -78,7 +73,6 @@ pub struct UploadView {
     /// Why it was rejected.
     pub reason: Option<String>,
     /// What was found in it.
-    #[schema(value_type = Object)]
     pub found: Value,
     /// Name.
     pub name: Option<String>,
@@ -107,7 +101,6 @@ pub struct UploadList {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct EstimateView {
     /// The body with every default.
-    #[schema(value_type = Object)]
     pub resolved: Value,
     /// Particles.
     pub particles: u64,
