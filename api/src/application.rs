@@ -61,7 +61,7 @@ pub enum ServeError {
 /// Time between two looks at the store's log.
 const LOG_INTERVAL: Duration = Duration::from_millis(250);
 /// Archives at once.
-const ARCHIVES: usize = 8;
+const ARCHIVES: usize = 6;
 /// Time that open answers have to end after the supervisor has.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
@@ -141,12 +141,15 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
 
 /// Keeps the store's log short, on a thread of its own, for as long as there is a store.
 fn trim_the_log(store: &Arc<Store>) -> std::io::Result<()> {
+    let mut changes = store.watch();
     let store = Arc::downgrade(store);
     std::thread::Builder::new().name("log-trimmer".to_owned()).spawn(move || {
         loop {
             std::thread::sleep(LOG_INTERVAL);
             let Some(store) = store.upgrade() else { return };
-            if let Err(error) = store.trim_log() {
+            let is_idle = !changes.has_changed().unwrap_or(true);
+            changes.mark_unchanged();
+            if let Err(error) = store.trim_log(is_idle) {
                 tracing::warn!(%error, "the store's log could not be trimmed");
             }
         }

@@ -120,7 +120,7 @@ enum Command {
 }
 
 /// Threads that wait for the disk at most: more would only take memory.
-const BLOCKING_THREADS: usize = 32;
+const BLOCKING_THREADS: usize = 16;
 
 /// Reads the arguments and does what they say.
 #[must_use]

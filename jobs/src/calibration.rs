@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Work and the CPU seconds that it took.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -125,9 +126,12 @@ pub fn measured(estimate: &Value, cost: &Value, threads: u64) -> Vec<PhaseMeasur
 
 /// The name of this machine for calibration: processor and number of cores.
 #[must_use]
-pub fn machine() -> String {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    format!("{} x {cores}", process::cpu_name().unwrap_or_else(|| "unknown".to_owned()))
+pub fn machine() -> &'static str {
+    static NAME: OnceLock<String> = OnceLock::new();
+    NAME.get_or_init(|| {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        format!("{} x {cores}", process::cpu_name().unwrap_or_else(|| "unknown".to_owned()))
+    })
 }
 
 /// Measures this machine by the short runs that every kind of scene names, in a directory that is emptied again.

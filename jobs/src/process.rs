@@ -3,6 +3,7 @@
 use rustix::process::{getpriority_process, setpriority_process};
 use rustix::time::{ClockId, clock_gettime};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// CPU seconds of this process, all threads.
 #[must_use]
@@ -47,7 +48,8 @@ pub fn available_memory() -> Option<u64> {
 /// Memory of the machine.
 #[must_use]
 pub fn total_memory() -> Option<u64> {
-    meminfo("MemTotal")
+    static TOTAL: OnceLock<Option<u64>> = OnceLock::new();
+    *TOTAL.get_or_init(|| meminfo("MemTotal"))
 }
 
 fn meminfo(name: &str) -> Option<u64> {

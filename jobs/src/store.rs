@@ -33,10 +33,12 @@ pub use uploads::{NewUpload, UploadRow};
 use crate::body::{Origin, RestartSource};
 use crate::job::State;
 use ids::RisingIds;
+use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::watch;
 use ulid::Ulid;
@@ -45,17 +47,19 @@ use ulid::Ulid;
 pub const FILE_NAME: &str = "meniscus.sqlite";
 /// Size of the log from which on it is trimmed.
 const LONG_LOG_BYTES: u64 = 2 << 20;
+/// Size from which on it is trimmed though somebody writes.
+const LONGEST_LOG_BYTES: u64 = 128 << 20;
 /// Pages of the log at which a commit trims it after all.
-const LONGEST_LOG_PAGES: i64 = 10_000;
+const LONGEST_LOG_PAGES: i64 = 65_536;
 /// Connections for reading.
 const READERS: usize = 4;
 
 /// The store of a data directory.
 pub struct Store {
     directory: PathBuf,
-    writer: Mutex<Connection>,
+    writer: Arc<Mutex<Connection>>,
     /// Small transactions that wait for the writer.
-    waiting: Mutex<Vec<together::Waiting>>,
+    waiting: Mutex<Sender<together::Waiting>>,
     readers: Vec<Mutex<Connection>>,
     next_reader: std::sync::atomic::AtomicUsize,
     /// Trims the log.
@@ -108,16 +112,17 @@ impl Store {
         let mut writer = connect(&path)?;
         migrations::apply(&mut writer)?;
         let ids = RisingIds::above(&writer)?;
+        let (writer, changes) = (Arc::new(Mutex::new(writer)), watch::Sender::new(0));
         let readers = (0..READERS).map(|_| connect(&path).map(Mutex::new)).collect::<Result<_, _>>()?;
         Ok(Self {
             directory: directory.to_owned(),
-            writer: Mutex::new(writer),
-            waiting: Mutex::default(),
+            waiting: together::start(Arc::clone(&writer), changes.clone())?,
+            writer,
             readers,
             next_reader: std::sync::atomic::AtomicUsize::new(0),
             trimmer: Mutex::new(connect(&path)?),
             ids,
-            changes: watch::Sender::new(0),
+            changes,
         })
     }
 
@@ -179,13 +184,15 @@ impl Store {
             .optional()?)
     }
 
-    /// Brings what the log has into the store's file, beside everything else: a commit that did it would be late.
+    /// Brings what the log has into the store's file while nobody writes: commits beside it would be late. Only a very long
+    /// log is trimmed in any case.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn trim_log(&self) -> Result<(), StoreError> {
+    pub fn trim_log(&self, is_idle: bool) -> Result<(), StoreError> {
         let log = self.directory.join(format!("{FILE_NAME}-wal"));
-        if std::fs::metadata(log).is_ok_and(|meta| meta.len() > LONG_LOG_BYTES) {
+        let least = if is_idle { LONG_LOG_BYTES } else { LONGEST_LOG_BYTES };
+        if std::fs::metadata(log).is_ok_and(|meta| meta.len() > least) {
             let trimmer = self.trimmer.lock().unwrap_or_else(PoisonError::into_inner);
             trimmer.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))?;
         }
@@ -310,6 +317,8 @@ pub(crate) fn connect(path: &Path) -> Result<Connection, rusqlite::Error> {
     connection.pragma_update(None, "synchronous", "FULL")?;
     connection.pragma_update(None, "foreign_keys", "ON")?;
     connection.pragma_update(None, "wal_autocheckpoint", LONGEST_LOG_PAGES)?;
+    // A plan does not depend on the values that are asked for: else statements are prepared anew for every one.
+    connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_QPSG, true)?;
     connection.set_prepared_statement_cache_capacity(64);
     Ok(connection)
 }

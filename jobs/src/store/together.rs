@@ -1,10 +1,12 @@
-//! Many small transactions as one: those who wait for the writer hand their work to whoever has it, and all become durable
-//! by one commit. Each stands in a savepoint of its own, so that one that fails takes nothing of the others away.
+//! Many small transactions as one: a thread of its own takes all that wait, and all become durable by one commit. Each
+//! stands in a savepoint of its own, so that one that fails takes nothing of the others away.
 
 use super::{Made, Store, StoreError};
-use rusqlite::{Transaction, TransactionBehavior};
-use std::sync::PoisonError;
-use std::sync::mpsc::{SyncSender, sync_channel};
+use rusqlite::{Connection, Transaction, TransactionBehavior};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use tokio::sync::watch;
 
 /// Work in a transaction that others may share.
 pub(super) type SharedWork = Box<dyn FnOnce(&Transaction) -> Result<Made, StoreError> + Send>;
@@ -15,51 +17,68 @@ pub(super) struct Waiting {
     reply: SyncSender<Result<Made, StoreError>>,
 }
 
-impl Store {
-    /// Runs work together with that of others; it is durable when this returns.
-    pub(super) fn write_together(&self, work: SharedWork) -> Result<Made, StoreError> {
-        let (reply, answer) = sync_channel(1);
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).push(Waiting { work, reply });
-        let mut connection = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
-        let all = std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
-        // Empty where somebody else had the writer and has done ours.
-        if !all.is_empty() {
-            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate);
-            let mut done = Vec::with_capacity(all.len());
-            let committed = transaction.and_then(|transaction| {
-                for Waiting { work, reply } in all {
-                    done.push((in_savepoint(&transaction, work), reply));
-                }
-                transaction.commit()
-            });
-            drop(connection);
-            match committed {
-                Ok(()) => {
-                    self.changes.send_modify(|count| *count += 1);
-                    for (result, reply) in done {
-                        // Whoever does not wait any more does not want to know.
-                        let _ = reply.send(result);
-                    }
-                }
-                Err(error) => {
-                    let text = error.to_string();
-                    for (_, reply) in done {
-                        let _ = reply.send(Err(StoreError::Together(text.clone())));
-                    }
-                    return Err(error.into());
+/// Transactions of one commit at most.
+const MOST_AT_ONCE: usize = 256;
+
+/// Starts the thread; it ends when the sender is dropped.
+pub(super) fn start(
+    writer: Arc<Mutex<Connection>>,
+    changes: watch::Sender<u64>,
+) -> std::io::Result<Mutex<Sender<Waiting>>> {
+    let (sender, receiver) = channel();
+    std::thread::Builder::new().name("committer".to_owned()).spawn(move || commit_all(&writer, &changes, &receiver))?;
+    Ok(Mutex::new(sender))
+}
+
+fn commit_all(writer: &Mutex<Connection>, changes: &watch::Sender<u64>, receiver: &Receiver<Waiting>) {
+    while let Ok(first) = receiver.recv() {
+        let mut connection = writer.lock().unwrap_or_else(PoisonError::into_inner);
+        // Whoever came while the writer was taken comes along.
+        let all: Vec<Waiting> = std::iter::once(first).chain(receiver.try_iter().take(MOST_AT_ONCE)).collect();
+        let mut done = Vec::with_capacity(all.len());
+        let mut waiting = all.into_iter();
+        let committed = connection.transaction_with_behavior(TransactionBehavior::Immediate).and_then(|transaction| {
+            for Waiting { work, reply } in waiting.by_ref() {
+                done.push((in_savepoint(&transaction, work), reply));
+            }
+            transaction.commit()
+        });
+        drop(connection);
+        match committed {
+            Ok(()) => {
+                changes.send_modify(|count| *count += 1);
+                for (result, reply) in done {
+                    // Whoever does not wait any more does not want to know.
+                    let _ = reply.send(result);
                 }
             }
-        } else {
-            drop(connection);
+            Err(error) => {
+                let all = done.into_iter().map(|(_, reply)| reply).chain(waiting.map(|one| one.reply));
+                for reply in all {
+                    let _ = reply.send(Err(StoreError::Together(error.to_string())));
+                }
+            }
         }
-        answer.recv().map_err(|_| StoreError::Together("the transaction was not begun".to_owned()))?
     }
 }
 
 fn in_savepoint(transaction: &Transaction, work: SharedWork) -> Result<Made, StoreError> {
     transaction.execute_batch("SAVEPOINT one")?;
-    let result = work(transaction);
+    // A defect in one must not take the others, or this thread, along.
+    let result = catch_unwind(AssertUnwindSafe(|| work(transaction)))
+        .unwrap_or_else(|_| Err(StoreError::Together("a transaction panicked".to_owned())));
     let end = if result.is_ok() { "RELEASE one" } else { "ROLLBACK TO one; RELEASE one" };
     transaction.execute_batch(end)?;
     result
+}
+
+impl Store {
+    /// Runs work together with that of others; it is durable when this returns.
+    pub(super) fn write_together(&self, work: SharedWork) -> Result<Made, StoreError> {
+        let (reply, answer) = sync_channel(1);
+        let gone = || StoreError::Together("nobody commits any more".to_owned());
+        let sender = self.waiting.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        sender.send(Waiting { work, reply }).map_err(|_| gone())?;
+        answer.recv().map_err(|_| gone())?
+    }
 }
