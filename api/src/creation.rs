@@ -3,6 +3,7 @@
 use crate::access::{Budget, Client};
 use crate::application::Application;
 use crate::error::{ApiError, ProblemItem};
+use crate::routes::with_store;
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
@@ -19,6 +20,8 @@ pub struct Creation {
     pub bytes: Vec<u8>,
     /// The client's key, if it gave one.
     pub once: Option<Once>,
+    /// What was made under the key before.
+    pub known: Option<Made>,
     budget: Option<Budget>,
 }
 
@@ -33,18 +36,23 @@ impl Creation {
     pub async fn take(application: &Application, request: Request, limit: usize) -> Result<Self, ApiError> {
         let (parts, body) = request.into_parts();
         let client = parts.extensions.get::<Client>().cloned().unwrap_or_default();
-        let budget = spend(application, &client)?;
         let key = key_of(&parts.headers)?;
         let bytes = read(&parts.headers, body, limit).await?;
         let target = parts.uri.path_and_query().map_or("", |target| target.as_str());
         let once = key.map(|key| Once {
-            owner: client.0,
+            owner: client.0.clone(),
             key,
             request_sha256: digest::of_bytes(
                 &[parts.method.as_str().as_bytes(), target.as_bytes(), &bytes].join(&b'\n'),
             ),
         });
-        Ok(Self { bytes, once, budget })
+        // What was made before is told again, whatever else is left to the client.
+        let known = match once.clone() {
+            Some(once) => with_store(application, move |store| Ok(store.recall(&once)?)).await?,
+            None => None,
+        };
+        let budget = if known.is_some() { None } else { spend(application, &client)? };
+        Ok(Self { bytes, once, known, budget })
     }
 
     /// The body as JSON.

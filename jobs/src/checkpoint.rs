@@ -194,6 +194,16 @@ pub fn read(path: &Path, sha256: Option<&str>) -> Result<(Meta, State), Checkpoi
     Ok((meta, state))
 }
 
+/// The names of the arrays that a checkpoint's meta text has.
+///
+/// # Errors
+/// [`CheckpointError`].
+pub fn array_names(path: &Path) -> Result<Vec<String>, CheckpointError> {
+    let text = hdf5::File::open(path)?.dataset("meta")?.read_raw::<u8>()?;
+    let meta: Meta = serde_json::from_slice(&text)?;
+    Ok(meta.arrays.into_iter().map(|array| array.name).collect())
+}
+
 /// Whether a checkpoint's body and another describe runs of the same physics: equal but for restart-safe fields.
 #[must_use]
 pub fn is_same_scene(a: &Value, b: &Value) -> bool {

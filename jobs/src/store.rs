@@ -304,6 +304,12 @@ impl Store {
 }
 
 fn delete_rows(transaction: &Transaction, job: &str) -> rusqlite::Result<()> {
+    // The point of a study that it repeated is again what it was before.
+    transaction
+        .prepare_cached(
+            "UPDATE jobs SET superseded = 0 WHERE id = (SELECT retry_of FROM jobs WHERE id = ?1 AND superseded = 0)",
+        )?
+        .execute([job])?;
     for table in ["events", "files", "checkpoints", "inputs"] {
         transaction.prepare_cached(&format!("DELETE FROM {table} WHERE job = ?1"))?.execute([job])?;
     }

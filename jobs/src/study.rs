@@ -11,10 +11,15 @@ use crate::calibration::Calibration;
 use crate::store::{NewJob, NewStudy};
 use meniscus::scene::{Violation, check};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 /// Points of a study at most.
 pub const MOST_POINTS: usize = 10_000;
+/// Pointers that vary at most.
+const MOST_AXES: usize = 64;
+/// Bytes of a body, and of one value of an axis, at most: there are ten thousand of them.
+const LARGEST_BODY: usize = 64 << 10;
+const LARGEST_VALUE: usize = 16 << 10;
 /// Violations that are listed at most; the rest is counted.
 const MOST_VIOLATIONS: usize = 100;
 const FIELDS: [&str; 6] = ["base", "sweep", "max_parallel", "on_failure", "name", "labels"];
@@ -101,15 +106,25 @@ pub fn parse(
             Value::Null,
         ));
     }
-    let points = sweep(given.get("sweep"), &mut errors);
+    let base_bytes = base.to_string().len();
+    if base_bytes > LARGEST_BODY {
+        let detail = format!("a job body in a study has at most {LARGEST_BODY} bytes");
+        errors.push(Violation::new("/base", "range", detail, &json!(base_bytes), json!(LARGEST_BODY)));
+    }
+    let points = if errors.is_empty() { sweep(given.get("sweep"), &mut errors) } else { Vec::new() };
     if !errors.is_empty() {
         return Err(errors);
     }
     let mut axes: Vec<String> = Vec::new();
+    let mut seen: HashSet<&str> = HashSet::new();
     for (pointer, _) in points.iter().flat_map(|point| &point.values) {
-        if !axes.contains(pointer) {
+        if seen.insert(pointer) {
             axes.push(pointer.clone());
         }
+    }
+    if axes.len() > MOST_AXES {
+        let detail = format!("a study has at most {MOST_AXES} axes");
+        return Err(vec![Violation::new("/sweep", "range", detail, &json!(axes.len()), json!(MOST_AXES))]);
     }
     let mut jobs = Vec::with_capacity(points.len());
     let mut total = Total { cpu_s: Some(0.0), ..Total::default() };
@@ -191,6 +206,15 @@ fn check_pointer(pointer: &str, at: &str, errors: &mut Vec<Violation>) {
     }
 }
 
+/// Refuses a value that is too large to be had ten thousand times.
+fn check_value(value: &Value, at: &str, errors: &mut Vec<Violation>) {
+    // Numbers, the usual values, are not written out for that.
+    if !value.is_number() && value.to_string().len() > LARGEST_VALUE {
+        let detail = format!("a value of an axis has at most {LARGEST_VALUE} bytes");
+        errors.push(Violation::new(at, "range", detail, &Value::Null, json!(LARGEST_VALUE)));
+    }
+}
+
 fn too_many(count: usize, errors: &mut Vec<Violation>) -> bool {
     if count > MOST_POINTS {
         let detail = format!("a study has at most {MOST_POINTS} points");
@@ -220,6 +244,7 @@ fn list(points: &Value, errors: &mut Vec<Violation>) -> Vec<SweepPoint> {
         for (pointer, value) in map {
             let place = format!("{at}/{}", check::escaped(pointer));
             check_pointer(pointer, &place, errors);
+            check_value(value, &place, errors);
             one.values.push((pointer.clone(), value.clone()));
             one.places.push(place);
         }
@@ -239,7 +264,12 @@ fn axes(mode: &str, axes: &Value, errors: &mut Vec<Violation>) -> Vec<SweepPoint
         let at = format!("/sweep/axes/{}", check::escaped(pointer));
         check_pointer(pointer, &at, errors);
         match values.as_array().filter(|values| !values.is_empty()) {
-            Some(values) => lists.push((pointer, values)),
+            Some(values) => {
+                for (k, value) in values.iter().enumerate() {
+                    check_value(value, &format!("{at}/{k}"), errors);
+                }
+                lists.push((pointer, values));
+            }
             None => {
                 errors.push(Violation::new(at, "type", "an axis has a list of values", values, json!([0.02, 0.01])));
             }
@@ -416,6 +446,12 @@ mod tests {
             (json!({"base": base, "sweep": {"mode": "list", "points": []}}), "/sweep/points"),
             (json!({"base": base, "sweep": {"mode": "zip", "axes": {"/a": [1], "/b": [1, 2]}}}), "/sweep/axes/~1b"),
             (json!({"base": base, "sweep": {"mode": "grid", "axes": {"spacing": [1]}}}), "/sweep/axes/spacing"),
+            // Had ten thousand times, it would fill the memory.
+            (
+                json!({"base": base, "sweep": {"mode": "grid", "axes": {"/labels": [{"a": "x".repeat(20_000)}]}}}),
+                "/sweep/axes/~1labels/0",
+            ),
+            (json!({"base": {"name": "x".repeat(70_000)}, "sweep": {"mode": "list", "points": [{}]}}), "/base"),
             (json!({"base": 3, "sweep": {"mode": "list", "points": [{}]}}), "/base"),
             (json!({"base": base, "sweep": {"mode": "list", "points": [{}]}, "max_parallel": 0}), "/max_parallel"),
             (json!({"base": base, "sweep": {"mode": "list", "points": [{}]}, "on_failure": "panic"}), "/on_failure"),

@@ -30,11 +30,11 @@ const LONGEST_WAIT: u64 = 60;
         (status = 413, body = Problem), (status = 422, body = Problem), (status = 429, body = Problem),
         (status = 503, body = Problem), (status = 507, body = Problem)))]
 pub async fn submit(State(application): State<Application>, request: Request) -> Result<Response, ApiError> {
-    let creation = Creation::take(&application, request, BODY_LIMIT).await?;
+    let mut creation = Creation::take(&application, request, BODY_LIMIT).await?;
     let here = application.clone();
     let response = with_store(&application, move |store| {
         let spec = creation.json()?;
-        if let Some(made) = creation.once.as_ref().map(|once| store.recall(once)).transpose()?.flatten() {
+        if let Some(made) = creation.known.take() {
             return creation.answer(made);
         }
         let sources = StoreSources::new(store);

@@ -34,11 +34,11 @@ pub async fn submit(
 ) -> Result<Response, ApiError> {
     refuse_unknown(&query, &["dry_run"])?;
     let is_dry = flag(&query, "dry_run")?;
-    let creation = Creation::take(&application, request, BODY_LIMIT).await?;
+    let mut creation = Creation::take(&application, request, BODY_LIMIT).await?;
     let here = application.clone();
     let response = with_store(&application, move |store| {
         let spec = creation.json()?;
-        if let Some(made) = creation.once.as_ref().map(|once| store.recall(once)).transpose()?.flatten() {
+        if let Some(made) = creation.known.take() {
             return creation.answer(made);
         }
         let sources = StoreSources::new(store);
@@ -132,7 +132,7 @@ pub async fn table(
     let limit = crate::routes::number(&query, "limit")?.unwrap_or(ALL_POINTS).clamp(1, ALL_POINTS);
     let row = study(&application, id).await?;
     let table = with_store(&application, move |store| {
-        let points = store.points(&row.id, after, limit)?;
+        let points = store.points(&row, after, limit)?;
         Ok(table::compose(&row.axes, &points))
     })
     .await?;
@@ -158,7 +158,7 @@ pub async fn report(
     let row = study(&application, id).await?;
     let is_picture = accepts(&headers, "svg", "json");
     with_store(&application, move |store| {
-        let points = store.points(&row.id, None, ALL_POINTS)?;
+        let points = store.points(&row, None, ALL_POINTS)?;
         if !is_picture {
             return Ok(Json(report::compose(&row, &points)).into_response());
         }
@@ -224,18 +224,22 @@ pub async fn retry(
     request: Request,
 ) -> Result<Response, ApiError> {
     let row = study(&application, id).await?;
-    let creation = Creation::take(&application, request, BODY_LIMIT).await?;
+    let mut creation = Creation::take(&application, request, BODY_LIMIT).await?;
     let here = application.clone();
     let response = with_store(&application, move |store| {
+        if let Some(made) = creation.known.take() {
+            return creation.answer(made);
+        }
         let sources = StoreSources::new(store);
         let calibration = store.calibration()?;
         let mut new = Vec::new();
-        for point in store.points(&row.id, None, ALL_POINTS)? {
+        for point in store.points(&row, None, ALL_POINTS)? {
             let was_stopped = row.is_stopping && point.state == JobState::Canceled;
             if point.state != JobState::Failed && !was_stopped {
                 continue;
             }
-            let body = body::parse(&point.spec, here.config.allowance(), &sources);
+            let Some(old) = store.job(&point.job)? else { continue };
+            let body = body::parse(&old.spec, here.config.allowance(), &sources);
             sources.check()?;
             let mut body = body?;
             body.forecast.time_by(&calibration);

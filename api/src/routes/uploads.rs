@@ -62,8 +62,10 @@ pub async fn submit(
         return Err(ApiError::NoSpace { needed: announced.unwrap_or(0), room });
     }
     let (id, directory) = with_store(&application, |store| Ok(store.begin_upload()?)).await?;
+    // A client that goes away in the middle leaves nothing behind.
+    let mut leftover = Leftover { directory: Some(directory.clone()) };
     let path = directory.join(CONTENT);
-    let taken = take(body, path.clone(), limit.min(room), limit).await;
+    let taken = take(body, path.clone(), limit.min(room), limit, application.config.disk_reserve_bytes).await;
     let size_bytes = match taken {
         Ok(size) => size,
         Err(error) => {
@@ -71,6 +73,7 @@ pub async fn submit(
             return Err(error);
         }
     };
+    leftover.directory = None;
     let target = parts.uri.path_and_query().map_or_else(String::new, |target| target.as_str().to_owned());
     let made = with_store(&application, move |store| {
         let finished = artifacts::finish(&path).and_then(|()| digest::of_file(&path));
@@ -97,8 +100,25 @@ pub async fn submit(
     creation::answer(made, budget)
 }
 
+/// The directory of an upload that has not come to its end.
+struct Leftover {
+    directory: Option<PathBuf>,
+}
+
+impl Drop for Leftover {
+    fn drop(&mut self) {
+        if let Some(directory) = &self.directory {
+            // The next start sweeps what cannot be removed now.
+            let _ = std::fs::remove_dir_all(directory);
+        }
+    }
+}
+
+/// Bytes of an upload between two looks at the free space.
+const CHECK_BYTES: u64 = 16 << 20;
+
 /// Writes a body into an unfinished file; its size.
-async fn take(body: Body, path: PathBuf, most: u64, limit: u64) -> Result<u64, ApiError> {
+async fn take(body: Body, path: PathBuf, most: u64, limit: u64, reserve: u64) -> Result<u64, ApiError> {
     let mut file = tokio::fs::File::create(artifacts::unfinished(&path)).await?;
     let mut stream = body.into_data_stream();
     let mut size = 0_u64;
@@ -112,6 +132,13 @@ async fn take(body: Body, path: PathBuf, most: u64, limit: u64) -> Result<u64, A
             return Err(ApiError::NoSpace { needed: size, room: most });
         }
         file.write_all(&bytes).await?;
+        // Others write, too: what was room at the start may be gone.
+        if size / CHECK_BYTES != (size - bytes.len() as u64) / CHECK_BYTES {
+            let left = process::free_space(&path).unwrap_or(u64::MAX);
+            if left < reserve {
+                return Err(ApiError::NoSpace { needed: size, room: 0 });
+            }
+        }
     }
     file.flush().await?;
     if size == 0 {

@@ -100,7 +100,7 @@ impl Store {
         Ok(imported)
     }
 
-    /// Books what the service knows of an attempt's cost.
+    /// Books what the service knows of an attempt's cost. What is on the disk already is not needed once more.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -109,9 +109,11 @@ impl Store {
         self.write(|transaction| {
             transaction
                 .prepare_cached(
-                    "UPDATE jobs SET usage = ?3, progress_count = progress_count + 1 WHERE id = ?1 AND attempt = ?2",
+                    "UPDATE jobs SET usage = ?3, progress_count = progress_count + 1,
+                         disk_bytes = MAX(0, CAST(json_extract(estimate, '$.disk_bytes') AS INTEGER) - ?4)
+                     WHERE id = ?1 AND attempt = ?2",
                 )?
-                .execute(params![job, epoch as i64, text])?;
+                .execute(params![job, epoch as i64, text, usage.disk_bytes as i64])?;
             Ok(())
         })
     }

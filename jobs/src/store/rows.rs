@@ -82,6 +82,14 @@ pub struct JobRow {
     pub results: Option<Value>,
 }
 
+impl JobRow {
+    /// Bytes that its files will still need, beside what is there.
+    #[must_use]
+    pub fn disk_bytes_to_come(&self) -> u64 {
+        self.estimate["disk_bytes"].as_u64().unwrap_or(0).saturating_sub(self.usage.disk_bytes)
+    }
+}
+
 /// A published file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileRow {

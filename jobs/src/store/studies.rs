@@ -5,8 +5,9 @@ use super::submission::{NewJob, insert};
 use super::transitions::apply;
 use super::{Change, ChangeError, Store, StoreError, remove_directory, rows};
 use crate::job::{Reason, State, Trigger};
+use crate::records::{Progress, Usage};
 use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::collections::{BTreeMap, HashSet};
 
 /// A study.
@@ -63,7 +64,7 @@ pub struct NewStudy {
     pub jobs: Vec<NewJob>,
 }
 
-/// A point of a study with its latest job.
+/// A point of a study with its latest job: what tables and reports need, and no more, of ten thousand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointRow {
     /// Number of the point.
@@ -74,18 +75,18 @@ pub struct PointRow {
     pub state: State,
     /// Why, if not plain.
     pub reason: Option<String>,
-    /// The body as sent, axes included.
-    pub spec: Value,
-    /// The body with every default.
-    pub resolved: Value,
-    /// What was used.
-    pub usage: crate::records::Usage,
-    /// Particles, steps and so on, as estimated or reached.
+    /// Its value at every axis: as it was sent, else the default that it got.
+    pub values: Vec<Value>,
+    /// Its spacing.
+    pub spacing: Option<f64>,
+    /// CPU seconds and seconds by the clock.
+    pub spent: [f64; 2],
+    /// Particles as reached, else as estimated.
     pub particles: u64,
     /// Steps done.
     pub steps: u64,
-    /// Errors and cost.
-    pub results: Option<Value>,
+    /// Errors by `QUANTITY.NORM`, each at its latest time; None before the end.
+    pub errors: Option<Map<String, Value>>,
 }
 
 /// Jobs changed in one transaction: between two of them others get their turn.
@@ -159,19 +160,26 @@ impl Store {
             let start = self.prepare_start(&id, job)?;
             prepared.push((id, job, start));
         }
-        self.make_once(once, |transaction| {
+        let made = self.make_once(once, |transaction| {
             transaction.execute("UPDATE studies SET stopping = 0, rev = rev + 1 WHERE id = ?1", [study])?;
             for (id, job, start) in &prepared {
                 // Somebody else may have repeated it in the meantime.
                 let is_latest: bool = transaction
-                    .prepare_cached("SELECT NOT EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND superseded)")?
+                    .prepare_cached("SELECT EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND superseded = 0)")?
                     .query_row([&job.retry_of], |row| row.get(0))?;
                 if is_latest {
                     insert(transaction, id, job, start.as_deref())?;
                 }
             }
             Ok(answer(&study_of(transaction, study)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
-        })
+        });
+        // Directories of jobs that were not made after all.
+        for (id, ..) in prepared.iter().filter(|(.., start)| start.is_some()) {
+            if self.job(id)?.is_none() {
+                remove_directory(&self.job_directory(id))?;
+            }
+        }
+        made
     }
 
     /// A study by id.
@@ -201,16 +209,29 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn points(&self, study: &str, after: Option<u64>, limit: u64) -> Result<Vec<PointRow>, StoreError> {
-        let connection = self.read();
-        let mut statement = connection.prepare_cached(
-            "SELECT study_index, id, state, reason, spec, resolved, usage, progress, estimate, results FROM jobs
-             WHERE study = ?1 AND superseded = 0 AND study_index > ?2 ORDER BY study_index LIMIT ?3",
-        )?;
-        let after = after.map_or(-1, |after| i64::try_from(after).unwrap_or(i64::MAX));
-        let limit = i64::try_from(limit).unwrap_or(i64::MAX);
-        let rows = statement.query_map(params![study, after, limit], point_of)?;
-        Ok(rows.collect::<Result<_, _>>()?)
+    pub fn points(&self, study: &StudyRow, after: Option<u64>, limit: u64) -> Result<Vec<PointRow>, StoreError> {
+        let mut points = Vec::new();
+        let mut after = after.map_or(-1, |after| i64::try_from(after).unwrap_or(i64::MAX));
+        // A reader is held for a chunk, not for the whole: others read, too.
+        while (points.len() as u64) < limit {
+            let many = (limit - points.len() as u64).min(CHUNK as u64);
+            let connection = self.read();
+            let mut statement = connection.prepare_cached(
+                "SELECT study_index, id, state, reason, spec, resolved, usage, progress, estimate, results FROM jobs
+                 WHERE study = ?1 AND superseded = 0 AND study_index > ?2 ORDER BY study_index LIMIT ?3",
+            )?;
+            let rows = statement.query_map(params![study.id, after, many as i64], |row| point_of(row, &study.axes))?;
+            let before = points.len();
+            for row in rows {
+                let point = row?;
+                after = point.index as i64;
+                points.push(point);
+            }
+            if ((points.len() - before) as u64) < many {
+                break;
+            }
+        }
+        Ok(points)
     }
 
     /// Applies a trigger to every latest job of a study that the table lets it apply to.
@@ -228,6 +249,18 @@ impl Store {
             let all = rows.collect::<Result<Vec<_>, _>>()?;
             all.into_iter().filter(|(_, state)| from.contains(state.as_str())).map(|(id, _)| id).collect()
         };
+        if trigger == Trigger::Pause {
+            // Those that rest for want of space must not go on by themselves any more.
+            self.write(|transaction| -> Result<(), StoreError> {
+                let (asked, full) = (Reason::UserPause, Reason::StorageEnospc);
+                transaction.execute(
+                    "UPDATE jobs SET rev = rev + 1, reason = ?2, hint = ?3
+                     WHERE study = ?1 AND state = 'paused' AND reason = ?4",
+                    params![study, asked.word(), asked.hint(), full.word()],
+                )?;
+                Ok(())
+            })?;
+        }
         for chunk in ids.chunks(CHUNK) {
             self.write(|transaction| {
                 for id in chunk {
@@ -351,24 +384,40 @@ fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, Store
     Ok(Some(study))
 }
 
-fn point_of(row: &Row) -> rusqlite::Result<PointRow> {
+fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
     let state: String = row.get("state")?;
     let estimate: Value = rows::json(row, "estimate")?;
-    let progress: crate::records::Progress = rows::json(row, "progress")?;
+    let progress: Progress = rows::json(row, "progress")?;
+    let usage: Usage = rows::json(row, "usage")?;
+    let (spec, resolved): (Value, Value) = (rows::json(row, "spec")?, rows::json(row, "resolved")?);
+    let value_at = |pointer: &str| {
+        let sent = spec.pointer(pointer).filter(|value| !value.is_null());
+        sent.or_else(|| resolved.pointer(pointer)).cloned().unwrap_or(Value::Null)
+    };
+    let results: Option<Value> = rows::json(row, "results")?;
     Ok(PointRow {
         index: row.get::<_, i64>("study_index")? as u64,
         job: row.get("id")?,
         state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
         reason: row.get("reason")?,
-        spec: rows::json(row, "spec")?,
-        resolved: rows::json(row, "resolved")?,
-        usage: rows::json(row, "usage")?,
+        values: axes.iter().map(|axis| value_at(axis)).collect(),
+        spacing: value_at("/scene/spacing").as_f64(),
+        spent: [usage.cpu_s, usage.wall_s],
         particles: if progress.particles > 0 {
             progress.particles
         } else {
             estimate["particles"].as_u64().unwrap_or(0)
         },
         steps: progress.step,
-        results: rows::json(row, "results")?,
+        errors: results.map(|results| errors_of(&results)),
     })
+}
+
+/// Errors come in the order of their times: the latest stays.
+fn errors_of(results: &Value) -> Map<String, Value> {
+    let word = |error: &Value, name: &str| error[name].as_str().unwrap_or_default().to_owned();
+    let listed = results["errors"].as_array().into_iter().flatten();
+    listed
+        .map(|error| (format!("{}.{}", word(error, "quantity"), word(error, "norm")), error["value"].clone()))
+        .collect()
 }

@@ -40,6 +40,11 @@ fn commit_all(writer: &Mutex<Connection>, changes: &watch::Sender<u64>, receiver
         let committed = connection.transaction_with_behavior(TransactionBehavior::Immediate).and_then(|transaction| {
             for Waiting { work, reply } in waiting.by_ref() {
                 done.push((in_savepoint(&transaction, work), reply));
+                // A full disk can roll everything back in the middle: then nothing more must be begun, or it would be
+                // committed by itself.
+                if transaction.is_autocommit() {
+                    return Err(rusqlite::Error::ExecuteReturnedResults);
+                }
             }
             transaction.commit()
         });
@@ -54,8 +59,13 @@ fn commit_all(writer: &Mutex<Connection>, changes: &watch::Sender<u64>, receiver
             }
             Err(error) => {
                 let all = done.into_iter().map(|(_, reply)| reply).chain(waiting.map(|one| one.reply));
+                let text = if matches!(error, rusqlite::Error::ExecuteReturnedResults) {
+                    "the transaction was rolled back: database or disk is full".to_owned()
+                } else {
+                    error.to_string()
+                };
                 for reply in all {
-                    let _ = reply.send(Err(StoreError::Together(error.to_string())));
+                    let _ = reply.send(Err(StoreError::Together(text.clone())));
                 }
             }
         }
@@ -68,8 +78,10 @@ fn in_savepoint(transaction: &Transaction, work: SharedWork) -> Result<Made, Sto
     let result = catch_unwind(AssertUnwindSafe(|| work(transaction)))
         .unwrap_or_else(|_| Err(StoreError::Together("a transaction panicked".to_owned())));
     let end = if result.is_ok() { "RELEASE one" } else { "ROLLBACK TO one; RELEASE one" };
-    transaction.execute_batch(end)?;
-    result
+    match transaction.execute_batch(end) {
+        Err(error) if result.is_ok() => Err(error.into()),
+        _ => result,
+    }
 }
 
 impl Store {

@@ -1,7 +1,6 @@
 //! Speed against error over the points of a study: one line for every setting of the axes other than the spacing, with
 //! its fitted order.
 
-use super::table::{errors, value_at};
 use crate::formats::speed_error::{self, Lines, Point, fitted_order};
 use crate::store::{PointRow, StudyRow};
 use serde_json::{Value, json};
@@ -29,16 +28,16 @@ fn measure(study: &StudyRow, points: &[PointRow]) -> Measured {
         let others: Vec<String> = study
             .axes
             .iter()
-            .filter(|axis| *axis != SPACING)
-            .map(|axis| format!("{axis} = {}", value_at(point, axis)))
+            .zip(&point.values)
+            .filter(|(axis, _)| *axis != SPACING)
+            .map(|(axis, value)| format!("{axis} = {value}"))
             .collect();
         let label = if others.is_empty() { "all points".to_owned() } else { others.join(", ") };
-        let spacing = value_at(point, SPACING).as_f64().unwrap_or(f64::NAN);
-        let cpu_s = point.results.as_ref().and_then(|results| results["cost"]["cpu_s"].as_f64());
-        for (name, value) in errors(point) {
-            if let (Some(error), Some(cpu_s)) = (value.as_f64(), cpu_s) {
-                let run = Run { spacing, cpu_s, index: point.index, error };
-                measured.entry(name).or_default().entry(label.clone()).or_default().push(run);
+        let spacing = point.spacing.unwrap_or(f64::NAN);
+        for (name, value) in point.errors.iter().flatten() {
+            if let Some(error) = value.as_f64() {
+                let run = Run { spacing, cpu_s: point.spent[0], index: point.index, error };
+                measured.entry(name.clone()).or_default().entry(label.clone()).or_default().push(run);
             }
         }
     }
@@ -78,7 +77,7 @@ pub fn compose(study: &StudyRow, points: &[PointRow]) -> Value {
             json!({"quantity": quantity, "norm": norm, "lines": lines})
         })
         .collect();
-    let done = points.iter().filter(|point| point.results.is_some()).count();
+    let done = points.iter().filter(|point| point.errors.is_some()).count();
     json!({"study": study.id, "points": study.points, "with_results": done, "errors": quantities})
 }
 

@@ -15,48 +15,31 @@ pub struct Table {
     pub rows: Vec<Vec<Value>>,
 }
 
-/// The errors of a finished run, by `QUANTITY.NORM`, each at its latest time.
-#[must_use]
-pub fn errors(point: &PointRow) -> Map<String, Value> {
-    let mut found = Map::new();
-    let listed = point.results.as_ref().and_then(|results| results["errors"].as_array());
-    for error in listed.into_iter().flatten() {
-        let word = |name: &str| error[name].as_str().unwrap_or_default().to_owned();
-        // They come in the order of their times.
-        found.insert(format!("{}.{}", word("quantity"), word("norm")), error["value"].clone());
-    }
-    found
-}
-
-/// The value of a point at an axis: as it was sent, else the default that it got.
-#[must_use]
-pub fn value_at(point: &PointRow, pointer: &str) -> Value {
-    let sent = point.spec.pointer(pointer).filter(|value| !value.is_null());
-    sent.or_else(|| point.resolved.pointer(pointer)).cloned().unwrap_or(Value::Null)
-}
-
 /// The table of some points.
 #[must_use]
 pub fn compose(axes: &[String], points: &[PointRow]) -> Table {
-    let errors: Vec<Map<String, Value>> = points.iter().map(errors).collect();
-    let kinds: BTreeSet<&String> = errors.iter().flat_map(Map::keys).collect();
+    let kinds: BTreeSet<&String> =
+        points.iter().filter_map(|point| point.errors.as_ref()).flat_map(Map::keys).collect();
     let mut columns = vec!["index".to_owned()];
     columns.extend(axes.iter().cloned());
     columns.extend(["job", "state", "reason", "cpu_s", "wall_s", "particles", "steps"].map(str::to_owned));
     columns.extend(kinds.iter().map(|kind| format!("error.{kind}")));
-    let rows = points.iter().zip(&errors).map(|(point, errors)| {
+    let rows = points.iter().map(|point| {
         let mut row = vec![json!(point.index)];
-        row.extend(axes.iter().map(|axis| value_at(point, axis)));
+        row.extend(point.values.iter().cloned());
         row.extend([
             json!(point.job),
             json!(point.state.word()),
             json!(point.reason),
-            json!(point.usage.cpu_s),
-            json!(point.usage.wall_s),
+            json!(point.spent[0]),
+            json!(point.spent[1]),
             json!(point.particles),
             json!(point.steps),
         ]);
-        row.extend(kinds.iter().map(|kind| errors.get(*kind).cloned().unwrap_or(Value::Null)));
+        row.extend(kinds.iter().map(|kind| {
+            let error = point.errors.as_ref().and_then(|errors| errors.get(*kind));
+            error.cloned().unwrap_or(Value::Null)
+        }));
         row
     });
     Table { rows: rows.collect(), columns }

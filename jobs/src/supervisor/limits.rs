@@ -117,8 +117,7 @@ impl Supervisor {
         }
         self.space_checked = Instant::now();
         for job in self.store.paused_for(Reason::StorageEnospc)? {
-            let needed =
-                job.estimate["disk_bytes"].as_u64().unwrap_or(0).saturating_add(self.settings.disk_reserve_bytes);
+            let needed = job.disk_bytes_to_come().saturating_add(self.settings.disk_reserve_bytes);
             if process::free_space(self.store.directory()).is_some_and(|free| free > needed) {
                 self.store_change(&job.id, Trigger::Resume, &Change::default())?;
             }

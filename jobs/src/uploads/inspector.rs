@@ -99,7 +99,9 @@ fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Res
         child.kill()?;
     }
     let status = child.wait()?;
-    let _ = reading.join();
+    if !is_late {
+        let _ = reading.join();
+    }
     if is_late {
         return Ok(Err(format!("looking into it took longer than {} s", PATIENCE.as_secs())));
     }
@@ -125,9 +127,18 @@ fn take(output: impl Read, target: &Path) -> io::Result<Result<Findings, String>
     }
     if !output.fill_buf()?.is_empty() {
         let mut file = File::create(artifacts::unfinished(target))?;
-        io::copy(&mut output, &mut file)?;
-        file.flush()?;
-        artifacts::finish(target)?;
+        let most = 24 + super::MOST_POINTS * 32;
+        let written = io::copy(&mut output.take(most), &mut file)
+            .and_then(|_| file.flush())
+            .and_then(|()| artifacts::finish(target));
+        if let Err(error) = written {
+            let _ = std::fs::remove_file(artifacts::unfinished(target));
+            // Waiting for room would keep the upload itself from being deleted.
+            if crate::process::is_out_of_space(&error) {
+                return Ok(Err("there was no room on the disk for its points; delete it and send it again".to_owned()));
+            }
+            return Err(error);
+        }
     }
     Ok(Ok(said["ready"].take()))
 }

@@ -72,13 +72,41 @@ mod filter {
         libc::SYS_mkdirat,
         libc::SYS_fchmodat,
         libc::SYS_kill,
+        libc::SYS_tkill,
         libc::SYS_tgkill,
+        libc::SYS_rt_sigqueueinfo,
+        libc::SYS_pidfd_send_signal,
+        libc::SYS_clone,
+        libc::SYS_clone3,
+        libc::SYS_truncate,
+        libc::SYS_ftruncate,
+        libc::SYS_process_vm_readv,
+        libc::SYS_openat2,
     ];
+
+    /// Older calls, which newer processors do not have.
+    #[cfg(target_arch = "x86_64")]
+    const OLD: &[i64] = &[
+        libc::SYS_fork,
+        libc::SYS_vfork,
+        libc::SYS_unlink,
+        libc::SYS_rmdir,
+        libc::SYS_rename,
+        libc::SYS_renameat,
+        libc::SYS_link,
+        libc::SYS_symlink,
+        libc::SYS_mkdir,
+        libc::SYS_chmod,
+        libc::SYS_chown,
+        libc::SYS_creat,
+    ];
+    #[cfg(not(target_arch = "x86_64"))]
+    const OLD: &[i64] = &[];
 
     /// Refused calls fail with "not permitted"; everything else goes on.
     pub fn apply() -> io::Result<()> {
         let arch = if cfg!(target_arch = "x86_64") { TargetArch::x86_64 } else { TargetArch::aarch64 };
-        let rules: BTreeMap<i64, Vec<_>> = REFUSED.iter().map(|call| (*call, Vec::new())).collect();
+        let rules: BTreeMap<i64, Vec<_>> = REFUSED.iter().chain(OLD).map(|call| (*call, Vec::new())).collect();
         let refuse = SeccompAction::Errno(libc::EPERM as u32);
         let program: BpfProgram = SeccompFilter::new(rules, SeccompAction::Allow, refuse, arch)
             .and_then(TryInto::try_into)

@@ -243,6 +243,10 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
                 return Err(self.unaccepted(place, format!("two {name}")));
             }
         }
+        // What has members is a group to libhdf5, whatever else it is; nothing may hide behind a layout.
+        if find(0x08).is_some() && messages.iter().any(|message| matches!(message.kind, 0x02 | 0x06 | 0x0A | 0x11)) {
+            return Err(self.unaccepted(place, "members though it is a data set"));
+        }
         if let Some(layout) = find(0x08) {
             let (Some(space), Some(kind)) = (find(0x01), find(0x03)) else {
                 return Err(self.damaged(place, at, "a data set without extent or type"));
