@@ -33,7 +33,9 @@ pub fn kills_between_operations(count: u64, seed: u64) -> String {
     let mut fired = 0;
     for round in 0..count {
         let place = PLACES[(round as usize) % PLACES.len()];
-        let number = 2 + (5.0 * chance(seed, round)) as u64;
+        // The service sees several checkpoints at once where it is late: its own places are passed less often.
+        let is_of_service = ["checkpoint/imported", "checkpoint/pruned"].contains(&place);
+        let number = if is_of_service { 1 } else { 2 + (4.0 * chance(seed, round)) as u64 };
         let data = directory.path().join(round.to_string());
         std::fs::create_dir(&data).unwrap();
         let mark = data.join("fired");
