@@ -106,7 +106,7 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
         tracing::info!("ready");
         supervisor.run();
     })?;
-    trim_the_log(&application.store)?;
+    tidy_up(&application.store, application.metrics.clone())?;
     if application.config.calibrate {
         calibration::start_where_needed(&application.store, application.config.threads)?;
     }
@@ -139,14 +139,15 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
     Ok(())
 }
 
-/// Keeps the store's log short, on a thread of its own, for as long as there is a store.
-fn trim_the_log(store: &Arc<Store>) -> std::io::Result<()> {
+/// Keeps the store's log and the samples of histograms short, on a thread of its own, for as long as there is a store.
+fn tidy_up(store: &Arc<Store>, metrics: PrometheusHandle) -> std::io::Result<()> {
     let mut changes = store.watch();
     let store = Arc::downgrade(store);
-    std::thread::Builder::new().name("log-trimmer".to_owned()).spawn(move || {
+    std::thread::Builder::new().name("tidy-up".to_owned()).spawn(move || {
         loop {
             std::thread::sleep(LOG_INTERVAL);
             let Some(store) = store.upgrade() else { return };
+            metrics.run_upkeep();
             let is_idle = !changes.has_changed().unwrap_or(true);
             changes.mark_unchanged();
             if let Err(error) = store.trim_log(is_idle) {

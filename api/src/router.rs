@@ -5,11 +5,12 @@ use crate::application::Application;
 use crate::error::ApiError;
 use crate::routes::{checkpoints, estimates, events, files, jobs, metrics, results, scenes, service, studies, uploads};
 use ::metrics::{counter, histogram};
+use axum::Router;
+use axum::body::Bytes;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
-use axum::{Json, Router};
 use serde_json::{Value, json};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -104,7 +105,9 @@ const ANYWHERE: [(&str, &str); 6] = [
 /// The whole service.
 pub fn router(application: Application) -> Router {
     let (routes, document) = documented().split_for_parts();
-    let document = Json(published(&document));
+    // Written once: a tree of it would be cloned for every request.
+    let document = Bytes::from(published(&document).to_string());
+    let document = ([(header::CONTENT_TYPE, "application/json")], document);
     routes
         .route("/openapi.json", axum::routing::get(move || async move { document }))
         .fallback(|| async { ApiError::NotFound("resource") })

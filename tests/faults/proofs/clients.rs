@@ -53,7 +53,7 @@ pub fn event_streams(count: u64, _: u64) -> String {
     });
     let memory = service.resident_bytes() as f64 / 1e6;
     drop(sockets);
-    assert!(memory < 200.0, "{memory} MB");
+    assert!(memory < 150.0, "{memory} MB");
     format!(
         "{count} streams, half of them never read: {events} events without gaps, slowest read beside {slowest:.3} s, service {memory:.0} MB"
     )
