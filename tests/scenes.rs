@@ -224,6 +224,7 @@ fn nonsense_is_refused_at_its_place() {
             "/shape/slot_depth",
         ),
         (json!({"kind": "redistance", "type": "foo"}), "/type"),
+        (json!({"kind": "vortex", "end_time": 5e-321, "steps": 60_000_000}), "/end_time"),
         (json!({"kind": "redistance", "method": {"type": "pcp", "weight": 1e5}}), "/method/weight"),
     ] {
         let found = meniscus::scene::understand(&body, SCENES).err().unwrap();

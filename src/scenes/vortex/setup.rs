@@ -130,6 +130,10 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         (Some(step), _) => FixedStep::from_time_step(written.end_time, step),
         (None, steps) => FixedStep::from_steps(written.end_time, steps.unwrap_or(240)),
     };
+    if !fixed.time_step.is_normal() {
+        let detail = "so short an end in so many steps leaves no time step that is a number";
+        violations.push(Violation::new("/end_time", "range", detail, &json!(written.end_time), Value::Null));
+    }
     if fixed.steps > 1_000_000_000 || fixed.steps == 0 {
         let allowed = json!(format!("a number from {} to {}", written.end_time * 1e-9, written.end_time));
         violations.push(Violation::new(
