@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
-.PHONY: help build demo test soak load check check-deploy setup clean
+.PHONY: help build demo test soak load estimates check check-deploy setup clean
 
 # Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
 ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
@@ -20,6 +20,7 @@ help:
 	@echo "make check  format and lints"
 	@echo "make soak   the promises by the hundred: COUNT=1000 is all, ONLY=name,name picks; counts add up over runs"
 	@echo "make load   how fast the service answers under load, beside what was promised"
+	@echo "make estimates  what runs were estimated to take beside what they took"
 	@echo "make check-deploy  the files in deploy/, as far as this machine can"
 
 # Installs what is missing, and nothing where nothing is missing.
@@ -57,6 +58,9 @@ soak: setup
 
 load: build
 	MENISCUS_BIN="$(abspath $(TARGET)/release/meniscus)" cargo bench --locked --bench service
+
+estimates: build
+	python3 tests/python/estimates.py "$(abspath $(TARGET)/release/meniscus)"
 
 check-deploy:
 	deploy/check.sh

@@ -64,8 +64,8 @@ pub trait Scene: Send + Sync {
     /// Runs of one family cost about the same for a unit of work: kind, dimension, and what the method makes of them.
     fn family(&self) -> String;
 
-    /// Work of the run by phase, for a plan of output.
-    fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork>;
+    /// Work of the run by phase, for its size and a plan of output.
+    fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork>;
 
     /// The simulation at its start. Memory for particles is allocated here.
     ///

@@ -32,7 +32,11 @@ fn main() {
     }
     let share: f64 = std::env::var("COUNT").ok().and_then(|c| c.parse().ok()).unwrap_or(20.0) / 1000.0;
     let only: Vec<String> =
-        std::env::var("ONLY").map(|names| names.split(',').map(str::to_owned).collect()).unwrap_or_default();
+        std::env::var("ONLY").unwrap_or_default().split_terminator(',').map(str::to_owned).collect();
+    for name in &only {
+        // A slip must not look like a proof.
+        assert!(PROOFS.iter().any(|proof| proof.name == name), "there is no proof {name:?}");
+    }
     std::fs::create_dir_all(Path::new(TOTALS).parent().unwrap()).unwrap();
     let mut failed = false;
     for proof in PROOFS.iter().filter(|proof| only.is_empty() || only.iter().any(|name| name == proof.name)) {

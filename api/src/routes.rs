@@ -19,6 +19,7 @@ pub(crate) use sources::StoreSources;
 
 use crate::application::Application;
 use crate::error::ApiError;
+use axum::http::{HeaderMap, header};
 use meniscus_jobs::store::{JobRow, Store};
 use std::sync::Arc;
 
@@ -31,6 +32,12 @@ pub(crate) async fn with_store<R: Send + 'static>(
     // What is logged inside keeps the id of the request.
     let span = tracing::Span::current();
     tokio::task::spawn_blocking(move || span.in_scope(|| work(&store))).await?
+}
+
+/// Whether a client asks for one kind of answer and not for the other.
+pub(crate) fn accepts(headers: &HeaderMap, kind: &str, other: &str) -> bool {
+    let accept = headers.get(header::ACCEPT).and_then(|v| v.to_str().ok());
+    accept.is_some_and(|accept| accept.contains(kind) && !accept.contains(other))
 }
 
 /// A job that must be there.

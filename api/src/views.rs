@@ -250,6 +250,10 @@ pub struct ServiceLimits {
     pub memory_bytes: u64,
     /// Bytes of a request's body.
     pub body_bytes: usize,
+    /// Bytes of a study's body.
+    pub study_bytes: usize,
+    /// Bytes of an upload.
+    pub upload_bytes: u64,
 }
 
 /// A kind of scene.

@@ -220,11 +220,17 @@ pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Resul
     let of_scene = scene.resolved();
     let forecast = Forecast {
         estimate,
-        work: scene.work(&plan, &sizes),
+        work: scene.work(&estimate, &plan),
         family: scene.family(),
         threads,
         memory_bytes: WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes),
-        disk_bytes: forecast::disk_bytes(of_scene["dimension"].as_u64().unwrap_or(2), &estimate, &output, &checkpoint),
+        disk_bytes: forecast::disk_bytes(
+            of_scene["dimension"].as_u64().unwrap_or(2),
+            &estimate,
+            &plan,
+            &output,
+            &checkpoint,
+        ),
         time: None,
     };
     let mut resolved = Map::new();

@@ -1,9 +1,10 @@
 //! What a unit of work takes, by phase: kept per build and machine, begun by a few short runs, refined by every job
 //! that finishes.
 
-use crate::forecast::{TimeForecast, is_at_moments};
+use crate::forecast::TimeForecast;
 use crate::{local_run, process};
 use meniscus::scene::PhaseWork;
+use meniscus::scene::work::Course;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -22,7 +23,7 @@ pub struct Measured {
 /// What was measured of one phase of one family of runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PhaseMeasured {
-    /// Kind and dimension.
+    /// Kind, dimension and method.
     pub family: String,
     /// Phase.
     pub phase: String,
@@ -84,18 +85,22 @@ impl Calibration {
         for phase in work.iter().filter(|phase| phase.units > 0.0) {
             let seconds = phase.units * self.seconds_per_unit(family, phase.phase)?;
             forecast.cpu_s += seconds;
-            if is_at_moments(phase) {
+            if phase.course == Course::Moments {
                 *forecast.moments.entry(phase.phase.to_owned()).or_insert(0.0) += seconds;
             }
         }
         let clock = self.seconds_per_unit(family, &wall(threads)).unwrap_or(1.0 / threads as f64);
         forecast.wall_s = forecast.cpu_s * clock;
-        let own = self.known.keys().any(|(known, _)| known == family);
-        forecast.basis = if own {
-            format!("measured {family} runs of this build on this machine, by phase")
+        let is_known = |is_alike: &dyn Fn(&str) -> bool| self.known.keys().any(|(known, _)| is_alike(known));
+        let alike = kind_and_dimension(family);
+        let of = if is_known(&|known| known == family) {
+            family
+        } else if is_known(&|known| kind_and_dimension(known) == alike) {
+            alike
         } else {
-            "measured runs of other kinds of this build on this machine, by phase".to_owned()
+            "other"
         };
+        forecast.basis = format!("measured {of} runs of this build on this machine, by phase");
         Some(forecast)
     }
 }

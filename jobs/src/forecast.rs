@@ -2,10 +2,12 @@
 
 use crate::calibration::Calibration;
 use crate::formats::hdf5_file::CHUNK_ROWS;
-use meniscus::scene::work::Course;
 use meniscus::scene::{Estimate, PhaseWork};
+use meniscus::scenes::work_estimate;
+use meniscus::simulation::OutputPlan;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 
 /// Memory of a worker before it holds any particle.
 pub const WORKER_BASE_BYTES: u64 = 20 << 20;
@@ -17,7 +19,7 @@ pub struct Forecast {
     pub estimate: Estimate,
     /// Work by phase.
     pub work: Vec<PhaseWork>,
-    /// Kind and dimension, by which runs are compared.
+    /// Kind, dimension and method: runs of one family are compared.
     pub family: String,
     /// Threads of the run.
     pub threads: u64,
@@ -37,7 +39,7 @@ pub struct TimeForecast {
     /// Seconds by the clock.
     pub wall_s: f64,
     /// CPU seconds of phases that come at some moments, not with every step.
-    pub moments: std::collections::BTreeMap<String, f64>,
+    pub moments: BTreeMap<String, f64>,
     /// What it rests on.
     pub basis: String,
 }
@@ -70,22 +72,18 @@ impl Forecast {
     }
 }
 
-/// Whether a phase comes at some moments only.
-pub(crate) fn is_at_moments(phase: &PhaseWork) -> bool {
-    phase.course == Course::Moments
-}
-
-/// Bytes of all files of a run: its frames, the checkpoints that are kept, and one more that is being written.
+/// Bytes of all files of a run: its frames, its series, its picture, and its checkpoints: the last one, and where they come by
+/// steps as many as are kept.
 pub(crate) fn disk_bytes(
     dimension: u64,
     estimate: &Estimate,
+    plan: &OutputPlan,
     output: &Map<String, Value>,
     checkpoint: &Map<String, Value>,
 ) -> u64 {
     const FILE: u64 = 24 << 10;
     const CHUNK: u64 = CHUNK_ROWS as u64;
-    let every = output.get("every_time").and_then(Value::as_f64).unwrap_or(f64::INFINITY);
-    let frames = ((estimate.end_time / every).min(estimate.steps as f64) + 2.0) as u64;
+    let frames = work_estimate::frames(estimate.steps, estimate.end_time, plan) as u64;
     // Topology, position and the fields that were chosen; vectors and numbers weigh alike here.
     let fields = output.get("fields").and_then(Value::as_array).map_or(6, Vec::len) as u64;
     let frame = 40 + 14 * fields;
@@ -96,7 +94,7 @@ pub(crate) fn disk_bytes(
     let rows_of = if rows_of > CHUNK { rows_of.saturating_add(CHUNK / 4) } else { rows_of };
     let state = rows_of.saturating_mul(STATE_BYTES);
     let frames_bytes = rows_of.saturating_mul(frame).saturating_add(FILE).saturating_mul(frames);
-    let rows = estimate.steps / output.get("series_every_steps").and_then(Value::as_u64).unwrap_or(10).max(1) + 2;
+    let rows = estimate.steps / plan.series_every_steps.max(1) + 2;
     let checkpoints_bytes = state.saturating_add(FILE).saturating_mul(written);
     // A picture shows every particle of the plane three times over, and a slice through those of space.
     let picture = estimate.particles.saturating_mul(if dimension == 2 { 225 } else { 6 });

@@ -75,7 +75,8 @@ impl Observer for Observers<'_> {
                 Ok(())
             })?;
         }
-        self.is_starved = !finished && free_space(&self.directory).is_some_and(|free| free < self.reserve_bytes);
+        let is_short = || free_space(&self.directory).is_some_and(|free| free < self.reserve_bytes);
+        self.is_starved = !finished && self.reserve_bytes > 0 && is_short();
         let stopping = (self.control.is_pausing() || self.is_starved) && !finished;
         let wanted = self.control.take_checkpoint_request() || stopping || finished;
         if !is_repeat && self.checkpoints.is_due(step, wanted) {

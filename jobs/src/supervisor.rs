@@ -276,7 +276,7 @@ impl Supervisor {
         let gone = self.store.expire(self.settings.retention_days)?;
         if gone > 0 {
             // There may be more; workers are attended in between.
-            self.expired = Some(Instant::now() - EXPIRY_INTERVAL + TICK);
+            self.expired = None;
             tracing::info!(gone, "jobs were kept long enough and are deleted");
         }
         Ok(())

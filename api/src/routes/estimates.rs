@@ -10,7 +10,7 @@ use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::HeaderMap;
-use meniscus_jobs::{body, strict_json};
+use meniscus_jobs::strict_json;
 
 /// Checks a job's body and says what it would take. Nothing is made.
 #[utoipa::path(post, path = "/v1/estimates", tag = "jobs",
@@ -26,11 +26,7 @@ pub async fn estimate(
     let allowance = application.config.allowance();
     with_store(&application, move |store| {
         let spec = strict_json::parse(&bytes).map_err(|error| ApiError::Unparsable(error.to_string()))?;
-        let sources = StoreSources::new(store);
-        let body = body::parse(&spec, allowance, &sources);
-        sources.check()?;
-        let mut body = body?;
-        body.forecast.time_by(&store.calibration()?);
+        let body = StoreSources::new(store).understand(&spec, allowance, &store.calibration()?)?;
         Ok(Json(EstimateView::from(body)))
     })
     .await

@@ -14,7 +14,7 @@ use meniscus::scene::Violation;
 use meniscus::scene::check::closest;
 use meniscus_jobs::job::{Reason, State as JobState, Trigger};
 use meniscus_jobs::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store};
-use meniscus_jobs::{body, clock, process};
+use meniscus_jobs::{clock, process};
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -37,11 +37,7 @@ pub async fn submit(State(application): State<Application>, request: Request) ->
         if let Some(made) = creation.known.take() {
             return creation.answer(made);
         }
-        let sources = StoreSources::new(store);
-        let body = body::parse(&spec, here.config.allowance(), &sources);
-        sources.check()?;
-        let mut body = body?;
-        body.forecast.time_by(&store.calibration()?);
+        let body = StoreSources::new(store).understand(&spec, here.config.allowance(), &store.calibration()?)?;
         check_room(&here, store, 1, body.forecast.disk_bytes)?;
         let answer = |row: JobRow| kept(StatusCode::CREATED, Some(format!("/v1/jobs/{}", row.id)), &JobView::from(row));
         creation.answer(store.submit(NewJob::of(&body), creation.once.clone(), answer)?)

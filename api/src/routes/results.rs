@@ -1,21 +1,18 @@
 //! What a job has to say: log, series, report.
 
 use crate::application::Application;
-use crate::error::{ApiError, Problem, ProblemItem};
+use crate::error::{ApiError, Problem};
 use crate::file_response::{FileFacts, bytes_response};
-use crate::routes::{files, job, with_store};
+use crate::routes::{accepts, files, job, number, refuse_unknown, with_store};
 use axum::Json;
 use axum::extract::{Path, Query, State};
-use axum::http::{HeaderMap, header};
+use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Response};
-use meniscus::scene::Violation;
 use meniscus_jobs::formats::csv;
 use meniscus_jobs::observers::series;
 use meniscus_jobs::order::attempt_directory;
 use meniscus_jobs::store::JobRow;
 use meniscus_jobs::worker;
-use serde_json::json;
-use std::collections::BTreeMap;
 
 /// A file of every attempt, in order, as far as it is there.
 fn of_attempts(application: &Application, row: &JobRow, name: &str) -> Vec<Vec<u8>> {
@@ -30,18 +27,11 @@ fn of_attempts(application: &Application, row: &JobRow, name: &str) -> Vec<Vec<u
 pub async fn log(
     State(application): State<Application>,
     Path(id): Path<String>,
-    Query(query): Query<BTreeMap<String, String>>,
+    Query(query): Query<Vec<(String, String)>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let tail = match query.get("tail").map(|text| (text, text.parse::<usize>())) {
-        None => None,
-        Some((_, Ok(tail))) => Some(tail),
-        Some((text, Err(_))) => {
-            let violation =
-                Violation::new("tail", "type", "a whole number is needed", &json!(text), json!("a whole number ≥ 0"));
-            return Err(ApiError::Invalid(vec![ProblemItem::from(violation)]));
-        }
-    };
+    refuse_unknown(&query, &["tail"])?;
+    let tail = number(&query, "tail")?;
     let row = job(&application, &id).await?;
     let reader = application.clone();
     let text = with_store(&application, move |_| Ok(of_attempts(&reader, &row, worker::LOG_NAME).concat())).await?;
@@ -49,7 +39,7 @@ pub async fn log(
         None => text,
         Some(tail) => {
             let lines: Vec<&[u8]> = text.split_inclusive(|b| *b == b'\n').collect();
-            lines[lines.len().saturating_sub(tail)..].concat()
+            lines[lines.len().saturating_sub(usize::try_from(tail).unwrap_or(usize::MAX))..].concat()
         }
     };
     let facts =
@@ -73,11 +63,7 @@ pub async fn series(
     let newest = places.find(|place| place.is_file());
     let text =
         with_store(&application, move |_| Ok(newest.map(std::fs::read).transpose()?.unwrap_or_default())).await?;
-    let wants_json = headers
-        .get(header::ACCEPT)
-        .and_then(|v| v.to_str().ok())
-        .is_some_and(|accept| accept.contains("json") && !accept.contains("text/csv"));
-    if wants_json {
+    if accepts(&headers, "json", "text/csv") {
         return Ok(Json(csv::to_json(&String::from_utf8_lossy(&text))).into_response());
     }
     let facts = FileFacts { sha256: None, media_type: "text/csv".to_owned(), name: format!("{id}.csv") };

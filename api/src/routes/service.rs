@@ -3,6 +3,7 @@
 use crate::application::Application;
 use crate::error::{ApiError, Problem};
 use crate::routes::jobs::BODY_LIMIT;
+use crate::routes::studies;
 use crate::views::{ServiceLimits, ServiceView, StatusView};
 use axum::Json;
 use axum::extract::State;
@@ -23,8 +24,18 @@ pub async fn index(State(application): State<Application>) -> Json<ServiceView> 
             threads: allowance.threads,
             memory_bytes: allowance.memory_bytes,
             body_bytes: BODY_LIMIT,
+            study_bytes: studies::BODY_LIMIT,
+            upload_bytes: application.config.upload_bytes,
         },
-        links: BTreeMap::from([("scenes", "/v1/scenes"), ("jobs", "/v1/jobs"), ("openapi", "/openapi.json")]),
+        links: BTreeMap::from([
+            ("scenes", "/v1/scenes"),
+            ("estimates", "/v1/estimates"),
+            ("jobs", "/v1/jobs"),
+            ("studies", "/v1/studies"),
+            ("uploads", "/v1/uploads"),
+            ("metrics", "/metrics"),
+            ("openapi", "/openapi.json"),
+        ]),
     })
 }
 

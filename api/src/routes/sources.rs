@@ -1,9 +1,11 @@
 //! Checkpoints and uploads as the store knows them.
 
 use crate::error::ApiError;
-use meniscus_jobs::body::{RestartSource, Sources};
+use meniscus_jobs::body::{self, Allowance, JobBody, RestartSource, Sources};
+use meniscus_jobs::calibration::Calibration;
 use meniscus_jobs::store::{Store, StoreError};
 use meniscus_jobs::uploads::Purpose;
+use serde_json::Value;
 use std::cell::RefCell;
 
 /// Looks things up; remembers when the store failed, since that is not the same as "not there".
@@ -15,6 +17,20 @@ pub(crate) struct StoreSources<'a> {
 impl<'a> StoreSources<'a> {
     pub(crate) fn new(store: &'a Store) -> Self {
         Self { store, failure: RefCell::new(None) }
+    }
+
+    /// A job's body as it will be run, with what it will take.
+    pub(crate) fn understand(
+        &self,
+        spec: &Value,
+        allowance: Allowance,
+        calibration: &Calibration,
+    ) -> Result<JobBody, ApiError> {
+        let body = body::parse(spec, allowance, self);
+        self.check()?;
+        let mut body = body?;
+        body.forecast.time_by(calibration);
+        Ok(body)
     }
 
     /// Whether the store failed while it was asked.

@@ -3,13 +3,12 @@
 use crate::application::Application;
 use crate::creation::{Creation, kept};
 use crate::error::{ApiError, Problem};
-use crate::routes::{Page, StoreSources, flag, jobs, refuse_unknown, with_store};
+use crate::routes::{Page, StoreSources, accepts, flag, jobs, number, refuse_unknown, with_store};
 use crate::views::{DryRunView, JobList, StudyList, StudyView};
 use axum::Json;
 use axum::extract::{Path, Query, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use meniscus_jobs::body;
 use meniscus_jobs::job::{Reason, State as JobState, Trigger};
 use meniscus_jobs::store::{Change, Made, NewJob, StudyRow};
 use meniscus_jobs::study::{self, report, table};
@@ -128,8 +127,8 @@ pub async fn table(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     refuse_unknown(&query, &["after", "limit"])?;
-    let after = crate::routes::number(&query, "after")?;
-    let limit = crate::routes::number(&query, "limit")?.unwrap_or(ALL_POINTS).clamp(1, ALL_POINTS);
+    let after = number(&query, "after")?;
+    let limit = number(&query, "limit")?.unwrap_or(ALL_POINTS).clamp(1, ALL_POINTS);
     let row = study(&application, id).await?;
     let table = with_store(&application, move |store| {
         let points = store.points(&row, after, limit)?;
@@ -167,12 +166,6 @@ pub async fn report(
         Ok(([(header::CONTENT_TYPE, "image/svg+xml")], picture).into_response())
     })
     .await
-}
-
-/// Whether a client asks for one kind and not for the other.
-fn accepts(headers: &HeaderMap, kind: &str, other: &str) -> bool {
-    let accept = headers.get(header::ACCEPT).and_then(|v| v.to_str().ok());
-    accept.is_some_and(|accept| accept.contains(kind) && !accept.contains(other))
 }
 
 async fn request(
@@ -239,10 +232,7 @@ pub async fn retry(
                 continue;
             }
             let Some(old) = store.job(&point.job)? else { continue };
-            let body = body::parse(&old.spec, here.config.allowance(), &sources);
-            sources.check()?;
-            let mut body = body?;
-            body.forecast.time_by(&calibration);
+            let body = sources.understand(&old.spec, here.config.allowance(), &calibration)?;
             let mut job = NewJob::of(&body);
             job.study = Some((row.id.clone(), point.index));
             job.retry_of = Some(point.job);

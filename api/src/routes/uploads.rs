@@ -51,7 +51,7 @@ pub async fn submit(
     let budget = creation::spend(&application, &client)?;
     let key = creation::key_of(&parts.headers)?;
     let limit = application.config.upload_bytes;
-    let announced = parts.headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
+    let announced = creation::announced(&parts.headers);
     if announced.is_some_and(|length| length > limit) {
         return Err(ApiError::TooLarge(limit));
     }
@@ -62,17 +62,11 @@ pub async fn submit(
         return Err(ApiError::NoSpace { needed: announced.unwrap_or(0), room });
     }
     let (id, directory) = with_store(&application, |store| Ok(store.begin_upload()?)).await?;
-    // A client that goes away in the middle leaves nothing behind.
+    // Whatever ends this before the file is whole, a client that goes away too, leaves nothing behind.
     let mut leftover = Leftover { directory: Some(directory.clone()) };
     let path = directory.join(CONTENT);
-    let taken = take(body, path.clone(), limit.min(room), limit, application.config.disk_reserve_bytes).await;
-    let size_bytes = match taken {
-        Ok(size) => size,
-        Err(error) => {
-            with_store(&application, move |store| Ok(store.abandon_upload(&id)?)).await?;
-            return Err(error);
-        }
-    };
+    let reserve = application.config.disk_reserve_bytes;
+    let size_bytes = take(body, path.clone(), limit.min(room), limit, reserve).await?;
     leftover.directory = None;
     let target = parts.uri.path_and_query().map_or_else(String::new, |target| target.as_str().to_owned());
     let made = with_store(&application, move |store| {

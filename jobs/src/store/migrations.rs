@@ -95,7 +95,6 @@ const MIGRATIONS: &[&str] = &[
     CREATE INDEX jobs_by_start ON jobs (restarted_from) WHERE restarted_from IS NOT NULL;
     CREATE TABLE studies (
         id TEXT PRIMARY KEY,
-        rev INTEGER NOT NULL DEFAULT 1,
         name TEXT,
         labels TEXT NOT NULL,
         base TEXT NOT NULL,

@@ -161,7 +161,7 @@ impl Store {
             prepared.push((id, job, start));
         }
         let made = self.make_once(once, |transaction| {
-            transaction.execute("UPDATE studies SET stopping = 0, rev = rev + 1 WHERE id = ?1", [study])?;
+            transaction.execute("UPDATE studies SET stopping = 0 WHERE id = ?1", [study])?;
             for (id, job, start) in &prepared {
                 // Somebody else may have repeated it in the meantime.
                 let is_latest: bool = transaction
@@ -251,15 +251,7 @@ impl Store {
         };
         if trigger == Trigger::Pause {
             // Those that rest for want of space must not go on by themselves any more.
-            self.write(|transaction| -> Result<(), StoreError> {
-                let (asked, full) = (Reason::UserPause, Reason::StorageEnospc);
-                transaction.execute(
-                    "UPDATE jobs SET rev = rev + 1, reason = ?2, hint = ?3
-                     WHERE study = ?1 AND state = 'paused' AND reason = ?4",
-                    params![study, asked.word(), asked.hint(), full.word()],
-                )?;
-                Ok(())
-            })?;
+            self.keep_paused_where("study", study)?;
         }
         for chunk in ids.chunks(CHUNK) {
             self.write(|transaction| {

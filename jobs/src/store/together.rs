@@ -37,16 +37,17 @@ fn commit_all(writer: &Mutex<Connection>, changes: &watch::Sender<u64>, receiver
         let all: Vec<Waiting> = std::iter::once(first).chain(receiver.try_iter().take(MOST_AT_ONCE)).collect();
         let mut done = Vec::with_capacity(all.len());
         let mut waiting = all.into_iter();
-        let committed = connection.transaction_with_behavior(TransactionBehavior::Immediate).and_then(|transaction| {
+        let begun = connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(StoreError::from);
+        let committed = begun.and_then(|transaction| {
             for Waiting { work, reply } in waiting.by_ref() {
                 done.push((in_savepoint(&transaction, work), reply));
                 // A full disk can roll everything back in the middle: then nothing more must be begun, or it would be
                 // committed by itself.
                 if transaction.is_autocommit() {
-                    return Err(rusqlite::Error::ExecuteReturnedResults);
+                    return Err(StoreError::Together("rolled back: database or disk is full".to_owned()));
                 }
             }
-            transaction.commit()
+            Ok(transaction.commit()?)
         });
         drop(connection);
         match committed {
@@ -59,13 +60,8 @@ fn commit_all(writer: &Mutex<Connection>, changes: &watch::Sender<u64>, receiver
             }
             Err(error) => {
                 let all = done.into_iter().map(|(_, reply)| reply).chain(waiting.map(|one| one.reply));
-                let text = if matches!(error, rusqlite::Error::ExecuteReturnedResults) {
-                    "the transaction was rolled back: database or disk is full".to_owned()
-                } else {
-                    error.to_string()
-                };
                 for reply in all {
-                    let _ = reply.send(Err(StoreError::Together(text.clone())));
+                    let _ = reply.send(Err(StoreError::Together(error.to_string())));
                 }
             }
         }

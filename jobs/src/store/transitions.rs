@@ -136,12 +136,19 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn keep_paused(&self, id: &str) -> Result<(), StoreError> {
+        self.keep_paused_where("id", id)
+    }
+
+    /// The same for every job with a value in a column.
+    pub(super) fn keep_paused_where(&self, column: &str, value: &str) -> Result<(), StoreError> {
         self.write(|transaction| {
             let reason = Reason::UserPause;
             transaction.execute(
-                "UPDATE jobs SET rev = rev + 1, reason = ?2, hint = ?3
-                 WHERE id = ?1 AND state = 'paused' AND reason IS NOT ?2",
-                params![id, reason.word(), reason.hint()],
+                &format!(
+                    "UPDATE jobs SET rev = rev + 1, reason = ?2, hint = ?3
+                     WHERE {column} = ?1 AND state = 'paused' AND reason IS NOT ?2"
+                ),
+                params![value, reason.word(), reason.hint()],
             )?;
             Ok(())
         })

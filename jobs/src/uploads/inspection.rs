@@ -7,7 +7,6 @@ use crate::formats::{cloud_file, vtkhdf};
 use meniscus::scene::{Cloud, understand};
 use meniscus::scenes::SCENES;
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::Path;
@@ -119,19 +118,7 @@ fn of_checkpoint(file: &File, path: &Path) -> Result<Findings, String> {
             return Err(format!("{name} is no text"));
         }
     }
-    // The arrays are read by the names that the meta text has: none may lead anywhere but into this group.
-    let is_array = |path: &String| path.strip_prefix("/state/").is_some_and(|name| !name.contains('/'));
-    let arrays: BTreeSet<&str> = structure
-        .data_sets
-        .keys()
-        .filter(|path| is_array(path))
-        .filter_map(|path| path.strip_prefix("/state/"))
-        .collect();
     jail::shut_the_door(file).map_err(|error| error.to_string())?;
-    let named = checkpoint::array_names(path).map_err(|error| error.to_string())?;
-    if let Some(name) = named.iter().find(|name| !arrays.contains(name.as_str())) {
-        return Err(format!("its meta text names an array {name:?} that is not there"));
-    }
     let (meta, state) = checkpoint::read(path, None).map_err(|error| error.to_string())?;
     let scene = understand(&meta.body["scene"], SCENES).map_err(|found| {
         let first = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));

@@ -211,8 +211,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         format!("redistance/{D}/{}", work_estimate::method_name(&self.method))
     }
 
-    fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork> {
-        let Estimate { particles, steps, end_time, .. } = self.estimate(sizes);
+    fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
+        let Estimate { particles, steps, end_time, .. } = *estimate;
         let particles = particles as f64;
         let reach_h = self.half_band / self.lattice.spacing;
         let reach_h = reach_h.max(self.method.reach_h::<D>());

@@ -276,8 +276,8 @@ impl<const D: usize> Scene for VortexScene<D> {
         format!("vortex/{D}/{}", work_estimate::method_name(&self.method))
     }
 
-    fn work(&self, plan: &OutputPlan, sizes: &CloudSizes) -> Vec<PhaseWork> {
-        let Estimate { particles, steps, end_time, .. } = self.estimate(sizes);
+    fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
+        let Estimate { particles, steps, end_time, .. } = *estimate;
         let particles = particles as f64;
         let stages = match self.integrator {
             PathIntegrator::Rk4 => 4.0,

@@ -157,7 +157,8 @@ pub fn scenes(count: u64, seed: u64) -> String {
                 let again = understand(&body.resolved["scene"], SCENES)
                     .unwrap_or_else(|found| panic!("what is resolved is refused: {spec}: {found:?}"));
                 assert_eq!(again.resolved(), body.resolved["scene"], "{spec}");
-                let work = again.work(&OutputPlan { every_time: None, series_every_steps: 10 }, &CloudSizes::new());
+                let plan = OutputPlan { every_time: None, series_every_steps: 10 };
+                let work = again.work(&again.estimate(&CloudSizes::new()), &plan);
                 assert!(work.iter().all(|phase| phase.units >= 0.0), "{spec}: {work:?}");
             }
         }
