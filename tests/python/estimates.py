@@ -5,6 +5,7 @@ python estimates.py MENISCUS: a line a scene with estimated over reached, and th
 
 import json
 import signal
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -70,8 +71,8 @@ def run(service, scene):
 def main(program):
     service = Service(program)
     service.wait_until_measured()
-    within, late = {}, []
-    print("particles  memory    disk    time   (took)  scene")
+    within, first, every = {}, [], []
+    print("particles  memory    disk    time   (took)  left  scene")
     for scene in SCENES:
         estimate = service.ask("/v1/estimates", {"scene": scene})
         job, seen, end = run(service, scene)
@@ -85,11 +86,14 @@ def main(program):
         for name, ratio in ratios.items():
             within[name] = within.get(name, 0) + (0.7 <= ratio <= 1.3)
         numbers = "  ".join(f"{ratio:6.2f}" for ratio in ratios.values())
-        print(f"   {numbers}  {usage['wall_s']:6.2f} s  {json.dumps(scene)}")
-        late += [abs(left - (end - at)) / (end - at) for at, fraction, left in seen if 0.1 <= fraction < 1]
-    late.sort()
+        late = [abs(left - (end - at)) / (end - at) for at, fraction, left in seen if 0.1 <= fraction < 1]
+        first += late[:1]
+        every += late
+        error = f"{100 * statistics.median(late):3.0f} %" if late else "    –"
+        print(f"   {numbers}  {usage['wall_s']:6.2f} s  {error}  {json.dumps(scene)}")
     print("within 30 %:", ", ".join(f"{name} {count} of {len(SCENES)}" for name, count in within.items()))
-    print(f"time left after a tenth of a run: median error {100 * late[len(late) // 2]:.0f} % of {len(late)} records")
+    for what, errors in [("at the first record after a tenth of a run", first), ("at every record after it", every)]:
+        print(f"time left, {what}: median error {100 * statistics.median(errors):.0f} % of {len(errors)}")
     service.process.send_signal(signal.SIGTERM)
     service.process.wait()
 
