@@ -6,4 +6,5 @@ pub mod frame_index;
 pub mod hdf5_file;
 pub mod picture;
 pub mod speed_error;
+pub mod structure;
 pub mod vtkhdf;

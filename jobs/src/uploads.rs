@@ -1,5 +1,5 @@
 //! Files from outside. They are hostile until a short-lived process under limits ([`jail`]) has looked into them
-//! ([`inspection`]): HDF5 files by our own reading of their structure ([`structure`]) before libhdf5 sees a byte, meshes
+//! ([`inspection`]): HDF5 files by our own reading of their structure ([`crate::formats::structure`]) before libhdf5 sees a byte, meshes
 //! by parsers of our own ([`mesh`]). Points leave that process in a plain format ([`crate::formats::cloud_file`]), so that
 //! nobody else opens the file.
 
@@ -7,7 +7,6 @@ pub mod inspection;
 pub mod inspector;
 pub mod jail;
 pub mod mesh;
-pub mod structure;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

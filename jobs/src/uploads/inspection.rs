@@ -1,9 +1,9 @@
 //! Looking into a file from outside. Runs in a process of its own, under limits.
 
-use super::{Findings, MOST_POINTS, Purpose, jail, mesh, structure};
+use super::{Findings, MOST_POINTS, Purpose, jail, mesh};
 use crate::body::Wishes;
 use crate::checkpoint;
-use crate::formats::{cloud_file, vtkhdf};
+use crate::formats::{cloud_file, structure, vtkhdf};
 use meniscus::scene::{Cloud, understand};
 use meniscus::scenes::SCENES;
 use serde_json::{Value, json};

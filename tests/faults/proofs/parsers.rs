@@ -8,7 +8,8 @@ use meniscus::scenes::SCENES;
 use meniscus::simulation::OutputPlan;
 use meniscus_jobs::body::{self, Allowance, NoSources};
 use meniscus_jobs::calibration::Calibration;
-use meniscus_jobs::uploads::{mesh, structure};
+use meniscus_jobs::formats::structure;
+use meniscus_jobs::uploads::mesh;
 use meniscus_jobs::{strict_json, study};
 use serde_json::{Value, json};
 

@@ -1,6 +1,6 @@
 //! On files of our own, whole, cut and turned.
 
-use super::{Refusal, read};
+use super::{Refusal, contents, read};
 use crate::formats::hdf5_file::write;
 
 fn sample() -> Vec<u8> {
@@ -39,4 +39,22 @@ fn whatever_is_cut_or_turned_is_refused_or_understood_and_never_a_panic() {
         let _ = read(broken.as_slice());
     }
     assert_eq!(read(b"solid".as_slice()), Err(Refusal::NotHdf5));
+}
+
+#[test]
+fn contents_are_what_libhdf5_wrote_in_one_piece_and_in_chunks() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("x.h5");
+    let values: Vec<u64> = (0..3 * 200_000).map(|k| k * k).collect();
+    let file = hdf5::File::create(&path).unwrap();
+    write(&file, "chunks", 3, &values).unwrap();
+    file.new_dataset::<u64>().shape(values.len()).create("piece").unwrap().write_raw(&values).unwrap();
+    file.new_dataset::<u64>().chunk(100).shape(1000).create("holes").unwrap();
+    file.close().unwrap();
+    let file = std::fs::File::open(&path).unwrap();
+    let structure = read(&file).unwrap();
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    assert!(contents(&file, "/chunks", &structure.data_sets["/chunks"]).unwrap() == bytes);
+    assert!(contents(&file, "/piece", &structure.data_sets["/piece"]).unwrap() == bytes);
+    assert!(contents(&file, "/holes", &structure.data_sets["/holes"]).is_err());
 }

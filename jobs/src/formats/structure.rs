@@ -6,7 +6,10 @@
 //! After the HDF5 File Format Specification, version 3.0. Accepted are superblocks 0 to 3, object headers 1 and 2, groups as
 //! symbol tables and as compact links, and compact, contiguous and chunked layouts of numbers.
 
+mod contents;
 mod data_set;
+
+pub use contents::contents;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -77,6 +80,31 @@ pub struct DataSet {
     pub element_bytes: u64,
     /// Whether elements are floating-point numbers; else they are whole numbers or fixed texts.
     pub is_float: bool,
+    /// Where its numbers are.
+    pub storage: Storage,
+}
+
+/// Where the numbers of a data set are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Storage {
+    /// In one piece of the file; no address where nothing was written.
+    OnePiece {
+        /// Where it begins.
+        at: u64,
+        /// Its length.
+        bytes: u64,
+    },
+    /// In chunks, found by a tree.
+    Chunks {
+        /// The tree.
+        tree: u64,
+        /// Extent of a chunk.
+        extent: Vec<u64>,
+        /// Filters in the order of writing.
+        filters: Vec<u16>,
+    },
+    /// In a way that only libhdf5 reads.
+    Other,
 }
 
 impl DataSet {
@@ -251,7 +279,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             let (Some(space), Some(kind)) = (find(0x01), find(0x03)) else {
                 return Err(self.damaged(place, at, "a data set without extent or type"));
             };
-            let data_set = self.data_set(place, space, kind, layout)?;
+            let data_set = self.data_set(place, space, kind, layout, find(0x0B))?;
             self.structure.data_sets.insert(place.to_owned(), data_set);
             return Ok(());
         }
@@ -369,7 +397,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
                 }
             }
             0x07 => Err(self.unaccepted(place, "external storage")),
-            0x0B => self.filters(place, message),
+            0x0B => self.filters(place, message).map(|_| ()),
             0x0F => Err(self.unaccepted(place, "a table of shared messages")),
             0x14 => Err(self.unaccepted(place, "driver information")),
             other => Err(self.unaccepted(place, format!("a header message of type {other}"))),
