@@ -1,10 +1,12 @@
-//! Which points are near a point: a cell list, and brute force as its oracle.
+//! Which points are near a point: a cell list, pencils for loops over pairs, and brute force as the oracle of both.
 
 pub mod brute_force;
 pub mod cell_list;
+pub mod pencils;
 
 pub use brute_force::BruteForce;
 pub use cell_list::CellList;
+pub use pencils::Pencils;
 
 use crate::geometry::Vector;
 

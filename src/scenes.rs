@@ -2,6 +2,7 @@
 //! come from [`SCENES`].
 
 mod dimension;
+pub mod droplet;
 pub mod particle_estimate;
 pub mod pcp_parameters;
 pub mod redistance;
@@ -12,7 +13,7 @@ pub mod work_estimate;
 use crate::scene::SceneKind;
 
 /// Every kind of scene.
-pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND];
+pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND, &droplet::KIND];
 
 /// A kind by its name.
 #[must_use]

@@ -88,6 +88,44 @@ pub enum StepError {
         /// At what time.
         time: f64,
     },
+    /// A particle is faster than sound: the fluid is no longer nearly incompressible.
+    #[error(
+        "particle {particle} moves at {speed:.4e}, faster than sound ({sound_speed}), at step {step}, time {time}; the step was {time_step:.3e}, {bound} allows {stable:.3e}"
+    )]
+    TooFast {
+        /// Which particle.
+        particle: usize,
+        /// Its speed.
+        speed: f64,
+        /// That of sound in its fluid.
+        sound_speed: f64,
+        /// Δt.
+        time_step: f64,
+        /// What the limits allow at usual speeds.
+        stable: f64,
+        /// What binds them.
+        bound: &'static str,
+        /// In which step.
+        step: u64,
+        /// At what time.
+        time: f64,
+    },
+    /// A step would have to be cut into more parts than makes sense.
+    #[error(
+        "at the speed {speed:.4e} the limits allow {stable:.3e} of a step of {time_step:.3e}, at step {step}, time {time}"
+    )]
+    TimeStepFloor {
+        /// The largest speed.
+        speed: f64,
+        /// Δt.
+        time_step: f64,
+        /// What the limits allow.
+        stable: f64,
+        /// In which step.
+        step: u64,
+        /// At what time.
+        time: f64,
+    },
     /// The surface vanished: no particle has a neighbour of the other sign, or no fit reaches a zero.
     #[error("no sample particle is left on the interface at step {step}, time {time}")]
     InterfaceLost {

@@ -2,10 +2,12 @@
 
 pub mod gaussian;
 pub mod lambda44;
+pub mod radial;
 pub mod wendland_c2;
 
 pub use gaussian::Gaussian;
 pub use lambda44::Lambda44;
+pub use radial::RadialKernel;
 pub use wendland_c2::WendlandC2;
 
 use crate::geometry::Vector;

@@ -107,6 +107,10 @@ words! {
         StorageIo => "storage.io",
         /// A value stopped being a number.
         DivergedNonfinite => "diverged.nonfinite",
+        /// A particle became faster than sound.
+        DivergedCfl => "diverged.cfl",
+        /// The limits ask for a step too small to go on.
+        DivergedDtFloor => "diverged.dt_floor",
         /// The interface vanished.
         DivergedInterface => "diverged.interface",
         /// The worker died.
@@ -193,6 +197,10 @@ impl Reason {
             Self::DivergedNonfinite => {
                 "a value stopped being finite; try a smaller time step, from the last checkpoint"
             }
+            Self::DivergedCfl => {
+                "particles became faster than sound; restart from the last checkpoint with the time step that the message names"
+            }
+            Self::DivergedDtFloor => "the run asks for ever smaller steps; look at its last frames before anything else",
             Self::DivergedInterface => "the interface vanished between the particles; try a smaller spacing",
             Self::WorkerCrash => "the worker died; its log may say why",
             Self::WorkerStalled => "the worker gave no sign of life and was ended",

@@ -79,6 +79,8 @@ impl Failure {
             Self::Run(RunError::Step(error)) => {
                 let reason = match error {
                     StepError::InterfaceLost { .. } => Reason::DivergedInterface,
+                    StepError::TooFast { .. } => Reason::DivergedCfl,
+                    StepError::TimeStepFloor { .. } => Reason::DivergedDtFloor,
                     _ => Reason::DivergedNonfinite,
                 };
                 Verdict::Failed { reason, message: error.to_string() }

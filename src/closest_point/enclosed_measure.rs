@@ -1,4 +1,4 @@
-//! The area or volume inside the surface by quadrature on the fitted polynomials.
+//! The area or volume inside the surface, its centre and second moments, by quadrature on the fitted polynomials.
 //!
 //! A coarse grid of cells covers the samples. Cells away from the surface count whole or not at
 //! all; cells that it cuts are halved along every axis, and the smallest ones count the share that the
@@ -18,6 +18,47 @@ const fn halvings(dimension: usize) -> u32 {
 /// Cells along the longest side of the samples' box before any is halved.
 const COARSE_CELLS: f64 = 16.0;
 
+/// Moments of the inside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EnclosedMoments<const D: usize> {
+    /// Area or volume.
+    pub measure: f64,
+    /// ∫ x.
+    pub first: Vector<D>,
+    /// ∫ x_d², axis by axis.
+    pub second: Vector<D>,
+    /// Lower corner of the box round the samples.
+    pub low: Vector<D>,
+    /// Upper corner.
+    pub high: Vector<D>,
+}
+
+impl<const D: usize> EnclosedMoments<D> {
+    fn nothing() -> Self {
+        let zero = Vector::<D>::zeros();
+        Self { measure: 0.0, first: zero, second: zero, low: zero, high: zero }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.measure += other.measure;
+        self.first += other.first;
+        self.second += other.second;
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn centre(&self) -> Vector<D> {
+        self.first / self.measure
+    }
+
+    /// Central second moments, axis by axis, by the measure.
+    #[must_use]
+    pub fn variance(&self) -> Vector<D> {
+        let centre = self.centre();
+        self.second / self.measure - centre.component_mul(&centre)
+    }
+}
+
 /// The measure of all points with a negative level, for a bounded surface in an unbounded space.
 ///
 /// Zero without samples. The sum runs over cells in a fixed order.
@@ -25,16 +66,30 @@ const COARSE_CELLS: f64 = 16.0;
 /// # Errors
 /// [`Interrupted`] when somebody asked to stop.
 pub fn enclosed_measure<const D: usize>(surface: &LevelSurface<D>, interrupt: &Interrupt) -> Result<f64, Interrupted> {
+    enclosed_moments(surface, |x| *x, interrupt).map(|moments| moments.measure)
+}
+
+/// Measure and moments likewise. In a periodic space `unwrap` moves the points of the surface side by side again.
+///
+/// # Errors
+/// [`Interrupted`] when somebody asked to stop.
+pub fn enclosed_moments<const D: usize>(
+    surface: &LevelSurface<D>,
+    unwrap: impl Fn(&Vector<D>) -> Vector<D>,
+    interrupt: &Interrupt,
+) -> Result<EnclosedMoments<D>, Interrupted> {
     if surface.is_lost() {
-        return Ok(0.0);
+        return Ok(EnclosedMoments::nothing());
     }
     let spacing = surface.spacing();
     let mut low = Vector::<D>::repeat(f64::INFINITY);
     let mut high = Vector::<D>::repeat(f64::NEG_INFINITY);
     for x in surface.sample_points() {
+        let x = unwrap(&x);
         low = low.inf(&x);
         high = high.sup(&x);
     }
+    let extent = (low, high);
     // Coarse cells that the surface does not cut are settled at one query each.
     let coarsening = ((high - low).max() / (COARSE_CELLS * spacing)).log2().ceil().max(0.0);
     let edge = spacing * coarsening.exp2();
@@ -42,7 +97,7 @@ pub fn enclosed_measure<const D: usize>(surface: &LevelSurface<D>, interrupt: &I
     let low = low.add_scalar(-2.0 * spacing);
     let counts: [usize; D] = std::array::from_fn(|d| ((high[d] + 2.0 * spacing - low[d]) / edge).ceil() as usize);
     let rows: usize = counts[1..].iter().product();
-    let sums: Vec<f64> = (0..rows)
+    let sums: Vec<EnclosedMoments<D>> = (0..rows)
         .into_par_iter()
         .map(|row| {
             let mut corner = low;
@@ -51,40 +106,60 @@ pub fn enclosed_measure<const D: usize>(surface: &LevelSurface<D>, interrupt: &I
                 corner[d] += (rest % counts[d]) as f64 * edge;
                 rest /= counts[d];
             }
-            (0..counts[0])
-                .map(|k| {
-                    corner[0] = low[0] + k as f64 * edge;
-                    if interrupt.is_raised() { 0.0 } else { inside_of_cell(surface, &corner, edge, halvings) }
-                })
-                .sum()
+            let mut sum = EnclosedMoments::nothing();
+            for k in 0..counts[0] {
+                corner[0] = low[0] + k as f64 * edge;
+                if !interrupt.is_raised() {
+                    inside_of_cell(surface, &corner, edge, halvings, &mut sum);
+                }
+            }
+            sum
         })
         .collect();
     interrupt.check()?;
-    Ok(sums.iter().sum())
+    let mut moments = EnclosedMoments::nothing();
+    for sum in &sums {
+        moments.add(sum);
+    }
+    (moments.low, moments.high) = extent;
+    Ok(moments)
 }
 
-/// The inside part of one cubic cell.
-fn inside_of_cell<const D: usize>(surface: &LevelSurface<D>, corner: &Vector<D>, edge: f64, halvings: u32) -> f64 {
+/// Adds the inside part of one cubic cell; a cut one counts at its centre.
+fn inside_of_cell<const D: usize>(
+    surface: &LevelSurface<D>,
+    corner: &Vector<D>,
+    edge: f64,
+    halvings: u32,
+    sum: &mut EnclosedMoments<D>,
+) {
     let whole = edge.powi(D as i32);
     let centre = corner.add_scalar(0.5 * edge);
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();
-    let Some(foot) = surface.query(&centre, f64::INFINITY) else { return 0.0 };
+    let Some(foot) = surface.query(&centre, f64::INFINITY) else { return };
+    let mut add = |measure: f64| {
+        sum.measure += measure;
+        sum.first += centre * measure;
+        sum.second += centre.component_mul(&centre).add_scalar(edge * edge / 12.0) * measure;
+    };
     if foot.distance >= half_diagonal {
-        return if surface.is_inside(&centre, &foot) { whole } else { 0.0 };
+        if surface.is_inside(&centre, &foot) {
+            add(whole);
+        }
+        return;
     }
     if halvings == 0 {
         let signed = if foot.is_outside { foot.distance } else { -foot.distance };
         // The surface bends away from its tangent plane by κ ρ²/2, on the average over a section of the cell by κ edge²/24.
         let bend = (foot.curvature * edge).clamp(-1.0, 1.0) / 24.0;
-        return whole * share_below_plane(&foot.normal, signed / edge + bend);
+        add(whole * share_below_plane(&foot.normal, signed / edge + bend));
+        return;
     }
     let half = 0.5 * edge;
-    (0..1_usize << D)
-        .map(|octant| {
-            let child = Vector::<D>::from_fn(|d, _| corner[d] + half * (octant >> d & 1) as f64);
-            inside_of_cell(surface, &child, half, halvings - 1)
-        })
-        .sum()
+    for octant in 0..1_usize << D {
+        let child = Vector::<D>::from_fn(|d, _| corner[d] + half * (octant >> d & 1) as f64);
+        inside_of_cell(surface, &child, half, halvings - 1, sum);
+    }
 }
 
 /// The share of the unit cube about the origin with n·x + s < 0 for a unit normal n.

@@ -168,6 +168,14 @@ fn check_value(kind: &Kind, value: &Value, pointer: &str, violations: &mut Vec<V
             }
         },
         Kind::Choice(variants) => check_choice(variants(), value, pointer, violations),
+        Kind::Group(parameters) => {
+            let Some(given) = value.as_object() else {
+                return refuse(violations, pointer, "type", "an object is needed", value, kind);
+            };
+            let before = violations.len();
+            let checked = check(parameters, given, pointer, violations);
+            (violations.len() == before).then_some(Value::Object(checked))
+        }
         Kind::Choices { variants, least } => {
             let Some(list) = value.as_array().filter(|list| list.len() >= *least) else {
                 return refuse(violations, pointer, "type", "a list of choices is needed", value, kind);
@@ -272,6 +280,7 @@ pub fn describe(kind: &Kind) -> Value {
         Kind::Choices { variants, least } => {
             json!({"at_least": least, "each": variants().iter().map(|v| v.name).collect::<Vec<_>>()})
         }
+        Kind::Group(parameters) => json!({"fields": parameters.iter().map(|p| p.name).collect::<Vec<_>>()}),
         Kind::Text => json!("a text"),
         Kind::Flag => json!([true, false]),
         Kind::Word(words) => json!(words),

@@ -85,6 +85,7 @@ fn of_value(kind: &Kind) -> Map<String, Value> {
             json!({"type": "array", "items": item, "minItems": 2, "maxItems": 3})
         }
         Kind::Choice(variants) => choice(variants()),
+        Kind::Group(parameters) => return object(parameters),
         Kind::Choices { variants, least } => {
             json!({"type": "array", "minItems": least, "items": choice(variants())})
         }

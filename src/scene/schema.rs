@@ -1,7 +1,7 @@
 //! Declarations of parameters: name, type, range, default, meaning, and whether a restart may change them.
 
 /// One parameter of a scene or of a choice.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Parameter {
     /// Name in JSON.
     pub name: &'static str,
@@ -29,7 +29,7 @@ pub enum Default {
 }
 
 /// Type and range of a parameter.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub enum Kind {
     /// A number; `least`/`most` inclusive, `above`/`below` exclusive.
     Number {
@@ -60,6 +60,8 @@ pub enum Kind {
     },
     /// One of several variants: `{"type": NAME, …}` or the bare name.
     Choice(fn() -> &'static [Variant]),
+    /// An object with parameters of its own.
+    Group(&'static [Parameter]),
     /// A list of such choices, at least so many.
     Choices {
         /// The variants.

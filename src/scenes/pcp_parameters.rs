@@ -207,6 +207,17 @@ pub fn understand(
     Ok((method, resolved))
 }
 
+/// The method with nothing given.
+///
+/// # Errors
+/// None that a test has not seen: defaults are valid.
+pub fn defaults(dimension: usize, default_ratio: f64) -> Result<PcpMethod, Violation> {
+    let mut violations = Vec::new();
+    let checked = crate::scene::check(PARAMETERS, &serde_json::Map::new(), "", &mut violations);
+    let understood = understand(&Value::Object(checked), "", dimension, default_ratio);
+    understood.map(|(method, _)| method).map_err(|mut found| found.swap_remove(0))
+}
+
 /// A violation where fits in material coordinates are asked for particles that do not keep their level.
 #[must_use]
 pub fn refuse_material(method: &PcpMethod, detail: &str) -> Option<Violation> {

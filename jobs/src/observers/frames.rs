@@ -56,7 +56,8 @@ impl Frames {
     /// When it cannot be written.
     pub fn observe(&mut self, simulation: &dyn Simulation) -> Result<Option<FileRecord>, ObserverError> {
         let clock = simulation.clock();
-        if !self.is_first && !self.plan.is_frame_due(&fixed_step(simulation), clock.step) {
+        let is_due = self.plan.is_frame_due(&fixed_step(simulation), clock.step) || simulation.is_finished();
+        if !self.is_first && !is_due {
             return Ok(None);
         }
         self.is_first = false;

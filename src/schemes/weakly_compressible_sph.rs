@@ -1,0 +1,33 @@
+//! Two-phase flow by weakly compressible SPH with surface tension (PCP paper, sections 4.3 and 4.4, appendix B).
+//!
+//! Data flows one way within an evaluation: positions → neighbours → interface → densities and pressures → forces.
+
+mod body_force;
+mod color_field;
+mod components;
+mod continuity;
+mod density;
+pub mod fluids;
+mod hydrodynamics;
+mod interface;
+mod kernel_choice;
+mod momentum;
+mod monitors;
+mod pair_sums;
+pub mod parts;
+mod shifting;
+mod simulation;
+mod stepping;
+mod summary;
+mod system;
+pub mod time_step;
+
+pub use body_force::BodyForce;
+pub use fluids::Fluid;
+pub use kernel_choice::KernelChoice;
+pub use parts::{DensityMethod, Geometry, Integrator, SphParts, TensionForce};
+pub use simulation::WeaklyCompressibleSph;
+pub use system::{Drop, SphSystem};
+
+#[cfg(test)]
+mod tests;

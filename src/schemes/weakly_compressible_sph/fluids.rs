@@ -1,0 +1,48 @@
+//! The two fluids and their equation of state.
+
+/// A fluid: ρ₀, η, c and γ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fluid {
+    /// Reference density ρ₀.
+    pub density: f64,
+    /// Dynamic viscosity η.
+    pub viscosity: f64,
+    /// Speed of sound c.
+    pub sound_speed: f64,
+    /// Exponent γ.
+    pub polytropic: f64,
+}
+
+impl Fluid {
+    /// P = c² ρ₀/γ ((ρ/ρ₀)^γ − 1) (PCP eq. 27).
+    #[must_use]
+    pub fn pressure(&self, density: f64) -> f64 {
+        let ratio = density / self.density;
+        // A whole exponent costs a few multiplications.
+        let whole = self.polytropic.round();
+        let power =
+            if (whole - self.polytropic).abs() < 1e-12 { ratio.powi(whole as i32) } else { ratio.powf(self.polytropic) };
+        self.sound_speed * self.sound_speed * self.density / self.polytropic * (power - 1.0)
+    }
+
+    /// ν = η/ρ₀.
+    #[must_use]
+    pub fn kinematic_viscosity(&self) -> f64 {
+        self.viscosity / self.density
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Fluid;
+
+    #[test]
+    fn pressure_vanishes_at_rest_and_its_slope_is_the_square_of_the_speed_of_sound() {
+        for polytropic in [1.0, 1.4, 7.0] {
+            let fluid = Fluid { density: 1.3, viscosity: 0.5, sound_speed: 20.0, polytropic };
+            assert_eq!(fluid.pressure(1.3), 0.0);
+            let slope = (fluid.pressure(1.3 + 1e-6) - fluid.pressure(1.3 - 1e-6)) / 2e-6;
+            assert!((slope - 400.0).abs() < 1e-3, "{slope}");
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! Neighbours and the sums over them: columns gathered in the order of pencils, sums, and what comes of them written back.
+
+use super::color_field;
+use super::continuity::{Rates, sum_rates};
+use super::density::sum_kernel;
+use super::kernel_choice::{KernelChoice, with_kernel};
+use super::momentum::sum_forces;
+use super::pair_sums::Columns;
+use super::parts::SphParts;
+use super::shifting::sum_concentration;
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::Pencils;
+use crate::neighbors::pencils::BoxTooSmall;
+use crate::parallel::{Interrupt, Interrupted};
+use std::array::from_fn;
+
+/// How far anybody may move before neighbours are listed anew, in h: half of it.
+const SKIN_H: f64 = 0.3;
+/// Far from everybody, in ε.
+const FAR: f64 = 1e15;
+
+/// Pencils and columns in their order.
+#[derive(Debug)]
+pub(super) struct Hydrodynamics<const D: usize> {
+    domain: Domain<D>,
+    pencils: Pencils<D>,
+    skin: f64,
+    epsilon: f64,
+    kernel: KernelChoice,
+    /// σ/ε^D.
+    normalisation: f64,
+    /// The volume of a particle at rest, h^D.
+    cell: f64,
+    x: [Vec<f64>; D],
+    u: [Vec<f64>; D],
+    scalars: [Vec<f64>; 6],
+    sums: Vec<f64>,
+    pairs: Vec<[f64; 2]>,
+    vectors: Vec<[f64; D]>,
+    rates: Vec<Rates<D>>,
+}
+
+/// The column slices of one length.
+fn slices<const N: usize>(columns: &[Vec<f64>]) -> [&[f64]; N] {
+    from_fn(|n| columns[n].as_slice())
+}
+
+impl<const D: usize> Hydrodynamics<D> {
+    pub fn new(parts: &SphParts<D>, domain: &Domain<D>, cell: f64) -> Result<Self, BoxTooSmall> {
+        let skin = SKIN_H * parts.spacing;
+        let epsilon = parts.smoothing_length;
+        let reach = parts.kernel.support() * epsilon + skin;
+        Ok(Self {
+            domain: domain.clone(),
+            pencils: Pencils::new(domain, reach)?,
+            skin,
+            epsilon,
+            kernel: parts.kernel,
+            normalisation: parts.kernel.normalisation(D) / epsilon.powi(D as i32),
+            cell,
+            x: from_fn(|_| Vec::new()),
+            u: from_fn(|_| Vec::new()),
+            scalars: from_fn(|_| Vec::new()),
+            sums: Vec::new(),
+            pairs: Vec::new(),
+            vectors: Vec::new(),
+            rates: Vec::new(),
+        })
+    }
+
+    /// Whether there are lists at all.
+    pub fn is_listed(&self) -> bool {
+        self.pencils.places() > 0
+    }
+
+    /// Whether the lists no longer cover everybody in reach.
+    pub fn is_stale(&self, positions: &[Vector<D>], reference: &[Vector<D>]) -> bool {
+        let most = 0.25 * self.skin * self.skin;
+        let has_moved = |(x, from)| self.domain.displacement(from, x).norm_squared() > most;
+        positions.iter().zip(reference).any(has_moved)
+    }
+
+    /// Lists neighbours anew, of the positions in `reference`.
+    pub fn list(&mut self, reference: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
+        self.pencils.rebuild(reference, interrupt)?;
+        let places = self.pencils.places();
+        self.sums.resize(places, 0.0);
+        self.pairs.resize(places, [0.0; 2]);
+        self.vectors.resize(places, [0.0; D]);
+        self.rates.resize(places, Rates::default());
+        Ok(())
+    }
+
+    /// Gathers positions, side by side with where they were listed however they have been wrapped since.
+    pub fn take_positions(&mut self, positions: &[Vector<D>], reference: &[Vector<D>]) {
+        let (domain, inverse) = (&self.domain, 1.0 / self.epsilon);
+        for (d, column) in self.x.iter_mut().enumerate() {
+            self.pencils.gather(column, FAR, |i| {
+                let from = &reference[i];
+                (from[d] + domain.displacement(from, &positions[i])[d]) * inverse
+            });
+        }
+    }
+
+    fn gather_vectors(&mut self, factor: f64, value: impl Fn(usize) -> Vector<D>) {
+        for (d, column) in self.u.iter_mut().enumerate() {
+            self.pencils.gather(column, 0.0, |i| value(i)[d] * factor);
+        }
+    }
+
+    fn gather(&mut self, slot: usize, nobodys: f64, value: impl Fn(usize) -> f64) {
+        self.pencils.gather(&mut self.scalars[slot], nobodys, value);
+    }
+
+    /// The volume of every particle by summation, 1/Σ W.
+    pub fn volumes(&mut self, volume: &mut [f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
+        let columns = Columns { vectors: [slices(&self.x)], scalars: [] };
+        let inverse = 1.0 / self.epsilon;
+        with_kernel!(self.kernel, K => sum_kernel::<K, D>(&self.pencils, &columns, inverse, &mut self.sums, interrupt))?;
+        for (place, i) in self.pencils.occupied() {
+            volume[i] = 1.0 / (self.normalisation * self.sums[place]);
+        }
+        Ok(())
+    }
+
+    /// Forces by the volume form; `viscosity` is that of both fluids, or each particle's own.
+    pub fn forces(
+        &mut self,
+        volume: &[f64],
+        pressure: &[f64],
+        velocity: &[Vector<D>],
+        viscosity: Result<f64, impl Fn(usize) -> f64>,
+        forces: &mut [Vector<D>],
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        let by_cell = 1.0 / self.cell;
+        self.gather(0, 1.0, |i| volume[i] * by_cell);
+        self.gather(1, 0.0, |i| volume[i] * by_cell * pressure[i]);
+        let inverse = 1.0 / self.epsilon;
+        let (pencils, sums) = (&self.pencils, &mut self.vectors);
+        match viscosity {
+            Ok(viscosity) => {
+                for (d, column) in self.u.iter_mut().enumerate() {
+                    pencils.gather(column, 0.0, |i| viscosity * inverse * velocity[i][d]);
+                }
+                let columns = Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<2>(&self.scalars) };
+                with_kernel!(self.kernel, K => sum_forces::<K, D, 2>(pencils, &columns, inverse, sums, interrupt))?;
+            }
+            Err(viscosity) => {
+                for (d, column) in self.u.iter_mut().enumerate() {
+                    pencils.gather(column, 0.0, |i| inverse * velocity[i][d]);
+                }
+                pencils.gather(&mut self.scalars[2], 1.0, viscosity);
+                let columns = Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<3>(&self.scalars) };
+                with_kernel!(self.kernel, K => sum_forces::<K, D, 3>(pencils, &columns, inverse, sums, interrupt))?;
+            }
+        }
+        // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
+        let factor = self.cell * self.cell * self.normalisation * self.kernel.slope() / self.epsilon;
+        for (place, i) in pencils.occupied() {
+            forces[i] = Vector::<D>::from(self.vectors[place]) * factor;
+        }
+        Ok(())
+    }
+
+    /// Accelerations and rates of density by the mass form.
+    #[expect(clippy::too_many_arguments, reason = "columns of one evaluation, each a slice of its own")]
+    pub fn rates(
+        &mut self,
+        parts: &SphParts<D>,
+        diffusion: f64,
+        is_inside: &[u8],
+        mass: impl Fn(usize) -> f64,
+        density: &[f64],
+        pressure: &[f64],
+        velocity: &[Vector<D>],
+        acceleration: &mut [Vector<D>],
+        density_rate: &mut [f64],
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        let (by_cell, unit) = (1.0 / self.cell, parts.inside.density * self.cell);
+        let factor = if D == 2 { 8.0 } else { 10.0 };
+        let fluid = |i: usize| parts.fluid(is_inside[i] == 1);
+        self.gather_vectors(1.0, |i| velocity[i]);
+        self.gather(0, 1.0, |i| density[i]);
+        self.gather(1, 1.0, |i| mass(i) / density[i] * by_cell);
+        self.gather(2, 0.0, |i| pressure[i] / (density[i] * density[i]));
+        let viscosity = factor * parts.inside.kinematic_viscosity();
+        let inverse = 1.0 / self.epsilon;
+        let is_one = parts.has_one_mass() && parts.has_one_viscosity();
+        if !is_one {
+            self.gather(3, 1.0, |i| mass(i) / unit);
+            self.gather(4, 1.0, |i| factor * fluid(i).kinematic_viscosity());
+            self.gather(5, 1.0, |i| 1.0 / fluid(i).density);
+        }
+        let (pencils, rates, vectors) = (&self.pencils, &mut self.rates, [slices(&self.x), slices(&self.u)]);
+        with_kernel!(self.kernel, K => if is_one {
+            let columns = Columns { vectors, scalars: slices::<3>(&self.scalars) };
+            sum_rates::<K, D, 3>(pencils, &columns, inverse, viscosity, rates, interrupt)
+        } else {
+            let columns = Columns { vectors, scalars: slices::<6>(&self.scalars) };
+            sum_rates::<K, D, 6>(pencils, &columns, inverse, viscosity, rates, interrupt)
+        })?;
+        let gradient = self.normalisation * self.kernel.slope() / self.epsilon;
+        for (place, i) in pencils.occupied() {
+            let Rates { force, compression, diffusion: spread } = self.rates[place];
+            let fluid = fluid(i);
+            acceleration[i] = Vector::<D>::from(force) * (-unit * gradient);
+            // Excesses are of ρ, or of ρ/ρ₀ where the fluids differ; W'/r has one more 1/ε than ∇W by x/ε.
+            let scale = if is_one { 1.0 } else { fluid.density };
+            let spread = diffusion * fluid.sound_speed * scale * spread;
+            density_rate[i] = (density[i] * compression + spread) * gradient * self.cell;
+        }
+        Ok(())
+    }
+
+    /// ∇C of every particle (B.15), for given volumes.
+    pub fn concentration(
+        &mut self,
+        volume: impl Fn(usize) -> f64,
+        spacing: f64,
+        interrupt: &Interrupt,
+        mut found: impl FnMut(usize, Vector<D>),
+    ) -> Result<(), Interrupted> {
+        let by_cell = 1.0 / self.cell;
+        self.gather(0, 0.0, |i| volume(i) * by_cell);
+        let at_spacing = self.kernel.value(spacing / self.epsilon);
+        let columns = Columns { vectors: [slices(&self.x)], scalars: slices::<1>(&self.scalars) };
+        let (pencils, inverse, sums) = (&self.pencils, 1.0 / self.epsilon, &mut self.vectors);
+        with_kernel!(self.kernel, K => {
+            sum_concentration::<K, D>(pencils, &columns, inverse, at_spacing, sums, interrupt)
+        })?;
+        let factor = self.cell * self.normalisation * self.kernel.slope() / self.epsilon;
+        for (place, i) in pencils.occupied() {
+            found(i, Vector::<D>::from(self.vectors[place]) * factor);
+        }
+        Ok(())
+    }
+
+    /// Colours of the inner fluid, their gradients (outward: from the inside out), unit normals and curvatures (B.5 to B.9);
+    /// `gradient` keeps n̂, zero away from the interface.
+    pub fn color_geometry(
+        &mut self,
+        is_inside: &[u8],
+        volume: &[f64],
+        gradient: &mut [Vector<D>],
+        normal: &mut [Vector<D>],
+        curvature: &mut [f64],
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        let (by_cell, inverse, slope) = (1.0 / self.cell, 1.0 / self.epsilon, self.kernel.slope());
+        let kernel = self.normalisation * self.cell;
+        self.gather(0, 0.0, |i| volume[i] * by_cell * f64::from(is_inside[i]));
+        self.gather(1, 0.0, |i| volume[i] * by_cell);
+        let columns = Columns { vectors: [slices(&self.x)], scalars: slices::<1>(&self.scalars) };
+        let (pencils, sums) = (&self.pencils, &mut self.sums);
+        with_kernel!(self.kernel, K => color_field::sum_color::<K, D>(pencils, &columns, inverse, sums, interrupt))?;
+        for (color, sum) in self.scalars[0].iter_mut().zip(&self.sums) {
+            *color = sum * kernel;
+        }
+        let columns = Columns { vectors: [slices(&self.x)], scalars: slices::<2>(&self.scalars) };
+        let sums = &mut self.vectors;
+        with_kernel!(self.kernel, K => color_field::sum_gradient::<K, D>(pencils, &columns, inverse, sums, interrupt))?;
+        let least = color_field::THRESHOLD * inverse;
+        for (place, i) in pencils.occupied() {
+            // Colours fall outwards.
+            let found = Vector::<D>::from(self.vectors[place]) * (-kernel * slope * inverse);
+            let is_of_interface = found.norm() > least;
+            gradient[i] = if is_of_interface { found } else { Vector::<D>::zeros() };
+            normal[i] = if is_of_interface { found.normalize() } else { Vector::<D>::zeros() };
+        }
+        self.gather_vectors(1.0, |i| normal[i]);
+        self.gather(0, 0.0, |i| if normal[i] == Vector::<D>::zeros() { 0.0 } else { volume[i] * by_cell });
+        let columns = Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<1>(&self.scalars) };
+        let (pencils, sums) = (&self.pencils, &mut self.pairs);
+        with_kernel!(self.kernel, K => color_field::sum_curvature::<K, D>(pencils, &columns, inverse, sums, interrupt))?;
+        for (place, i) in pencils.occupied() {
+            let [weights, divergence] = self.pairs[place];
+            // ∇·n with ∇W about i, turned to the sign of a divergence.
+            curvature[i] = if weights > 0.0 { divergence * slope * inverse / weights } else { 0.0 };
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,56 @@
+//! Pressure and viscous forces between particles in the volume form (PCP eq. B.2): antisymmetric in the pair, so that
+//! momentum is kept to round-off.
+
+use super::pair_sums::{Columns, apart, total};
+use crate::linear_algebra::number::{Lanes, Number};
+use crate::neighbors::Pencils;
+use crate::parallel::{Interrupt, Interrupted};
+use crate::smoothing_kernels::RadialKernel;
+use std::array::from_fn;
+
+/// The force on each particle, −Σ (V_i² + V_j²) P̄ ∇W + Σ η (V_i² + V_j²) u_ij/r ∂W/∂r, by the factor of the first sum.
+///
+/// P̄ = (V_i P_i + V_j P_j)/(V_i + V_j), which is (ρ_i P_j + ρ_j P_i)/(ρ_i + ρ_j) for particles of one mass; volumes are those
+/// of a lattice up to compression, so the quotient is a series in 1 − (V_i + V_j)/2, exact to its eighth power.
+/// Columns: position in ε, η u/ε; V in h^D, V P in h^D, and η where pairs differ in it (velocity then without it).
+pub(super) fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
+    pencils: &Pencils<D>,
+    columns: &Columns<'_, D, 2, S>,
+    inverse_smoothing: f64,
+    forces: &mut [[f64; D]],
+    interrupt: &Interrupt,
+) -> Result<(), Interrupted> {
+    let (one, half) = (Lanes::splat(1.0), Lanes::splat(-0.5));
+    pencils.for_each_place(forces, interrupt, |place, ranges, force| {
+        let own = columns.at(place);
+        let u = own.vectors[1];
+        let (volume, stress) = (own.scalars[0], own.scalars[1]);
+        let volume2 = volume * volume;
+        let mut sums = [Lanes::splat(0.0); D];
+        for range in ranges {
+            let shift = pencils.shift(range);
+            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
+            columns.over(range, |other| {
+                let (dx, square) = apart(&x, &other.vectors[0]);
+                let slope: Lanes = K::slope_over_q(Number::sqrt(square));
+                let (other_volume, other_stress) = (other.scalars[0], other.scalars[1]);
+                let common = slope * Number::mul_add(other_volume, other_volume, volume2);
+                let e = Number::mul_add(volume + other_volume, half, one);
+                let (e2, sum) = (e * e, (stress + other_stress) * half);
+                let first = Number::mul_add(sum, e, sum);
+                let second = Number::mul_add(first, e2, first);
+                let mean = Number::mul_add(second, e2 * e2, second);
+                let mut across: [Lanes; D] = from_fn(|d| u[d] - other.vectors[1][d]);
+                if let (Some(a), Some(b)) = (own.scalars.get(2), other.scalars.get(2)) {
+                    // The harmonic mean keeps the shear stress of two layers.
+                    let viscosity = (*a + *a) * *b / (*a + *b);
+                    across = across.map(|c| c * viscosity);
+                }
+                for d in 0..D {
+                    sums[d] = Number::mul_add(common, Number::mul_add(mean, dx[d], across[d]), sums[d]);
+                }
+            });
+        }
+        *force = sums.map(total);
+    })
+}

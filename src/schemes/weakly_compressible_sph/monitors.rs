@@ -1,0 +1,156 @@
+//! What a series shows of two fluids, and what a report makes of it.
+
+use super::system::SphSystem;
+use crate::closest_point::enclosed_measure::{EnclosedMoments, enclosed_moments};
+use crate::geometry::Vector;
+use crate::geometry::domain::Axis;
+use crate::neighbors::{CellList, NeighborSearch};
+use crate::parallel::Interrupted;
+use std::f64::consts::TAU;
+
+/// Numbers of one moment, in the order of [`names`].
+pub(super) type Row = Vec<f64>;
+
+/// The columns of a series behind time and time step.
+pub(super) fn names(dimension: usize) -> Vec<&'static str> {
+    let axes = |three: [&'static str; 3]| three.into_iter().take(dimension);
+    let mut names = vec!["kinetic_energy"];
+    names.extend(axes(["momentum_x", "momentum_y", "momentum_z"]));
+    names.extend(["curvature_mean", "curvature_std", if dimension == 2 { "area" } else { "volume" }]);
+    names.extend(axes(["center_x", "center_y", "center_z"]));
+    names.extend(axes(["extent_x", "extent_y", "extent_z"]));
+    names.extend([
+        "deformation",
+        "pressure_inside",
+        "pressure_outside",
+        "pressure_eos_jump",
+        "droplets",
+        "mach",
+        "cfl",
+        "least_pair_distance_h",
+    ]);
+    names
+}
+
+/// Mean and standard deviation.
+fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let (count, sum) = values.clone().fold((0.0, 0.0), |(count, sum), v| (count + 1.0, sum + v));
+    let mean: f64 = sum / count;
+    let square: f64 = values.map(|v| (v - mean) * (v - mean)).sum();
+    (mean, (square / count).sqrt())
+}
+
+impl<const D: usize> SphSystem<D> {
+    /// The largest speed.
+    pub(super) fn largest_speed(&self) -> f64 {
+        self.velocity.iter().map(Vector::<D>::norm_squared).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Mean and standard deviation of the curvature over the particles that feel the tension: |φ| < 2 ε, or those of the
+    /// colour field's interface.
+    pub(super) fn curvature_spread(&self) -> (f64, f64) {
+        let curvature = self.particles.scalar(self.columns.curvature);
+        let band = self.particles.flag(self.columns.in_band);
+        let phi = self.particles.scalar(self.columns.phi);
+        let width = if self.interface.is_some() { 2.0 * self.parts.smoothing_length } else { f64::INFINITY };
+        spread((0..band.len()).filter(|i| band[*i] == 1 && phi[*i].abs() < width).map(|i| curvature[i]))
+    }
+
+    /// Means of the pressure well inside and well outside: by the equation of state, and with what the balanced force has
+    /// absorbed inside.
+    pub(super) fn mean_pressures(&self) -> [(f64, f64); 2] {
+        let far = 2.0 * self.parts.smoothing_length;
+        let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
+        let mut sums = [[0.0; 3]; 2];
+        let is_balanced = self.parts.tension_force == super::parts::TensionForce::Balanced;
+        for i in 0..phi.len() {
+            if band[i] == 1 && phi[i].abs() <= far {
+                continue;
+            }
+            let is_inside = self.phase[i] == 1;
+            let absorbed = if is_inside && is_balanced && self.parts.has_tension() {
+                self.parts.tension * self.ball_curvature(i)
+            } else {
+                0.0
+            };
+            let sum = &mut sums[usize::from(is_inside)];
+            sum[0] += 1.0;
+            sum[1] += self.pressure[i];
+            sum[2] += self.pressure[i] + absorbed;
+        }
+        [1, 0].map(|side: usize| (sums[side][1] / sums[side][0], sums[side][2] / sums[side][0]))
+    }
+
+    /// Area or volume, centre and second moments of the inside, by quadrature on the fits; None without an interface.
+    pub(super) fn moments(&self) -> Result<Option<EnclosedMoments<D>>, Interrupted> {
+        let Some(interface) = &self.interface else { return Ok(None) };
+        let centre = self.circular_centre(&interface.surface.sample_points());
+        let unwrap = |x: &Vector<D>| centre + self.domain.displacement(&centre, x);
+        enclosed_moments(&interface.surface, unwrap, &self.interrupt).map(Some)
+    }
+
+    /// The middle of points on the circles that periodic axes are.
+    fn circular_centre(&self, points: &[Vector<D>]) -> Vector<D> {
+        Vector::<D>::from_fn(|d, _| match self.domain.axes()[d] {
+            Axis::Unbounded => points.iter().map(|x| x[d]).sum::<f64>() / points.len().max(1) as f64,
+            Axis::Periodic { start, length } => {
+                let (sine, cosine) = points.iter().fold((0.0, 0.0), |(s, c), x| {
+                    let angle = TAU * (x[d] - start) / length;
+                    (s + angle.sin(), c + angle.cos())
+                });
+                start + length * f64::atan2(sine, cosine).rem_euclid(TAU) / TAU
+            }
+        })
+    }
+
+    /// The least distance of two particles, in h.
+    fn least_distance(&self) -> f64 {
+        let positions = self.particles.positions();
+        let mut cells = CellList::new(self.domain.clone());
+        let reach = self.parts.spacing;
+        cells.rebuild(positions.iter().copied(), reach);
+        let mut least = reach * reach;
+        for (i, x) in positions.iter().enumerate() {
+            cells.for_each_within(x, reach, |j, _, r2| {
+                if j != i {
+                    least = least.min(r2);
+                }
+            });
+        }
+        least.sqrt() / self.parts.spacing
+    }
+
+    /// Everything a row of the series shows.
+    pub(super) fn row(&self, time_step: f64, moments: Option<&EnclosedMoments<D>>) -> Row {
+        let mut energy = 0.0;
+        let mut momentum = Vector::<D>::zeros();
+        for (i, u) in self.velocity.iter().enumerate() {
+            let mass = self.mass(i);
+            energy += 0.5 * mass * u.norm_squared();
+            momentum += u * mass;
+        }
+        let mut row = vec![energy];
+        row.extend(momentum.iter());
+        let (mean, deviation) = self.curvature_spread();
+        row.extend([mean, deviation]);
+        let nothing = Vector::<D>::repeat(f64::NAN);
+        row.push(moments.map_or(f64::NAN, |m| m.measure));
+        row.extend(moments.map_or(nothing, EnclosedMoments::centre).iter());
+        row.extend(moments.map_or(nothing, |m| m.high - m.low).iter());
+        row.push(moments.map_or(f64::NAN, deformation));
+        let [(inside, inside_full), (outside, _)] = self.mean_pressures();
+        let droplets = if self.parts.has_tension() { self.ball_curvatures.len() as f64 } else { f64::NAN };
+        let speed = self.largest_speed();
+        let sound = self.parts.inside.sound_speed.min(self.parts.outside.sound_speed);
+        row.extend([inside_full, outside, inside - outside, droplets, speed / sound]);
+        row.extend([speed * time_step / self.parts.spacing, self.least_distance()]);
+        row
+    }
+}
+
+/// (Qxx − Qyy)/(Qxx + Qyy) of the central second moments; in space with the mean of Qyy and Qzz for Qyy.
+pub(super) fn deformation<const D: usize>(moments: &EnclosedMoments<D>) -> f64 {
+    let variance = moments.variance();
+    let across = variance.iter().skip(1).sum::<f64>() / (D - 1) as f64;
+    (variance[0] - across) / (variance[0] + across)
+}

@@ -1,0 +1,49 @@
+//! Particle shifting towards an even distribution (PCP eqs. B.15 and B.16).
+
+use super::pair_sums::{Columns, apart, total};
+use crate::geometry::Vector;
+use crate::linear_algebra::number::{Lanes, Number};
+use crate::neighbors::Pencils;
+use crate::parallel::{Interrupt, Interrupted};
+use crate::smoothing_kernels::RadialKernel;
+use std::array::from_fn;
+
+/// Σ (1 + 0.2 (W_ij/W(h))⁴) ∇W V_j, but for the kernel's factors. Columns: position in ε; V in h^D. `at_spacing` is w(h/ε).
+pub(super) fn sum_concentration<K: RadialKernel, const D: usize>(
+    pencils: &Pencils<D>,
+    columns: &Columns<'_, D, 1, 1>,
+    inverse_smoothing: f64,
+    at_spacing: f64,
+    gradients: &mut [[f64; D]],
+    interrupt: &Interrupt,
+) -> Result<(), Interrupted> {
+    let (one, fifth, by_spacing) = (Lanes::splat(1.0), Lanes::splat(0.2), Lanes::splat(1.0 / at_spacing));
+    pencils.for_each_place(gradients, interrupt, |place, ranges, gradient| {
+        let own = columns.at(place);
+        let mut sums = [Lanes::splat(0.0); D];
+        for range in ranges {
+            let shift = pencils.shift(range);
+            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
+            columns.over(range, |other| {
+                let (dx, square) = apart(&x, &other.vectors[0]);
+                let q = Number::sqrt(square);
+                let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
+                let ratio = value * by_spacing;
+                let ratio2 = ratio * ratio;
+                let weight = slope * other.scalars[0] * Number::mul_add(ratio2 * ratio2, fifth, one);
+                for d in 0..D {
+                    sums[d] = Number::mul_add(weight, dx[d], sums[d]);
+                }
+            });
+        }
+        *gradient = sums.map(total);
+    })
+}
+
+/// The displacement for a gradient of concentration: −0.05 ε² ∇C, at most 0.02 ε long.
+#[must_use]
+pub(super) fn displacement<const D: usize>(gradient: Vector<D>, smoothing_length: f64) -> Vector<D> {
+    let full = gradient * (-0.05 * smoothing_length * smoothing_length);
+    let (length, most) = (full.norm(), 0.02 * smoothing_length);
+    if length < most { full } else { full * (most / length) }
+}
