@@ -51,6 +51,9 @@ fn steps_allocate_nothing_after_warm_up() {
             "kind": "vortex", "spacing": 0.03125, "steps": 12, "end_time": 0.1, "field": "overwrite",
             "flow": {"type": "translation", "velocity": [1, 1]}
         }),
+        json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.02}),
+        json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.02, "geometry": "colorfield", "integrator": "predictor_corrector"}),
+        json!({"kind": "droplet", "case": "dividing", "spacing": 0.05, "end_time": 0.002}),
     ];
     let plan = meniscus::simulation::OutputPlan { every_time: None, series_every_steps: 1000 };
     for body in bodies {

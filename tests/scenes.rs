@@ -41,6 +41,26 @@ fn bodies() -> Vec<Value> {
             "kind": "redistance", "spacing": 0.05, "repeat": 3, "method": {"type": "remesh", "kernel": kernel}
         }));
     }
+    let droplet = |more: Value| {
+        // Driven fast enough that neighbours are listed anew a few times.
+        let force = json!({"type": "constant", "acceleration": [300, 100]});
+        let mut body = json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.014, "body_force": force});
+        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        body
+    };
+    bodies.push(droplet(json!({})));
+    bodies.push(droplet(json!({"integrator": "predictor_corrector", "tension_force": "csf", "end_time": 0.008})));
+    bodies.push(droplet(json!({"geometry": "colorfield", "discretization": {"type": "sph", "kernel": "quintic_spline", "smoothing_h": 1.5}})));
+    bodies.push(droplet(json!({"surface_tension": 0, "fluids": {"inside": {"density": 2, "viscosity": 0.1}}})));
+    bodies.push(droplet(json!({
+        "case": "dividing", "domain": {"low": [-1, -1], "high": [1, 1]}, "end_time": 0.02, "time_step": 1e-3,
+        "body_force": {"type": "pulse", "coefficient": 4000, "duration": 0.02},
+        "fluids": {"inside": {"density": 1.5}}, "shape": {"type": "circle", "radius": 0.4}
+    })));
+    bodies.push(json!({
+        "kind": "droplet", "dimension": 3, "case": "static", "spacing": 0.16, "steps": 4, "end_time": 4e-3,
+        "shape": {"type": "sphere", "radius": 0.7}, "integrator": "predictor_corrector", "shifting": "pst"
+    }));
     bodies.push(vortex(json!({"flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3}})));
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
@@ -183,6 +203,9 @@ fn declared_defaults_are_valid() {
                 meniscus::scene::check(std::slice::from_ref(parameter), &given, "", &mut violations);
                 assert!(violations.is_empty(), "{place}: {violations:?}");
             }
+            if let Kind::Group(parameters) = parameter.kind {
+                walk(parameters, &place);
+            }
             if let Kind::Choice(variants) | Kind::Choices { variants, .. } = parameter.kind {
                 for variant in variants() {
                     walk(variant.parameters, &format!("{place}/{}", variant.name));
@@ -226,6 +249,18 @@ fn nonsense_is_refused_at_its_place() {
         (json!({"kind": "redistance", "type": "foo"}), "/type"),
         (json!({"kind": "vortex", "end_time": 5e-321, "steps": 60_000_000}), "/end_time"),
         (json!({"kind": "redistance", "method": {"type": "pcp", "weight": 1e5}}), "/method/weight"),
+        (json!({"kind": "droplet", "case": "custom"}), "/shape"),
+        (json!({"kind": "droplet", "fluids": {"inside": {"density": -1}}}), "/fluids/inside/density"),
+        (json!({"kind": "droplet", "fluids": {"inside": {"densty": 1}}}), "/fluids/inside/densty"),
+        (json!({"kind": "droplet", "spacing": 0.2}), "/domain"),
+        (json!({"kind": "droplet", "domain": {"low": [0, 0], "high": [1, -1]}}), "/domain/high"),
+        (json!({"kind": "droplet", "shape": {"type": "circle", "radius": 3}}), "/shape"),
+        (json!({"kind": "droplet", "geometry": {"type": "pcp", "band_h": 4}}), "/geometry/band_h"),
+        (
+            json!({"kind": "droplet", "geometry": {"type": "pcp", "neighborhood": "material"}}),
+            "/geometry/neighborhood/type",
+        ),
+        (json!({"kind": "droplet", "time_step": 1e-3, "steps": 7}), "/time_step"),
     ] {
         let found = meniscus::scene::understand(&body, SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == place), "{body}: {found:?}");

@@ -200,7 +200,9 @@ impl Reason {
             Self::DivergedCfl => {
                 "particles became faster than sound; restart from the last checkpoint with the time step that the message names"
             }
-            Self::DivergedDtFloor => "the run asks for ever smaller steps; look at its last frames before anything else",
+            Self::DivergedDtFloor => {
+                "the run asks for ever smaller steps; look at its last frames before anything else"
+            }
             Self::DivergedInterface => "the interface vanished between the particles; try a smaller spacing",
             Self::WorkerCrash => "the worker died; its log may say why",
             Self::WorkerStalled => "the worker gave no sign of life and was ended",

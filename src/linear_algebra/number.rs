@@ -21,6 +21,8 @@ pub trait Number:
     fn sqrt(self) -> Self;
     /// The larger one; of a NaN and a number the number.
     fn max(self, other: Self) -> Self;
+    /// The number where it is positive, else 0; also of a NaN.
+    fn positive_part(self) -> Self;
     /// |self| with the sign of `sign`, where zero counts as positive.
     fn copysign(self, sign: Self) -> Self;
 }
@@ -48,6 +50,11 @@ impl Number for f64 {
     }
 
     #[inline(always)]
+    fn positive_part(self) -> Self {
+        if self > 0.0 { self } else { 0.0 }
+    }
+
+    #[inline(always)]
     fn copysign(self, sign: Self) -> Self {
         if sign < 0.0 { -self.abs() } else { self.abs() }
     }
@@ -72,6 +79,11 @@ impl Number for Lanes {
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         Self::max(self, other)
+    }
+
+    #[inline(always)]
+    fn positive_part(self) -> Self {
+        self.fast_max(Self::splat(0.0))
     }
 
     #[inline(always)]

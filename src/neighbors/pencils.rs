@@ -1,9 +1,10 @@
-//! Neighbours as a few contiguous ranges: points of a periodic box sorted into pencils along x (stripes in the plane), so
-//! that those within reach of a point stand side by side in memory, by x, in each pencil that the reach touches.
+//! Neighbours as groups that stand side by side in memory: points of a periodic box sorted into pencils along x (stripes in the
+//! plane), in each by x, so that those within reach of a point are a few contiguous ranges, cut into groups of [`GROUP`].
 //!
-//! Loops over a range need no index list and no condition: whoever reads up to [`OVERRUN`] places beyond its end finds
-//! points out of reach, or places that nobody stands at, of which every pencil ends with a few. Periodic images need no copies: a range says by which period its point is moved to meet it. The lists hold while
-//! no point has moved by more than half the skin; an order is a function of the positions that it was made of alone.
+//! A loop over groups needs no condition: the last group of a range may reach beyond it, to points that are out of reach,
+//! or to places that nobody stands at, of which every pencil ends with a few. Periodic images need no copies: groups are
+//! told with the period that their point is moved by to meet them. The lists hold while no point has moved by more than
+//! half the skin; an order is a function of the positions that it was made of alone.
 
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
@@ -11,8 +12,8 @@ use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use rayon::slice::ParallelSliceMut;
 
-/// Places behind a range that may be read.
-pub const OVERRUN: usize = 4;
+/// Places of a group.
+pub const GROUP: usize = 4;
 /// Who stands at a place where nobody stands.
 const NOBODY: u32 = u32::MAX;
 /// Places of one parallel task.
@@ -24,23 +25,44 @@ const fn pencils_a_reach(dimension: usize) -> f64 {
 /// Edge of the cells along x by the edge of a pencil.
 const CELL: f64 = 0.5;
 
-/// Places of the sorted points in reach, seen from a point moved by an image's shift.
+/// Groups that are met from one image of their point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Range {
-    /// First place.
-    pub from: u32,
-    /// Behind the last one.
-    pub to: u32,
-    /// Which image: an index into [`Pencils::shift`].
+struct Run {
+    /// Behind the last group, in the groups of the block.
+    end: u32,
+    /// Which image: an index into the shifts.
     image: u32,
 }
 
-/// The ranges of up to [`PENCIL_BLOCK`] places.
+/// The groups of up to [`PENCIL_BLOCK`] places.
 #[derive(Debug, Clone, Default)]
 struct Block {
-    ranges: Vec<Range>,
-    /// Where the ranges of each place end.
+    /// First place of each group.
+    groups: Vec<u32>,
+    runs: Vec<Run>,
+    /// Where the runs of each place end.
     ends: Vec<u32>,
+}
+
+/// The neighbours of one place: groups by image.
+#[derive(Debug, Clone, Copy)]
+pub struct Near<'a, const D: usize> {
+    groups: &'a [u32],
+    runs: &'a [Run],
+    begin: u32,
+    shifts: &'a [Vector<D>],
+}
+
+impl<'a, const D: usize> Near<'a, D> {
+    /// Groups with the displacement of the image that they are met from: add it to the position of the point.
+    pub fn runs(&self) -> impl Iterator<Item = (&'a Vector<D>, &'a [u32])> + '_ {
+        let mut begin = self.begin as usize;
+        self.runs.iter().map(move |run| {
+            let groups = &self.groups[begin..run.end as usize];
+            begin = run.end as usize;
+            (&self.shifts[run.image as usize], groups)
+        })
+    }
 }
 
 /// Points of a periodic box in pencils, with the ranges in reach of each.
@@ -126,7 +148,8 @@ impl<const D: usize> Pencils<D> {
         blocks.resize_with(self.order.len().div_ceil(PENCIL_BLOCK), Block::default);
         let this = &*self;
         blocks.par_iter_mut().enumerate().for_each(|(number, block)| {
-            block.ranges.clear();
+            block.groups.clear();
+            block.runs.clear();
             block.ends.clear();
             if interrupt.is_raised() {
                 return;
@@ -134,9 +157,9 @@ impl<const D: usize> Pencils<D> {
             let first = number * PENCIL_BLOCK;
             for x in &this.sorted[first..(first + PENCIL_BLOCK).min(this.sorted.len())] {
                 if x[0] < f64::INFINITY {
-                    this.find_ranges(x, &mut block.ranges);
+                    this.find_groups(x, block);
                 }
-                block.ends.push(block.ranges.len() as u32);
+                block.ends.push(block.runs.len() as u32);
             }
         });
         self.blocks = blocks;
@@ -158,17 +181,10 @@ impl<const D: usize> Pencils<D> {
     pub fn gather(&self, column: &mut Vec<f64>, nobodys: f64, value: impl Fn(usize) -> f64) {
         column.clear();
         column.extend(self.order.iter().map(|i| if *i == NOBODY { nobodys } else { value(*i as usize) }));
-        column.resize(self.order.len() + OVERRUN, nobodys);
+        column.resize(self.order.len() + GROUP, nobodys);
     }
 
-    /// The displacement of the image that a range is seen from: add it to the position of the point whose range it is.
-    #[must_use]
-    #[inline]
-    pub fn shift(&self, range: &Range) -> &Vector<D> {
-        &self.shifts[range.image as usize]
-    }
-
-    /// Calls `work` with the place, its ranges and its slot of `out`, in parallel.
+    /// Calls `work` with the place, its neighbours and its slot of `out`, in parallel.
     ///
     /// # Errors
     /// [`Interrupted`] when somebody asked to stop.
@@ -176,27 +192,23 @@ impl<const D: usize> Pencils<D> {
         &self,
         out: &mut [T],
         interrupt: &Interrupt,
-        work: impl Fn(usize, &[Range], &mut T) + Sync,
+        work: impl Fn(usize, &Near<'_, D>, &mut T) + Sync,
     ) -> Result<(), Interrupted> {
         out.par_chunks_mut(PENCIL_BLOCK).enumerate().for_each(|(number, slots)| {
             if interrupt.is_raised() {
                 return;
             }
             let Some(block) = self.blocks.get(number) else { return };
-            let mut begin = 0;
+            let (mut first, mut begin) = (0, 0);
             for ((k, slot), end) in slots.iter_mut().enumerate().zip(&block.ends) {
-                let end = *end as usize;
-                work(number * PENCIL_BLOCK + k, &block.ranges[begin..end], slot);
-                begin = end;
+                let runs = &block.runs[first..*end as usize];
+                let near = Near { groups: &block.groups, runs, begin, shifts: &self.shifts };
+                work(number * PENCIL_BLOCK + k, &near, slot);
+                first = *end as usize;
+                begin = runs.last().map_or(begin, |run| run.end);
             }
         });
         interrupt.check()
-    }
-
-    /// Pairs of a place with a place in its ranges, over-run excluded.
-    #[must_use]
-    pub fn listed_pairs(&self) -> u64 {
-        self.blocks.iter().flat_map(|block| &block.ranges).map(|range| u64::from(range.to - range.from)).sum()
     }
 
     fn cell(&self, x: &Vector<D>) -> usize {
@@ -220,7 +232,7 @@ impl<const D: usize> Pencils<D> {
         // Behind the last cell of every pencil stand a few nobodies.
         for cell in 0..cells {
             let pencil_ends = (cell + 1).is_multiple_of(self.counts[0]);
-            self.starts[cell + 1] += self.starts[cell] + if pencil_ends { OVERRUN as u32 } else { 0 };
+            self.starts[cell + 1] += self.starts[cell] + if pencil_ends { GROUP as u32 } else { 0 };
         }
         self.order.clear();
         self.order.resize(self.starts[cells] as usize, NOBODY);
@@ -232,7 +244,7 @@ impl<const D: usize> Pencils<D> {
         // The starts have become ends, short of the nobodies.
         for cell in (1..=cells).rev() {
             let pencil_ends = cell.is_multiple_of(self.counts[0]);
-            self.starts[cell] = self.starts[cell - 1] + if pencil_ends { OVERRUN as u32 } else { 0 };
+            self.starts[cell] = self.starts[cell - 1] + if pencil_ends { GROUP as u32 } else { 0 };
         }
         self.starts[0] = 0;
         for ends in self.starts.windows(2) {
@@ -246,16 +258,18 @@ impl<const D: usize> Pencils<D> {
         self.sorted.extend(self.order.iter().map(|i| points.get(*i as usize).copied().unwrap_or(far)));
     }
 
-    /// The ranges of everybody within reach of `x`, pencil by pencil.
-    fn find_ranges(&self, x: &Vector<D>, found: &mut Vec<Range>) {
+    /// The groups of everybody within reach of `x`, pencil by pencil.
+    fn find_groups(&self, x: &Vector<D>, found: &mut Block) {
+        let first_run = found.runs.len();
         let own: [i64; D] = std::array::from_fn(|d| {
             (((x[d] - self.low[d]) / self.edges[d]).max(0.0) as i64).min(self.counts[d] as i64 - 1)
         });
-        let reaches: [i64; D] = std::array::from_fn(|d| if d == 0 { 0 } else { (self.reach / self.edges[d]).ceil() as i64 });
+        let reaches: [i64; D] =
+            std::array::from_fn(|d| if d == 0 { 0 } else { (self.reach / self.edges[d]).ceil() as i64 });
         let mut pencil: [i64; D] = std::array::from_fn(|d| own[d] - reaches[d]);
         pencil[0] = 0;
         loop {
-            self.ranges_of_pencil(x, &pencil, found);
+            self.groups_of_pencil(x, &pencil, first_run, found);
             let mut d = 1;
             loop {
                 if d == D {
@@ -271,7 +285,7 @@ impl<const D: usize> Pencils<D> {
         }
     }
 
-    fn ranges_of_pencil(&self, x: &Vector<D>, pencil: &[i64; D], found: &mut Vec<Range>) {
+    fn groups_of_pencil(&self, x: &Vector<D>, pencil: &[i64; D], first_run: usize, found: &mut Block) {
         let (mut chord, mut base, mut image, mut digit) = (self.reach * self.reach, 0, 0, 1);
         for d in 1..D {
             let start = self.low[d] + pencil[d] as f64 * self.edges[d];
@@ -308,7 +322,13 @@ impl<const D: usize> Pencils<D> {
             }
             if first < end {
                 let image = (image + (turn + 1) as usize) as u32;
-                found.push(Range { from: first as u32, to: end as u32, image });
+                found.groups.extend((first..end).step_by(GROUP).map(|place| place as u32));
+                let all = found.groups.len() as u32;
+                let is_new = found.runs.len() == first_run;
+                match found.runs.last_mut() {
+                    Some(run) if !is_new && run.image == image => run.end = all,
+                    _ => found.runs.push(Run { end: all, image }),
+                }
             }
         }
     }
@@ -316,7 +336,7 @@ impl<const D: usize> Pencils<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Domain, Interrupt, OVERRUN, Pencils, Vector};
+    use super::{Domain, GROUP, Interrupt, Pencils, Vector};
     use crate::geometry::domain::Axis;
     use crate::geometry::random::CounterRandom;
     use crate::neighbors::{BruteForce, NeighborSearch};
@@ -333,20 +353,20 @@ mod tests {
         let mut pencils = Pencils::new(&domain, reach).unwrap();
         pencils.rebuild(&points, &Interrupt::default()).unwrap();
         let mut found = vec![Vec::new(); pencils.places()];
-        let mut standing = vec![None; pencils.places() + OVERRUN];
+        let mut standing = vec![None; pencils.places() + GROUP];
         for (place, i) in pencils.occupied() {
             standing[place] = Some(i);
         }
         pencils
-            .for_each_place(&mut found, &Interrupt::default(), |place, ranges, found| {
-                for range in ranges {
-                    let x = points[standing[place].unwrap()] + pencils.shift(range);
-                    let in_reach = |other: u32| {
-                        standing[other as usize].filter(|j| (x - points[*j]).norm() <= reach)
-                    };
-                    found.extend((range.from..range.to).filter_map(in_reach));
-                    // What a vector loop reads beyond a range is out of reach, or it would be in it.
-                    assert!((range.to..range.to + OVERRUN as u32).all(|beyond| in_reach(beyond).is_none()));
+            .for_each_place(&mut found, &Interrupt::default(), |place, near, found| {
+                for (shift, groups) in near.runs() {
+                    let x = points[standing[place].unwrap()] + shift;
+                    // What a group holds beyond its range is out of reach, or it would be found twice.
+                    let places = groups.iter().flat_map(|first| *first..*first + GROUP as u32);
+                    found.extend(
+                        places
+                            .filter_map(|other| standing[other as usize].filter(|j| (x - points[*j]).norm() <= reach)),
+                    );
                 }
                 found.sort_unstable();
             })

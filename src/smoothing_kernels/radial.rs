@@ -27,7 +27,7 @@ pub trait RadialKernel: Copy + Send + Sync + 'static {
 /// What is left of `end` − q·`by`, at least zero.
 #[inline(always)]
 fn rest<T: Number>(q: T, by: f64, end: f64) -> T {
-    q.mul_add(T::splat(-by), T::splat(end)).max(T::splat(0.0))
+    q.mul_add(T::splat(-by), T::splat(end)).positive_part()
 }
 
 /// Keeps divisions by q finite: below it slopes are zero anyway.
@@ -140,7 +140,8 @@ impl RadialKernel for QuinticSplineRadial {
             let t2 = t * t;
             t2 * t2
         };
-        let sum = T::splat(-75.0).mul_add(fourth(1.0), T::splat(30.0).mul_add(fourth(2.0), T::splat(-5.0) * fourth(3.0)));
+        let sum =
+            T::splat(-75.0).mul_add(fourth(1.0), T::splat(30.0).mul_add(fourth(2.0), T::splat(-5.0) * fourth(3.0)));
         sum / q.max(T::splat(TINY))
     }
 }

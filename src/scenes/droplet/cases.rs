@@ -31,22 +31,25 @@ pub(super) fn case(name: &str, dimension: usize, spacing: f64) -> Case {
     let (low, high) = cube(1.22);
     let oscillating = Case {
         shape: Some(both(
-            json!({"type": "ellipse", "semi_axes": [0.75, 0.5]}),
-            json!({"type": "ellipsoid", "semi_axes": [0.75, 0.5, 0.5]}),
+            json!({"type": "ellipse", "center": null, "semi_axes": [0.75, 0.5]}),
+            json!({"type": "ellipsoid", "center": null, "semi_axes": [0.75, 0.5, 0.5]}),
         )),
         low,
         high,
         tension: if is_flat { 50.0 } else { 25.0 },
         density_method: json!("summation"),
         shifting: "none",
-        body_force: json!("none"),
+        body_force: json!({"type": "none"}),
         time_step: None,
         smoothing_h: if is_flat { 3.0 } else { 2.0 },
         fits: (4, 2.8),
     };
     match name {
         "dividing" => Case {
-            shape: Some(both(json!({"type": "circle", "radius": 0.25}), json!({"type": "sphere", "radius": 0.25}))),
+            shape: Some(both(
+                json!({"type": "circle", "center": null, "radius": 0.25}),
+                json!({"type": "sphere", "center": null, "radius": 0.25}),
+            )),
             low: if is_flat { vec![-1.0, -0.5] } else { vec![-0.75, -0.390_625, -0.390_625] },
             high: if is_flat { vec![1.0, 0.5] } else { vec![0.75, 0.390_625, 0.390_625] },
             tension: 5.0,
@@ -54,7 +57,7 @@ pub(super) fn case(name: &str, dimension: usize, spacing: f64) -> Case {
             shifting: "pst",
             // Without force where the halves come to stay, and half way to it across (errata).
             body_force: both(
-                json!({"type": "pulse", "coefficient": 1000, "duration": 0.5, "A": 0.5, "B": 0.5}),
+                json!({"type": "pulse", "coefficient": 1000, "duration": 0.5, "A": 0.5, "B": 0.5, "C": 0.5}),
                 json!({"type": "pulse", "coefficient": 5000, "duration": 0.05, "A": 0.375, "B": 0.390_625, "C": 0.390_625}),
             ),
             time_step: Some(if is_flat { 1e-4 } else { 1.5e-4 }),
@@ -63,7 +66,10 @@ pub(super) fn case(name: &str, dimension: usize, spacing: f64) -> Case {
             ..oscillating
         },
         "static" => Case {
-            shape: Some(both(json!({"type": "circle", "radius": 0.5}), json!({"type": "sphere", "radius": 0.5}))),
+            shape: Some(both(
+                json!({"type": "circle", "center": null, "radius": 0.5}),
+                json!({"type": "sphere", "center": null, "radius": 0.5}),
+            )),
             ..oscillating
         },
         "custom" => Case { shape: None, ..oscillating },

@@ -23,7 +23,12 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         Kind::Integer { least: 2, most: 3 },
         DefaultValue::Absent,
     ),
-    Parameter::new("shape", "the drop at the start; by case when not given", Kind::Choice(shapes::variants), DefaultValue::Absent),
+    Parameter::new(
+        "shape",
+        "the drop at the start; by case when not given",
+        Kind::Choice(shapes::variants),
+        DefaultValue::Absent,
+    ),
     Parameter::new(
         "domain",
         "the box, periodic along every axis; by case when not given",
@@ -51,18 +56,43 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         ]),
         DefaultValue::Json("{}"),
     ),
-    Parameter::new("surface_tension", "τ; by case when not given; with 0 no interface is computed", NOT_NEGATIVE, DefaultValue::Absent),
+    Parameter::new(
+        "surface_tension",
+        "τ; by case when not given; with 0 no interface is computed",
+        NOT_NEGATIVE,
+        DefaultValue::Absent,
+    ),
     Parameter::new(
         "tension_force",
         "balanced: −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet; csf: κ₀ = 0 (the paper)",
         Kind::Word(&["balanced", "csf"]),
         DefaultValue::Json("\"balanced\""),
     ),
-    Parameter::new("geometry", "where normals and curvatures come from", Kind::Choice(|| GEOMETRIES), DefaultValue::Json("\"pcp\"")),
+    Parameter::new(
+        "geometry",
+        "where normals and curvatures come from",
+        Kind::Choice(|| GEOMETRIES),
+        DefaultValue::Json("\"pcp\""),
+    ),
     Parameter::new("discretization", "of the flow", Kind::Choice(|| DISCRETIZATIONS), DefaultValue::Json("\"sph\"")),
-    Parameter::new("density_method", "where densities come from; by case when not given", Kind::Choice(|| DENSITIES), DefaultValue::Absent),
-    Parameter::new("shifting", "particle shifting; by case when not given", Kind::Word(&["none", "pst"]), DefaultValue::Absent),
-    Parameter::new("body_force", "a force from outside; by case when not given", Kind::Choice(|| BODY_FORCES), DefaultValue::Absent),
+    Parameter::new(
+        "density_method",
+        "where densities come from; by case when not given",
+        Kind::Choice(|| DENSITIES),
+        DefaultValue::Absent,
+    ),
+    Parameter::new(
+        "shifting",
+        "particle shifting; by case when not given",
+        Kind::Word(&["none", "pst"]),
+        DefaultValue::Absent,
+    ),
+    Parameter::new(
+        "body_force",
+        "a force from outside; by case when not given",
+        Kind::Choice(|| BODY_FORCES),
+        DefaultValue::Absent,
+    ),
     Parameter::new(
         "integrator",
         "kick_drift_kick: one evaluation a step; predictor_corrector: two (the paper's)",
@@ -75,7 +105,12 @@ pub(super) static PARAMETERS: &[Parameter] = &[
 static FLUID: &[Parameter] = &[
     Parameter::new("density", "ρ₀", POSITIVE, DefaultValue::Json("1")),
     Parameter::new("viscosity", "dynamic viscosity η", NOT_NEGATIVE, DefaultValue::Json("0.5")),
-    Parameter::new("sound_speed", "c, at least ten times the largest speed to come", POSITIVE, DefaultValue::Json("100")),
+    Parameter::new(
+        "sound_speed",
+        "c, at least ten times the largest speed to come",
+        POSITIVE,
+        DefaultValue::Json("100"),
+    ),
     Parameter::new(
         "polytropic",
         "γ",
@@ -86,7 +121,8 @@ static FLUID: &[Parameter] = &[
 
 /// Closest points with a band.
 static PCP: [Parameter; pcp_parameters::PARAMETERS.len() + 1] = {
-    let band = Parameter::new("band_h", "width of the band in h; 4 ε/h + 1 when not given", POSITIVE, DefaultValue::Absent);
+    let band =
+        Parameter::new("band_h", "width of the band in h; 4 ε/h + 1 when not given", POSITIVE, DefaultValue::Absent);
     let mut all = [band; pcp_parameters::PARAMETERS.len() + 1];
     let mut k = 0;
     while k < pcp_parameters::PARAMETERS.len() {

@@ -1,7 +1,7 @@
 //! From parameters to two fluids in a box.
 
 use super::cases::{Case, case};
-use super::parameters::{Corners, Density, Discretization, Force, Stop, WrittenFluid, Written};
+use super::parameters::{Corners, Density, Discretization, Force, Stop, Written, WrittenFluid};
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
@@ -166,10 +166,10 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         }
     };
     let force_json = written.body_force.clone().unwrap_or_else(|| case.body_force.clone());
-    let force: Force = match &force_json {
-        Value::String(_) => Force::None,
-        given => serde_json::from_value(given.clone()).unwrap_or(Force::None),
-    };
+    let force: Force = serde_json::from_value(force_json.clone()).unwrap_or_else(|error| {
+        violations.push(Violation::new("/body_force", "type", error.to_string(), &force_json, Value::Null));
+        Force::None
+    });
     let density = written.density_method.unwrap_or(if case.density_method == "continuity" {
         Density::Continuity { diffusion: 0.05 }
     } else {
@@ -242,7 +242,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         ("discretization", json!({"type": "sph", "kernel": kernel_name, "smoothing_h": smoothing_h})),
         ("density_method", density_json),
         ("shifting", json!(shifting)),
-        ("body_force", if force_json.is_string() { json!({"type": force_json}) } else { force_json }),
+        ("body_force", force_json),
     ] {
         resolved[name] = value;
     }
@@ -328,11 +328,7 @@ impl<const D: usize> DropletScene<D> {
     }
 
     /// Signed distances from the surface of points that came from elsewhere.
-    fn levels_of_points(
-        &self,
-        context: &BuildContext,
-        positions: &[Vector<D>],
-    ) -> Result<Vec<f64>, Violation> {
+    fn levels_of_points(&self, context: &BuildContext, positions: &[Vector<D>]) -> Result<Vec<f64>, Violation> {
         let (points, level) = cloud::points_with_levels::<D>(&context.clouds, "/shape")?;
         if let Some(found) = cloud::check_spacing(&points, self.parts.spacing) {
             return Err(found);
@@ -345,9 +341,8 @@ impl<const D: usize> DropletScene<D> {
         };
         let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.parts.spacing)));
         let never = Interrupt::default();
-        let fitted = surface
-            .detect(&points, &level, &never)
-            .and_then(|()| surface.fit_samples(&points, &level, None, &never));
+        let fitted =
+            surface.detect(&points, &level, &never).and_then(|()| surface.fit_samples(&points, &level, None, &never));
         if fitted.is_err() || surface.is_lost() {
             let detail = "phi of the points has no zero between them".to_owned();
             return Err(Violation::new("/shape", "data", detail, &Value::Null, json!("PointData/phi of both signs")));
@@ -432,7 +427,13 @@ impl<const D: usize> Scene for DropletScene<D> {
                 Geometry::Pcp { method, half_band } => {
                     let band = self.near(2.0 * half_band);
                     let reach_h = half_band / self.parts.spacing;
-                    work.extend(work_estimate::redistancing::<D>(method, band, reach_h, evaluations, Course::EveryStep));
+                    work.extend(work_estimate::redistancing::<D>(
+                        method,
+                        band,
+                        reach_h,
+                        evaluations,
+                        Course::EveryStep,
+                    ));
                     work.push(PhaseWork::every_step("measure", band * (steps_done / 10.0).max(400.0)));
                 }
                 Geometry::ColorField => work.push(PhaseWork::every_step("sph/color", 3.0 * pairs)),

@@ -19,13 +19,12 @@ pub(super) fn sum_color<K: RadialKernel, const D: usize>(
     colors: &mut [f64],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
-    pencils.for_each_place(colors, interrupt, |place, ranges, color| {
+    pencils.for_each_place(colors, interrupt, |place, near, color| {
         let own = columns.at(place);
         let mut sum = Lanes::splat(0.0);
-        for range in ranges {
-            let shift = pencils.shift(range);
+        for (shift, groups) in near.runs() {
             let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(range, |other| {
+            columns.over(groups, |other| {
                 let (_, square) = apart(&x, &other.vectors[0]);
                 let value: Lanes = K::value(Number::sqrt(square));
                 sum = Number::mul_add(value, other.scalars[0], sum);
@@ -43,13 +42,12 @@ pub(super) fn sum_gradient<K: RadialKernel, const D: usize>(
     gradients: &mut [[f64; D]],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
-    pencils.for_each_place(gradients, interrupt, |place, ranges, gradient| {
+    pencils.for_each_place(gradients, interrupt, |place, near, gradient| {
         let own = columns.at(place);
         let mut sums = [Lanes::splat(0.0); D];
-        for range in ranges {
-            let shift = pencils.shift(range);
+        for (shift, groups) in near.runs() {
             let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(range, |other| {
+            columns.over(groups, |other| {
                 let (dx, square) = apart(&x, &other.vectors[0]);
                 let slope: Lanes = K::slope_over_q(Number::sqrt(square));
                 let weight = slope * other.scalars[1] * (other.scalars[0] - own.scalars[0]);
@@ -71,17 +69,16 @@ pub(super) fn sum_curvature<K: RadialKernel, const D: usize>(
     sums: &mut [[f64; 2]],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
-    pencils.for_each_place(sums, interrupt, |place, ranges, sum| {
+    pencils.for_each_place(sums, interrupt, |place, near, sum| {
         *sum = [0.0; 2];
         if columns.scalars[0][place] == 0.0 {
             return;
         }
         let own = columns.at(place);
         let (mut weights, mut divergence) = (Lanes::splat(0.0), Lanes::splat(0.0));
-        for range in ranges {
-            let shift = pencils.shift(range);
+        for (shift, groups) in near.runs() {
             let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(range, |other| {
+            columns.over(groups, |other| {
                 let (dx, square) = apart(&x, &other.vectors[0]);
                 let q = Number::sqrt(square);
                 let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));

@@ -45,15 +45,14 @@ pub(super) fn sum_rates<K: RadialKernel, const D: usize, const S: usize>(
     // Π = −k ν u·x/(ε ρ̄ (q² + μ̂)), with ρ̄ = (ρ_i + ρ_j)/2.
     let drag = Lanes::splat(-2.0 * inverse_smoothing);
     let same = Lanes::splat(viscosity);
-    pencils.for_each_place(rates, interrupt, |place, ranges, rates| {
+    pencils.for_each_place(rates, interrupt, |place, near, rates| {
         let own = columns.at(place);
         let u = own.vectors[1];
         let (density, stress) = (own.scalars[0], own.scalars[2]);
         let (mut force, mut compression, mut diffusion) = ([zero; D], zero, zero);
-        for range in ranges {
-            let shift = pencils.shift(range);
+        for (shift, groups) in near.runs() {
             let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(range, |other| {
+            columns.over(groups, |other| {
                 let (dx, square) = apart(&x, &other.vectors[0]);
                 let slope: Lanes = K::slope_over_q(Number::sqrt(square));
                 let [other_density, volume] = [other.scalars[0], other.scalars[1]];

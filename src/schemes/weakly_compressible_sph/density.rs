@@ -14,13 +14,12 @@ pub(super) fn sum_kernel<K: RadialKernel, const D: usize>(
     sums: &mut [f64],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
-    pencils.for_each_place(sums, interrupt, |place, ranges, sum| {
+    pencils.for_each_place(sums, interrupt, |place, near, sum| {
         let own = columns.at(place);
         let mut lanes = Lanes::splat(0.0);
-        for range in ranges {
-            let shift = pencils.shift(range);
+        for (shift, groups) in near.runs() {
             let x: [Lanes; D] = std::array::from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(range, |other| {
+            columns.over(groups, |other| {
                 let (_, square) = apart(&x, &other.vectors[0]);
                 lanes += K::value(Number::sqrt(square));
             });

@@ -20,8 +20,11 @@ impl Fluid {
         let ratio = density / self.density;
         // A whole exponent costs a few multiplications.
         let whole = self.polytropic.round();
-        let power =
-            if (whole - self.polytropic).abs() < 1e-12 { ratio.powi(whole as i32) } else { ratio.powf(self.polytropic) };
+        let power = if (whole - self.polytropic).abs() < 1e-12 {
+            ratio.powi(whole as i32)
+        } else {
+            ratio.powf(self.polytropic)
+        };
         self.sound_speed * self.sound_speed * self.density / self.polytropic * (power - 1.0)
     }
 

@@ -143,7 +143,8 @@ impl<const D: usize> Hydrodynamics<D> {
                 for (d, column) in self.u.iter_mut().enumerate() {
                     pencils.gather(column, 0.0, |i| viscosity * inverse * velocity[i][d]);
                 }
-                let columns = Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<2>(&self.scalars) };
+                let columns =
+                    Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<2>(&self.scalars) };
                 with_kernel!(self.kernel, K => sum_forces::<K, D, 2>(pencils, &columns, inverse, sums, interrupt))?;
             }
             Err(viscosity) => {
@@ -151,7 +152,8 @@ impl<const D: usize> Hydrodynamics<D> {
                     pencils.gather(column, 0.0, |i| inverse * velocity[i][d]);
                 }
                 pencils.gather(&mut self.scalars[2], 1.0, viscosity);
-                let columns = Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<3>(&self.scalars) };
+                let columns =
+                    Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<3>(&self.scalars) };
                 with_kernel!(self.kernel, K => sum_forces::<K, D, 3>(pencils, &columns, inverse, sums, interrupt))?;
             }
         }

@@ -21,16 +21,15 @@ pub(super) fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
     let (one, half) = (Lanes::splat(1.0), Lanes::splat(-0.5));
-    pencils.for_each_place(forces, interrupt, |place, ranges, force| {
+    pencils.for_each_place(forces, interrupt, |place, near, force| {
         let own = columns.at(place);
         let u = own.vectors[1];
         let (volume, stress) = (own.scalars[0], own.scalars[1]);
         let volume2 = volume * volume;
         let mut sums = [Lanes::splat(0.0); D];
-        for range in ranges {
-            let shift = pencils.shift(range);
+        for (shift, groups) in near.runs() {
             let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(range, |other| {
+            columns.over(groups, |other| {
                 let (dx, square) = apart(&x, &other.vectors[0]);
                 let slope: Lanes = K::slope_over_q(Number::sqrt(square));
                 let (other_volume, other_stress) = (other.scalars[0], other.scalars[1]);

@@ -1,7 +1,6 @@
 //! Sums over pairs, gathered particle by particle in the order of pencils, several pairs side by side.
 
 use crate::linear_algebra::number::{LANES, Lanes, Number};
-use crate::neighbors::pencils::Range;
 use std::array::from_fn;
 
 /// `V` vector columns and `S` scalar columns in the order of places.
@@ -20,7 +19,7 @@ pub(super) struct Side<const D: usize, const V: usize, const S: usize> {
     pub scalars: [Lanes; S],
 }
 
-impl<'a, const D: usize, const V: usize, const S: usize> Columns<'a, D, V, S> {
+impl<const D: usize, const V: usize, const S: usize> Columns<'_, D, V, S> {
     /// The values of one place.
     #[inline(always)]
     pub fn at(&self, place: usize) -> Side<D, V, S> {
@@ -30,23 +29,30 @@ impl<'a, const D: usize, const V: usize, const S: usize> Columns<'a, D, V, S> {
         }
     }
 
-    /// Calls `add` with the values of a range, [`LANES`] places at a time and up to three places behind its end.
+    /// Calls `add` with the values of groups of places.
     #[inline(always)]
-    pub fn over(&self, range: &Range, mut add: impl FnMut(&Side<D, V, S>)) {
-        let (from, to) = (range.from as usize, range.to as usize);
-        let end = from + (to - from).next_multiple_of(LANES);
-        let first = self.vectors[0][0][from..end].as_chunks::<LANES>().0;
-        // Of one length, as the compiler can see, so that nothing is checked in the loop.
-        let part = |column: &'a [f64]| &column[from..end].as_chunks::<LANES>().0[..first.len()];
-        let vectors: [[&[[f64; LANES]]; D]; V] = from_fn(|v| from_fn(|d| part(self.vectors[v][d])));
-        let scalars: [&[[f64; LANES]]; S] = from_fn(|s| part(self.scalars[s]));
-        for k in 0..first.len() {
+    pub fn over(&self, groups: &[u32], mut add: impl FnMut(&Side<D, V, S>)) {
+        // Cut to one length, so that one comparison a group stands for all columns.
+        let length = self.vectors[0][0].len();
+        let vectors: [[&[f64]; D]; V] = from_fn(|v| from_fn(|d| &self.vectors[v][d][..length]));
+        let scalars: [&[f64]; S] = from_fn(|s| &self.scalars[s][..length]);
+        for first in groups {
+            let at = *first as usize;
+            let end = at + LANES;
+            if end > length {
+                return;
+            }
             add(&Side {
-                vectors: from_fn(|v| from_fn(|d| Lanes::new(vectors[v][d][k]))),
-                scalars: from_fn(|s| Lanes::new(scalars[s][k])),
+                vectors: from_fn(|v| from_fn(|d| lanes(&vectors[v][d][at..end]))),
+                scalars: from_fn(|s| lanes(&scalars[s][at..end])),
             });
         }
     }
+}
+
+#[inline(always)]
+fn lanes(numbers: &[f64]) -> Lanes {
+    numbers.first_chunk::<LANES>().map_or(Lanes::splat(0.0), |lanes| Lanes::new(*lanes))
 }
 
 /// x_i − x_j in units of ε and its square.

@@ -98,7 +98,8 @@ impl<const D: usize> SphParts<D> {
     /// Whether all pairs have one viscosity.
     #[must_use]
     pub fn has_one_viscosity(&self) -> bool {
-        self.inside.viscosity == self.outside.viscosity && (self.has_one_mass() || self.density == DensityMethod::Summation)
+        self.inside.viscosity == self.outside.viscosity
+            && (self.has_one_mass() || self.density == DensityMethod::Summation)
     }
 
     /// Whether there is an interface to compute.

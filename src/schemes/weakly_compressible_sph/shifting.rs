@@ -18,13 +18,12 @@ pub(super) fn sum_concentration<K: RadialKernel, const D: usize>(
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
     let (one, fifth, by_spacing) = (Lanes::splat(1.0), Lanes::splat(0.2), Lanes::splat(1.0 / at_spacing));
-    pencils.for_each_place(gradients, interrupt, |place, ranges, gradient| {
+    pencils.for_each_place(gradients, interrupt, |place, near, gradient| {
         let own = columns.at(place);
         let mut sums = [Lanes::splat(0.0); D];
-        for range in ranges {
-            let shift = pencils.shift(range);
+        for (shift, groups) in near.runs() {
             let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(range, |other| {
+            columns.over(groups, |other| {
                 let (dx, square) = apart(&x, &other.vectors[0]);
                 let q = Number::sqrt(square);
                 let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));

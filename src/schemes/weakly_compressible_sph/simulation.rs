@@ -70,6 +70,8 @@ impl Pace {
 const MOST_PARTS: f64 = 64.0;
 /// Steps of rest that count as rest.
 const STEPS_OF_REST: u64 = 50;
+/// Steps between measurements at least: each costs about as much as a step, and takes room of its own.
+const LEAST_BETWEEN: u64 = 16;
 /// Measurements of a run, about.
 const MEASUREMENTS: u64 = 400;
 
@@ -153,7 +155,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
     fn is_row_due(&self, step: u64) -> bool {
         step >= self.pace.last
             || self.plan.is_series_due(&self.pace.fixed(), step)
-            || step.is_multiple_of((self.pace.last / MEASUREMENTS).max(1))
+            || step.is_multiple_of((self.pace.last / MEASUREMENTS).max(LEAST_BETWEEN))
     }
 
     /// How many parts a step must be cut into, for the present speed.
@@ -243,8 +245,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let part = self.time_of_part();
         for k in 0..self.parts_of_step {
             let time = start.time + k as f64 * part;
-            let changed =
-                self.system.advance(time, part, &mut self.phases).map_err(|error| failed(error, next))?;
+            let changed = self.system.advance(time, part, &mut self.phases).map_err(|error| failed(error, next))?;
             if let Some(droplets) = changed {
                 let name = if droplets as f64 > self.summary.droplets { "split" } else { "merged" };
                 let message = format!("there are {droplets} droplets now");
@@ -323,8 +324,10 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let Clock { step, time } = self.pace.origin;
         state.push_counts("origin_step", vec![step]);
         state.push_reals("origin", &[time, self.pace.time_step]);
-        state.push_reals("row", &self.row);
-        state.push_reals("summary", &self.summary.to_numbers(self.pace.end_time));
+        // What is not known is no number, which a checkpoint's arrays of numbers would not hold: their bits are kept.
+        state.push_counts("row", self.row.iter().map(|v| v.to_bits()).collect());
+        let summary = self.summary.to_numbers(self.pace.end_time);
+        state.push_counts("summary", summary.iter().map(|v| v.to_bits()).collect());
         state
     }
 
@@ -351,14 +354,19 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         for name in ["phase", "candidate", "droplet"] {
             check_length(name, state.counts(name)?.len(), count)?;
         }
-        let (rescues, counters, monitors) = (state.counts("rescues")?, state.counts("counters")?, state.reals("monitors")?);
+        let (rescues, counters, monitors) =
+            (state.counts("rescues")?, state.counts("counters")?, state.reals("monitors")?);
         let entries = self.system.interface.as_ref().map_or(0, |i| i.surface.soundness().counts.entries().len());
         check_length("rescues", rescues.len(), entries)?;
         check_length("counters", counters.len(), 3)?;
         check_length("monitors", monitors.len(), 3)?;
-        check_length("row", state.reals("row")?.len(), self.row.len())?;
-        let Some(summary) = Summary::from_numbers(state.reals("summary")?, pace.end_time) else {
-            let got = state.reals("summary")?.len();
+        check_length("row", state.counts("row")?.len(), self.row.len())?;
+        let numbers = |name| -> Result<Vec<f64>, RestoreError> {
+            Ok(state.counts(name)?.iter().map(|bits| f64::from_bits(*bits)).collect())
+        };
+        let (row, summary) = (numbers("row")?, numbers("summary")?);
+        let got = summary.len();
+        let Some(summary) = Summary::from_numbers(&summary, pace.end_time) else {
             return Err(RestoreError::Length { name: "summary".to_owned(), got, expected: Summary::HEAD });
         };
         state.pull_particles(&mut self.system.particles)?;
@@ -398,7 +406,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         self.max_cfl = monitors[0];
         self.parts_of_step = counters[0].max(1);
         self.resting = counters[1];
-        self.row = state.reals("row")?.to_vec();
+        self.row = row;
         self.summary = summary;
         self.findings.clear();
         self.step = state.step;

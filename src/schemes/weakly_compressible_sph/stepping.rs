@@ -22,12 +22,7 @@ impl<const D: usize> SphSystem<D> {
 
     /// 1. Half a kick, a drift. 2. Forces there, viscous ones (and densities by continuity) with what a whole kick would
     ///    give. 3. Half a kick.
-    fn kick_drift_kick(
-        &mut self,
-        time: f64,
-        step: f64,
-        phases: &mut Phases,
-    ) -> Result<Option<usize>, EvaluationError> {
+    fn kick_drift_kick(&mut self, time: f64, step: f64, phases: &mut Phases) -> Result<Option<usize>, EvaluationError> {
         let half = 0.5 * step;
         phases.measure("sph/advance", || {
             self.kick(half);

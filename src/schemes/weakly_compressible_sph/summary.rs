@@ -156,12 +156,9 @@ impl Summary {
     }
 }
 
-const CROSSINGS: [&str; MOST_TURNS] = [
-    "zero_1", "zero_2", "zero_3", "zero_4", "zero_5", "zero_6", "zero_7", "zero_8",
-];
-const EXTREMES: [&str; MOST_TURNS] = [
-    "extreme_1", "extreme_2", "extreme_3", "extreme_4", "extreme_5", "extreme_6", "extreme_7", "extreme_8",
-];
+const CROSSINGS: [&str; MOST_TURNS] = ["zero_1", "zero_2", "zero_3", "zero_4", "zero_5", "zero_6", "zero_7", "zero_8"];
+const EXTREMES: [&str; MOST_TURNS] =
+    ["extreme_1", "extreme_2", "extreme_3", "extreme_4", "extreme_5", "extreme_6", "extreme_7", "extreme_8"];
 
 #[cfg(test)]
 mod tests {

@@ -179,6 +179,8 @@ impl<const D: usize> SphSystem<D> {
         let changed = if is_due { phases.measure("droplets", || self.count_droplets()) } else { None };
         if self.parts.density == DensityMethod::Summation {
             phases.measure("sph/density", || self.sum_densities())?;
+        } else {
+            self.derive_volumes();
         }
         self.derive_pressures();
         if !self.gradient.is_empty() {
@@ -200,7 +202,8 @@ impl<const D: usize> SphSystem<D> {
             phases.measure("neighbors", || self.hydrodynamics.list(&self.reference, &self.interrupt))?;
             if let Some(interface) = &mut self.interface {
                 let candidate = &mut self.candidate;
-                phases.measure("redistancing/detection", || interface.select(&self.particles, &self.columns, candidate));
+                phases
+                    .measure("redistancing/detection", || interface.select(&self.particles, &self.columns, candidate));
             }
         }
         Ok(is_stale)
@@ -212,11 +215,15 @@ impl<const D: usize> SphSystem<D> {
         if let Some(interface) = &mut self.interface {
             interface.take(&self.candidate);
         }
+        self.derive_pressures();
+        Ok(())
+    }
+
+    /// The volumes of the present densities: what a state needs not hold.
+    fn derive_volumes(&mut self) {
         for i in 0..self.volume.len() {
             self.volume[i] = self.mass(i) / self.density[i];
         }
-        self.derive_pressures();
-        Ok(())
     }
 
     fn gather_positions(&mut self) {
@@ -225,11 +232,17 @@ impl<const D: usize> SphSystem<D> {
 
     /// Moves particles towards evenness (B.16); the interface stays where it is.
     fn shift(&mut self) -> Result<(), Interrupted> {
+        self.derive_volumes();
         let Self { hydrodynamics, particles, parts, volume, domain, interrupt, .. } = self;
         let positions = particles.positions_mut();
-        hydrodynamics.concentration(|i| volume[i], parts.spacing, interrupt, |i, gradient| {
-            positions[i] = domain.wrap(positions[i] + displacement(gradient, parts.smoothing_length));
-        })?;
+        hydrodynamics.concentration(
+            |i| volume[i],
+            parts.spacing,
+            interrupt,
+            |i, gradient| {
+                positions[i] = domain.wrap(positions[i] + displacement(gradient, parts.smoothing_length));
+            },
+        )?;
         self.gather_positions();
         Ok(())
     }
@@ -278,11 +291,17 @@ impl<const D: usize> SphSystem<D> {
             DensityMethod::Continuity { diffusion } => {
                 let rates = &mut self.density_rate;
                 hydrodynamics.rates(
-                    parts, diffusion, phase, mass, density, pressure, predicted, acceleration, rates, interrupt,
+                    parts,
+                    diffusion,
+                    phase,
+                    mass,
+                    density,
+                    pressure,
+                    predicted,
+                    acceleration,
+                    rates,
+                    interrupt,
                 )?;
-                for i in 0..volume.len() {
-                    volume[i] = mass(i) / density[i];
-                }
             }
         }
         Ok(())
@@ -306,7 +325,8 @@ impl<const D: usize> SphSystem<D> {
         if let Some(interface) = &self.interface {
             let (phi, curvature) =
                 (self.particles.scalar(self.columns.phi), self.particles.scalar(self.columns.curvature));
-            let (normal, band) = (self.particles.vector(self.columns.normal), self.particles.flag(self.columns.in_band));
+            let (normal, band) =
+                (self.particles.vector(self.columns.normal), self.particles.flag(self.columns.in_band));
             for i in interface.candidates().iter().copied().filter(|i| band[*i] == 1) {
                 let delta = smoothed_delta(phi[i], self.parts.smoothing_length);
                 if delta > 0.0 {
@@ -324,8 +344,7 @@ impl<const D: usize> SphSystem<D> {
 
     fn add_body_force(&mut self, time: f64) {
         let Some(force) = &self.parts.body_force else { return };
-        for ((acceleration, x), phase) in
-            self.acceleration.iter_mut().zip(self.particles.positions()).zip(&self.phase)
+        for ((acceleration, x), phase) in self.acceleration.iter_mut().zip(self.particles.positions()).zip(&self.phase)
         {
             *acceleration += force.acceleration(x, time, *phase == 1);
         }

@@ -26,7 +26,10 @@ pub fn longest_step<const D: usize>(parts: &SphParts<D>, speed: f64) -> (f64, &'
     for fluid in [&parts.inside, &parts.outside] {
         bind(acoustic * epsilon / (fluid.sound_speed + speed), "the speed of sound");
         bind(viscous * fluid.density * epsilon * epsilon / fluid.viscosity, "viscosity");
-        bind(capillary * (fluid.density * epsilon.powi(3) / (2.0 * PI * parts.tension.abs())).sqrt(), "capillary waves");
+        bind(
+            capillary * (fluid.density * epsilon.powi(3) / (2.0 * PI * parts.tension.abs())).sqrt(),
+            "capillary waves",
+        );
     }
     if let Some(force) = &parts.body_force {
         bind(0.25 * (epsilon / force.strength()).sqrt(), "the force from outside");
