@@ -16,6 +16,10 @@ const MARGIN_H: f64 = 1.0;
 /// Within so many h a particle counts as next to the surface when others are selected.
 const NEAR_H: f64 = 2.0;
 
+/// Curvature by h, and cosine between the last normal and the present one, of an interface that shifted particles may cross.
+const BEND: f64 = 0.3;
+const FACING: f64 = 0.8;
+
 /// The surface and the particles near it.
 #[derive(Debug)]
 pub(super) struct Interface<const D: usize> {
@@ -32,14 +36,14 @@ pub(super) struct Interface<const D: usize> {
     level: Vec<f64>,
     normals: Vec<Vector<D>>,
     answers: Answers<D>,
-    /// Whether particles move between rebuild and answer.
-    is_shifted: bool,
+    /// How far particles are moved between rebuild and answer at most; negative where nobody is.
+    most_shift: f64,
     /// Curvatures that were cut to 1/h.
     pub bounded: u64,
 }
 
 impl<const D: usize> Interface<D> {
-    pub fn new(method: PcpMethod, domain: &Domain<D>, spacing: f64, half_band: f64, is_shifted: bool) -> Self {
+    pub fn new(method: PcpMethod, domain: &Domain<D>, spacing: f64, half_band: f64, most_shift: f64) -> Self {
         let keep = half_band.max(method.reach_h::<D>() * spacing) + MARGIN_H * spacing;
         Self {
             surface: LevelSurface::Spatial(Box::new(Redistancing::new(method, domain.clone(), spacing))),
@@ -54,7 +58,7 @@ impl<const D: usize> Interface<D> {
             level: Vec::new(),
             normals: Vec::new(),
             answers: Answers::default(),
-            is_shifted,
+            most_shift,
             bounded: 0,
         }
     }
@@ -148,9 +152,14 @@ impl<const D: usize> Interface<D> {
                     candidate[i] = 1;
                 }
                 let was_inside = self.level[k] < 0.0;
-                // Who was moved aside may have crossed over; who lies off a mere sample keeps what it has carried.
-                let is_near = self.is_shifted && answer.distance < self.spacing && !answer.is_sample;
-                let is_inside = if is_near { !answer.is_outside } else { was_inside };
+                // Nobody crosses over but who lay nearer to the interface than it was moved aside, and where that is known
+                // well: gently bent, and facing as before.
+                let is_known = !answer.is_sample
+                    && answer.curvature.abs() * self.spacing < BEND
+                    && answer.normal.dot(&self.normals[k]) > FACING;
+                let may_cross = is_known && self.level[k].abs() <= self.most_shift;
+                let is_inside = if may_cross { !answer.is_outside } else { was_inside };
+                // Who lies off a mere sample keeps what it has carried.
                 if !answer.is_sample {
                     particles.scalar_mut(columns.phi)[i] = if is_inside { -answer.distance } else { answer.distance };
                 }

@@ -8,6 +8,9 @@ use crate::parallel::{Interrupt, Interrupted};
 use crate::smoothing_kernels::RadialKernel;
 use std::array::from_fn;
 
+/// The longest displacement, in ε.
+pub(super) const MOST_SHIFT: f64 = 0.02;
+
 /// Σ (1 + 0.2 (W_ij/W(h))⁴) ∇W V_j, but for the kernel's factors. Columns: position in ε; V in h^D. `at_spacing` is w(h/ε).
 pub(super) fn sum_concentration<K: RadialKernel, const D: usize>(
     pencils: &Pencils<D>,
@@ -43,6 +46,6 @@ pub(super) fn sum_concentration<K: RadialKernel, const D: usize>(
 #[must_use]
 pub(super) fn displacement<const D: usize>(gradient: Vector<D>, smoothing_length: f64) -> Vector<D> {
     let full = gradient * (-0.05 * smoothing_length * smoothing_length);
-    let (length, most) = (full.norm(), 0.02 * smoothing_length);
+    let (length, most) = (full.norm(), MOST_SHIFT * smoothing_length);
     if length < most { full } else { full * (most / length) }
 }

@@ -4,7 +4,7 @@ use super::components::{Components, FRAGMENT, ball_curvature};
 use super::hydrodynamics::Hydrodynamics;
 use super::interface::Interface;
 use super::parts::{DensityMethod, Geometry, Integrator, SphParts, TensionForce};
-use super::shifting::displacement;
+use super::shifting::{MOST_SHIFT, displacement};
 use super::stepping::Start;
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::{Domain, Vector};
@@ -100,7 +100,8 @@ impl<const D: usize> SphSystem<D> {
         particles.scalar_mut(columns.phi).copy_from_slice(&drop.level);
         let interface = match &parts.geometry {
             Geometry::Pcp { method, half_band } if parts.has_tension() => {
-                Some(Interface::new(method.clone(), &domain, parts.spacing, *half_band, parts.is_shifted))
+                let most_shift = if parts.is_shifted { MOST_SHIFT * parts.smoothing_length } else { -1.0 };
+                Some(Interface::new(method.clone(), &domain, parts.spacing, *half_band, most_shift))
             }
             _ => None,
         };
@@ -174,6 +175,13 @@ impl<const D: usize> SphSystem<D> {
         if let Some(interface) = &mut self.interface {
             let (particles, candidate) = (&mut self.particles, &mut self.candidate);
             interface.answer(particles, &self.columns, candidate, is_listed, &self.interrupt, phases)?;
+            if self.parts.is_shifted && self.parts.inside == self.parts.outside {
+                // Of one fluid, whoever is shifted across is of the other side from then on.
+                let phi = self.particles.scalar(self.columns.phi);
+                for i in interface.candidates() {
+                    self.phase[*i] = u8::from(phi[*i] < 0.0);
+                }
+            }
         }
         let is_due = is_listed && self.parts.has_tension();
         let changed = if is_due { phases.measure("droplets", || self.count_droplets()) } else { None };
