@@ -90,7 +90,8 @@ pub enum StepError {
     },
     /// A particle is faster than sound: the fluid is no longer nearly incompressible.
     #[error(
-        "particle {particle} moves at {speed:.4e}, faster than sound ({sound_speed}), at step {step}, time {time}; the step was {time_step:.3e}, {bound} allows {stable:.3e}"
+        "particle {particle} moves at {speed:.4e}, faster than sound ({sound_speed}), at step {step}, time {time}; {}",
+        advice(*.time_step, *.stable, .bound)
     )]
     TooFast {
         /// Which particle.
@@ -134,6 +135,17 @@ pub enum StepError {
         /// At what time.
         time: f64,
     },
+}
+
+/// What would have held.
+fn advice(time_step: f64, stable: f64, bound: &str) -> String {
+    if time_step > stable * 1.001 {
+        return format!("the step was {time_step:.3e}, {bound} allows {stable:.3e}");
+    }
+    format!(
+        "the step of {time_step:.3e} is within the limits ({bound} allows {stable:.3e}), so particles have crowded: shifting, a \
+         higher speed of sound or a finer spacing is needed"
+    )
 }
 
 impl From<crate::parallel::Interrupted> for StepError {

@@ -41,7 +41,7 @@ fn bodies() -> Vec<Value> {
             "kind": "redistance", "spacing": 0.05, "repeat": 3, "method": {"type": "remesh", "kernel": kernel}
         }));
     }
-    let droplet = |more: Value| {
+    let droplet = |more: Value| -> Value {
         // Driven fast enough that neighbours are listed anew a few times.
         let force = json!({"type": "constant", "acceleration": [300, 100]});
         let mut body = json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.014, "body_force": force});

@@ -1,6 +1,7 @@
 //! The papers' cases and the hard ones, against figures with their reasons.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod droplets;
 mod hard_cases;
 #[path = "../support/mod.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]

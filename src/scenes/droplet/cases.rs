@@ -63,7 +63,6 @@ pub(super) fn case(name: &str, dimension: usize, spacing: f64) -> Case {
             time_step: Some(if is_flat { 1e-4 } else { 1.5e-4 }),
             smoothing_h: if is_flat { growing_smoothing(spacing) } else { 2.0 },
             fits: (3, 3.0),
-            ..oscillating
         },
         "static" => Case {
             shape: Some(both(

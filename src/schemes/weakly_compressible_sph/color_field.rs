@@ -83,8 +83,8 @@ pub(super) fn sum_curvature<K: RadialKernel, const D: usize>(
                 let q = Number::sqrt(square);
                 let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
                 weights = Number::mul_add(value, other.scalars[0], weights);
-                for d in 0..D {
-                    let turn = (other.vectors[1][d] - own.vectors[1][d]) * dx[d];
+                for (d, dx) in dx.iter().enumerate() {
+                    let turn = (other.vectors[1][d] - own.vectors[1][d]) * *dx;
                     divergence = Number::mul_add(slope * other.scalars[0], turn, divergence);
                 }
             });

@@ -1,7 +1,7 @@
 //! Rates of density and velocity in the mass form: continuity with diffusion (PCP eq. B.12, corrected by errata), pressure
 //! with a viscosity that stands for the physical one (B.13, B.14).
 
-use super::pair_sums::{Columns, apart, total};
+use super::pair_sums::{Columns, TINY, apart, total};
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
 use crate::parallel::{Interrupt, Interrupted};
@@ -70,7 +70,7 @@ pub(super) fn sum_rates<K: RadialKernel, const D: usize, const S: usize>(
                     other.scalars.get(5),
                 ) {
                     mass = *m;
-                    kinematic = (*a + *a) * *b / (*a + *b);
+                    kinematic = (*a + *a) * *b / (*a + *b + Lanes::splat(TINY));
                     excess = density * *by - other_density * *other_by;
                 }
                 let viscous = drag * kinematic * approach / ((density + other_density) * (square + softening));

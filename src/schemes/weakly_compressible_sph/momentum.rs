@@ -1,7 +1,7 @@
 //! Pressure and viscous forces between particles in the volume form (PCP eq. B.2): antisymmetric in the pair, so that
 //! momentum is kept to round-off.
 
-use super::pair_sums::{Columns, apart, total};
+use super::pair_sums::{Columns, TINY, apart, total};
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
 use crate::parallel::{Interrupt, Interrupted};
@@ -42,7 +42,7 @@ pub(super) fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
                 let mut across: [Lanes; D] = from_fn(|d| u[d] - other.vectors[1][d]);
                 if let (Some(a), Some(b)) = (own.scalars.get(2), other.scalars.get(2)) {
                     // The harmonic mean keeps the shear stress of two layers.
-                    let viscosity = (*a + *a) * *b / (*a + *b);
+                    let viscosity = (*a + *a) * *b / (*a + *b + Lanes::splat(TINY));
                     across = across.map(|c| c * viscosity);
                 }
                 for d in 0..D {

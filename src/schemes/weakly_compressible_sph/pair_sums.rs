@@ -55,6 +55,9 @@ fn lanes(numbers: &[f64]) -> Lanes {
     numbers.first_chunk::<LANES>().map_or(Lanes::splat(0.0), |lanes| Lanes::new(*lanes))
 }
 
+/// Keeps the mean of two viscosities that are both zero a number.
+pub(super) const TINY: f64 = 1e-300;
+
 /// x_i − x_j in units of ε and its square.
 #[inline(always)]
 pub(super) fn apart<const D: usize>(x: &[Lanes; D], other: &[Lanes; D]) -> ([Lanes; D], Lanes) {

@@ -16,6 +16,8 @@ pub(super) struct Summary {
     measure: f64,
     /// The last two moments and deformations.
     shapes: [[f64; 2]; 2],
+    /// Where the deformation last turned, or began; and the largest since it last passed zero.
+    swing: [f64; 2],
     /// Times at which the deformation passed zero.
     crossings: Vec<f64>,
     /// Times and values of its extremes.
@@ -31,18 +33,21 @@ impl Default for Summary {
             droplets: 1.0,
             measure: f64::NAN,
             shapes: [[f64::NAN; 2]; 2],
+            swing: [f64::NAN, 0.0],
             crossings: Vec::new(),
             extremes: Vec::new(),
         }
     }
 }
 
+/// Swings of the deformation that are more than noise.
+const LEAST_SWING: f64 = 0.01;
 /// Turns of the shape that are kept.
 const MOST_TURNS: usize = 8;
 
 impl Summary {
     /// Numbers before the lists.
-    pub const HEAD: usize = 17;
+    pub const HEAD: usize = 19;
 
     /// Takes pressure jump, its part by the equation of state, mean and deviation of the curvature, and |Σ m u|.
     pub fn take(&mut self, _time: f64, is_late: bool, [jump, eos, mean, deviation, momentum]: [f64; 5]) {
@@ -63,9 +68,14 @@ impl Summary {
             return None;
         }
         self.shapes = [[t1, d1], [time, value]];
+        if self.swing[0].is_nan() {
+            self.swing[0] = value;
+        }
+        self.swing[1] = self.swing[1].max(value.abs());
         let mut found = None;
-        if d1 * value < 0.0 && self.crossings.len() < MOST_TURNS {
+        if d1 * value < 0.0 && self.swing[1] > LEAST_SWING && self.crossings.len() < MOST_TURNS {
             self.crossings.push(t1 + (time - t1) * d1 / (d1 - value));
+            self.swing[1] = 0.0;
         }
         if (d1 - d0) * (value - d1) < 0.0 && self.extremes.len() < MOST_TURNS {
             // The vertex of the parabola through the three.
@@ -73,6 +83,10 @@ impl Summary {
             let bend = (b - a) / (time - t0);
             let vertex = 0.5 * (t0 + t1) - 0.5 * a / bend;
             let height = d1 + (vertex - t1) * (a + bend * (vertex - t0));
+            if (height - self.swing[0]).abs() < LEAST_SWING {
+                return None;
+            }
+            self.swing[0] = height;
             self.extremes.push([vertex, height]);
             let is_first = self.extremes.len() == 1;
             let message = format!("the deformation turned at {height:.4}, time {vertex:.4}");
@@ -91,6 +105,7 @@ impl Summary {
         numbers.extend(self.curvature);
         numbers.extend([self.momentum, self.droplets, self.measure]);
         numbers.extend(self.shapes.as_flattened());
+        numbers.extend(self.swing);
         numbers.extend([self.crossings.len() as f64, self.extremes.len() as f64]);
         numbers.extend(&self.crossings);
         numbers.extend(self.extremes.as_flattened());
@@ -100,7 +115,7 @@ impl Summary {
     /// None where the numbers are none of a summary. What was summed for another end is forgotten.
     pub fn from_numbers(numbers: &[f64], end: f64) -> Option<Self> {
         let (head, lists) = numbers.split_at_checked(Self::HEAD)?;
-        let (crossings, extremes) = (head[15] as usize, head[16] as usize);
+        let (crossings, extremes) = (head[17] as usize, head[18] as usize);
         if lists.len() != crossings + 2 * extremes {
             return None;
         }
@@ -112,6 +127,7 @@ impl Summary {
             droplets: head[9],
             measure: head[10],
             shapes: [[head[11], head[12]], [head[13], head[14]]],
+            swing: [head[15], head[16]],
             crossings: lists[..crossings].to_vec(),
             extremes: lists[crossings..].as_chunks::<2>().0.to_vec(),
         })
