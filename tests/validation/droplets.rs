@@ -73,7 +73,7 @@ fn a_circle_rests_and_its_pressure_follows_young_and_laplace() {
 #[test]
 fn a_drop_at_rest_ends_its_run_when_asked_to() {
     let stop = json!({"type": "at_rest", "velocity": 0.05});
-    let (simulation, findings) = finish(&droplet(json!({"case": "static", "end_time": 5, "stop_when": stop})));
+    let (simulation, findings) = finish(&droplet(&json!({"case": "static", "end_time": 5, "stop_when": stop})));
     assert!(simulation.clock().time < 1.0, "{}", simulation.clock().time);
     assert_eq!(findings, ["came_to_rest"]);
 }
@@ -83,7 +83,7 @@ fn a_drop_at_rest_ends_its_run_when_asked_to() {
 fn the_edge_of_the_box_is_no_place() {
     let at = |center: [f64; 2]| {
         let shape = json!({"type": "ellipse", "center": center, "semi_axes": [0.75, 0.5]});
-        finish(&droplet(json!({"end_time": 0.05, "shape": shape}))).0
+        finish(&droplet(&json!({"end_time": 0.05, "shape": shape}))).0
     };
     // A whole number of spacings apart (the box has 49 particles a side).
     let spacing = 2.44 / 49.0;
@@ -97,7 +97,7 @@ fn the_edge_of_the_box_is_no_place() {
 #[test]
 fn fluids_may_differ() {
     for outside in [json!({"density": 0.1, "viscosity": 0.05}), json!({"viscosity": 0.05}), json!({"viscosity": 0})] {
-        let (simulation, _) = finish(&droplet(json!({"end_time": 0.1, "fluids": {"outside": outside}})));
+        let (simulation, _) = finish(&droplet(&json!({"end_time": 0.1, "fluids": {"outside": outside}})));
         let health = simulation.health();
         assert!(health.finite && health.volume_drift.unwrap().abs() < 0.02, "{outside}: {health:?}");
         assert!(last(simulation.as_ref(), "mach") < 0.1, "{outside}");
@@ -109,7 +109,7 @@ fn fluids_may_differ() {
 fn two_drops_rest_side_by_side() {
     let circle = |x: f64, radius: f64| json!({"type": "circle", "center": [x, 0], "radius": radius});
     let shape = json!({"type": "union", "of": [circle(-0.6, 0.35), circle(0.6, 0.45)]});
-    let (simulation, findings) = finish(&droplet(json!({"case": "custom", "end_time": 0.05, "shape": shape})));
+    let (simulation, findings) = finish(&droplet(&json!({"case": "custom", "end_time": 0.05, "shape": shape})));
     assert_eq!(last(simulation.as_ref(), "droplets"), 2.0);
     assert!(findings.is_empty(), "{findings:?}");
     assert!(last(simulation.as_ref(), "kinetic_energy") < 1e-3);
