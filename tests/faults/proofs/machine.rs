@@ -135,7 +135,8 @@ fn crowded(service: &Service) -> Value {
 pub fn stalled_workers(count: u64, seed: u64) -> String {
     let directory = tempfile::tempdir().unwrap();
     let service = Service::start(directory.path(), &["--slots", "1", "--lease-s", "3"]);
-    let body = steady_job();
+    // Long enough not to have ended when the signal comes, however busy the machine.
+    let body = long_job();
     let expected = Expected::of(&service, &body);
     for round in 0..count {
         let id = service.submit(&body);
