@@ -35,7 +35,7 @@ struct DropletScene<const D: usize> {
     clouds: Vec<CloudReference>,
 }
 
-/// Weight of the fits and neighbours per coefficient, where the level is overwritten at every evaluation.
+/// Neighbours per coefficient, where the level is overwritten at every evaluation.
 const RATIO: f64 = 2.0;
 /// Particles of a run at most.
 const MOST_PARTICLES: f64 = 1e9;
@@ -383,7 +383,7 @@ impl<const D: usize> Scene for DropletScene<D> {
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
         let particles = self.count();
         // Columns, their gathered copies, a state and a frame in the making; ranges of neighbours.
-        let bytes = if D == 2 { 700 } else { 1500 };
+        let bytes = if D == 2 { 900 } else { 1750 };
         Estimate {
             particles,
             steps: self.steps,

@@ -142,7 +142,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let (mean, deviation) = self.system.curvature_spread();
         let is_late = time >= 0.8 * self.end().time;
         let momentum = self.row[1..=D].iter().map(|m| m * m).sum::<f64>().sqrt();
-        self.summary.take(time, is_late, [full - outside, inside - outside, mean, deviation, momentum]);
+        self.summary.take(is_late, [full - outside, inside - outside, mean, deviation, momentum]);
         if let Some(moments) = moments {
             let turned = self.summary.take_shape(time, moments.measure, deformation(&moments));
             if let Some((name, message)) = turned {

@@ -50,7 +50,7 @@ impl Summary {
     pub const HEAD: usize = 19;
 
     /// Takes pressure jump, its part by the equation of state, mean and deviation of the curvature, and |Σ m u|.
-    pub fn take(&mut self, _time: f64, is_late: bool, [jump, eos, mean, deviation, momentum]: [f64; 5]) {
+    pub fn take(&mut self, is_late: bool, [jump, eos, mean, deviation, momentum]: [f64; 5]) {
         if is_late {
             for (sum, value) in self.late.iter_mut().zip([1.0, jump, eos, mean]) {
                 *sum += value;
