@@ -22,18 +22,20 @@ pub fn method_name(method: &PcpMethod) -> String {
     format!("{neighborhood}/{solver}")
 }
 
-/// Redistancings of `particles` in a band of half width `reach_h` spacings, `times` over.
+/// Redistancings of `particles` in a band of half width `reach_h` spacings, `times` over, of a surface that a flow has made
+/// longer by `stretch` on the average.
 #[must_use]
 pub fn redistancing<const D: usize>(
     method: &PcpMethod,
     particles: f64,
     reach_h: f64,
+    stretch: f64,
     times: f64,
     course: Course,
 ) -> Vec<PhaseWork> {
     let terms = term_count::<D>(method.degree) as f64;
     let moments = term_count::<D>(2 * method.degree) as f64;
-    let samples = particles * (method.sample_threshold_h / reach_h).min(1.0);
+    let samples = particles * (stretch * method.sample_threshold_h / reach_h).min(1.0);
     let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
     let neighbors = ball * method.even_cutoff_h::<D>().powi(D as i32);
     // Material fits are of the level and of every coordinate.

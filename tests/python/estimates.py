@@ -26,8 +26,12 @@ SCENES = [
     {"kind": "vortex", "spacing": 0.015625, "field": "overwrite"},
     {"kind": "vortex", "spacing": 0.0078125, "preset": "paper"},
     {"kind": "vortex", "dimension": 3, "flow": "vortex_3d", "spacing": 0.03, "shape": SPHERE},
-    {"kind": "vortex", "spacing": 0.01, "end_time": 2,
+    {"kind": "vortex", "spacing": 0.004, "end_time": 2,
      "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3.14}},
+    {"kind": "droplet", "end_time": 0.3},
+    {"kind": "droplet", "spacing": 0.02, "end_time": 0.1, "geometry": "colorfield"},
+    {"kind": "droplet", "case": "dividing", "end_time": 0.12},
+    {"kind": "droplet", "dimension": 3, "spacing": 0.08, "end_time": 0.02},
 ]
 
 

@@ -431,6 +431,7 @@ impl<const D: usize> Scene for DropletScene<D> {
                         method,
                         band,
                         reach_h,
+                        1.0,
                         evaluations,
                         Course::EveryStep,
                     ));

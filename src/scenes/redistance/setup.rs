@@ -217,7 +217,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         let reach_h = self.half_band / self.lattice.spacing;
         let reach_h = reach_h.max(self.method.reach_h::<D>());
         let times = self.repeats as f64;
-        let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, times, Course::EveryStep);
+        let mut work =
+            work_estimate::redistancing::<D>(&self.method, particles, reach_h, 1.0, times, Course::EveryStep);
         if self.remeshing.is_some() {
             work.push(PhaseWork::every_step("remeshing", particles * times));
         }
