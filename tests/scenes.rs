@@ -228,6 +228,14 @@ fn what_is_resolved_resolves_to_itself() {
     bodies.push(json!({"kind": "vortex", "preset": "paper"}));
     bodies.push(json!({"kind": "redistance", "preset": "paper", "dimension": 3}));
     bodies.push(json!({"kind": "redistance", "shape": {"type": "box", "size": [1, 1]}, "band": 0.3}));
+    for case in ["oscillating", "dividing", "static"] {
+        for dimension in [2, 3] {
+            bodies.push(json!({"kind": "droplet", "case": case, "dimension": dimension, "spacing": 0.04}));
+            bodies.push(
+                json!({"kind": "droplet", "case": case, "dimension": dimension, "spacing": 0.04, "preset": "paper"}),
+            );
+        }
+    }
     for body in bodies {
         let once = scene(&body).resolved();
         assert_eq!(scene(&once).resolved(), once, "{body}");

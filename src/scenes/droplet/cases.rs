@@ -57,8 +57,8 @@ pub(super) fn case(name: &str, dimension: usize, spacing: f64) -> Case {
             shifting: "pst",
             // Without force where the halves come to stay, and half way to it across (errata).
             body_force: both(
-                json!({"type": "pulse", "coefficient": 1000, "duration": 0.5, "A": 0.5, "B": 0.5, "C": 0.5}),
-                json!({"type": "pulse", "coefficient": 5000, "duration": 0.05, "A": 0.375, "B": 0.390_625, "C": 0.390_625}),
+                json!({"type": "pulse", "coefficient": 1000.0, "duration": 0.5, "A": 0.5, "B": 0.5, "C": 0.5}),
+                json!({"type": "pulse", "coefficient": 5000.0, "duration": 0.05, "A": 0.375, "B": 0.390_625, "C": 0.390_625}),
             ),
             time_step: Some(if is_flat { 1e-4 } else { 1.5e-4 }),
             smoothing_h: if is_flat { growing_smoothing(spacing) } else { 2.0 },
