@@ -338,6 +338,26 @@ fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
             simulation.step().unwrap();
         }
         assert!(simulation.health().volume_drift.unwrap().abs() < 1e-4);
+        // A drop takes its level from them: the inside has its area, and everybody its side.
+        let domain = json!({"low": [0, 0], "high": [1, 1]});
+        let drop = json!({
+            "kind": "droplet", "case": "custom", "spacing": 0.025, "shape": points.clone(), "domain": domain, "end_time": 2e-3
+        });
+        let mut simulation = with(drop).unwrap();
+        let state = simulation.state();
+        let places = state.reals("position").unwrap();
+        for (side, x) in state.counts("phase").unwrap().iter().zip(places.chunks(2)) {
+            assert_eq!(*side == 1, circle(x[0], x[1]) < 0.0, "{x:?}");
+        }
+        let area = |simulation: &dyn meniscus::simulation::Simulation| {
+            simulation.observables().into_iter().find(|(name, _)| *name == "area").map_or(f64::NAN, |(_, area)| area)
+        };
+        let exact = std::f64::consts::PI / 16.0;
+        assert!((area(simulation.as_ref()) / exact - 1.0).abs() < 1e-4);
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+        }
+        assert!((area(simulation.as_ref()) / exact - 1.0).abs() < 1e-3);
         // What does not fit is refused in words.
         let mut wrong = own.clone();
         wrong["spacing"] = json!(0.5);

@@ -210,7 +210,7 @@ pub fn understand(
 /// The method with nothing given.
 ///
 /// # Errors
-/// None that a test has not seen: defaults are valid.
+/// As [`understand`].
 pub fn defaults(dimension: usize, default_ratio: f64) -> Result<PcpMethod, Violation> {
     let mut violations = Vec::new();
     let checked = crate::scene::check(PARAMETERS, &serde_json::Map::new(), "", &mut violations);

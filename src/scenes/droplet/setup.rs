@@ -218,7 +218,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     }
     let domain = domain_of(&low, &lengths);
     if violations.is_empty()
-        && let Err(error) = Pencils::<D>::new(&domain, parts.kernel.support() * parts.smoothing_length + 0.3 * h)
+        && let Err(error) = Pencils::<D>::new(&domain, parts.reach())
     {
         violations.push(Violation::new("/domain", "range", error.to_string(), &resolved["domain"], json!(error.least)));
     }
@@ -466,7 +466,8 @@ impl<const D: usize> Scene for DropletScene<D> {
 }
 
 impl<const D: usize> DropletScene<D> {
-    /// Particles within a band of this width about the drop, about: that of a ball of a third of the box.
+    /// Particles within a band of this width about the drop, about: that of a ball of its measure, which is taken for a fifth of the
+    /// box where it is not known.
     fn near(&self, width: f64) -> f64 {
         let surface = shapes::surface::<D>(&self.shape, "/shape");
         let measure = surface.map_or_else(|_| self.lengths().product() / 5.0, |surface| surface.measure());

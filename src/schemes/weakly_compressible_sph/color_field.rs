@@ -1,12 +1,11 @@
 //! Normals and curvatures of the smoothed colour of the phases (PCP eqs. B.5 to B.10; Adami et al. 2010), with the volume of
 //! particle j in the sum of B.6 and curvatures of the sign of this project: positive where the inside is convex.
 
-use super::pair_sums::{Columns, apart, total};
+use super::pair_sums::{Columns, total};
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::smoothing_kernels::RadialKernel;
-use std::array::from_fn;
 
 /// |n̂| ε above which a particle is one of the interface (B.7).
 pub(super) const THRESHOLD: f64 = 0.01;
@@ -22,14 +21,10 @@ pub(super) fn sum_color<K: RadialKernel, const D: usize>(
     pencils.for_each_place(colors, interrupt, |place, near, color| {
         let own = columns.at(place);
         let mut sum = Lanes::splat(0.0);
-        for (shift, groups) in near.runs() {
-            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(groups, |other| {
-                let (_, square) = apart(&x, &other.vectors[0]);
-                let value: Lanes = K::value(Number::sqrt(square));
-                sum = Number::mul_add(value, other.scalars[0], sum);
-            });
-        }
+        columns.pairs(&own, near, inverse_smoothing, |_, square, other| {
+            let value: Lanes = K::value(Number::sqrt(square));
+            sum = Number::mul_add(value, other.scalars[0], sum);
+        });
         *color = total(sum);
     })
 }
@@ -45,17 +40,13 @@ pub(super) fn sum_gradient<K: RadialKernel, const D: usize>(
     pencils.for_each_place(gradients, interrupt, |place, near, gradient| {
         let own = columns.at(place);
         let mut sums = [Lanes::splat(0.0); D];
-        for (shift, groups) in near.runs() {
-            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(groups, |other| {
-                let (dx, square) = apart(&x, &other.vectors[0]);
-                let slope: Lanes = K::slope_over_q(Number::sqrt(square));
-                let weight = slope * other.scalars[1] * (other.scalars[0] - own.scalars[0]);
-                for d in 0..D {
-                    sums[d] = Number::mul_add(weight, dx[d], sums[d]);
-                }
-            });
-        }
+        columns.pairs(&own, near, inverse_smoothing, |dx, square, other| {
+            let slope: Lanes = K::slope_over_q(Number::sqrt(square));
+            let weight = slope * other.scalars[1] * (other.scalars[0] - own.scalars[0]);
+            for d in 0..D {
+                sums[d] = Number::mul_add(weight, dx[d], sums[d]);
+            }
+        });
         *gradient = sums.map(total);
     })
 }
@@ -76,19 +67,15 @@ pub(super) fn sum_curvature<K: RadialKernel, const D: usize>(
         }
         let own = columns.at(place);
         let (mut weights, mut divergence) = (Lanes::splat(0.0), Lanes::splat(0.0));
-        for (shift, groups) in near.runs() {
-            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(groups, |other| {
-                let (dx, square) = apart(&x, &other.vectors[0]);
-                let q = Number::sqrt(square);
-                let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
-                weights = Number::mul_add(value, other.scalars[0], weights);
-                for (d, dx) in dx.iter().enumerate() {
-                    let turn = (other.vectors[1][d] - own.vectors[1][d]) * *dx;
-                    divergence = Number::mul_add(slope * other.scalars[0], turn, divergence);
-                }
-            });
-        }
+        columns.pairs(&own, near, inverse_smoothing, |dx, square, other| {
+            let q = Number::sqrt(square);
+            let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
+            weights = Number::mul_add(value, other.scalars[0], weights);
+            for (d, dx) in dx.iter().enumerate() {
+                let turn = (other.vectors[1][d] - own.vectors[1][d]) * *dx;
+                divergence = Number::mul_add(slope * other.scalars[0], turn, divergence);
+            }
+        });
         *sum = [total(weights), total(divergence)];
     })
 }

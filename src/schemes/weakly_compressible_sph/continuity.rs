@@ -1,7 +1,7 @@
 //! Rates of density and velocity in the mass form: continuity with diffusion (PCP eq. B.12, corrected by errata), pressure
 //! with a viscosity that stands for the physical one (B.13, B.14).
 
-use super::pair_sums::{Columns, TINY, apart, total};
+use super::pair_sums::{Columns, TINY, total};
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
 use crate::parallel::{Interrupt, Interrupted};
@@ -50,39 +50,35 @@ pub(super) fn sum_rates<K: RadialKernel, const D: usize, const S: usize>(
         let u = own.vectors[1];
         let (density, stress) = (own.scalars[0], own.scalars[2]);
         let (mut force, mut compression, mut diffusion) = ([zero; D], zero, zero);
-        for (shift, groups) in near.runs() {
-            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(groups, |other| {
-                let (dx, square) = apart(&x, &other.vectors[0]);
-                let slope: Lanes = K::slope_over_q(Number::sqrt(square));
-                let [other_density, volume] = [other.scalars[0], other.scalars[1]];
-                let approach = {
-                    let parts: [Lanes; D] = from_fn(|d| (u[d] - other.vectors[1][d]) * dx[d]);
-                    parts.into_iter().reduce(|a, b| a + b).unwrap_or(zero)
-                };
-                let (mut kinematic, mut mass) = (same, Lanes::splat(1.0));
-                let mut excess = density - other_density;
-                if let (Some(m), Some(a), Some(b), Some(by), Some(other_by)) = (
-                    other.scalars.get(3),
-                    own.scalars.get(4),
-                    other.scalars.get(4),
-                    own.scalars.get(5),
-                    other.scalars.get(5),
-                ) {
-                    mass = *m;
-                    kinematic = (*a + *a) * *b / (*a + *b + Lanes::splat(TINY));
-                    excess = density * *by - other_density * *other_by;
-                }
-                let viscous = drag * kinematic * approach / ((density + other_density) * (square + softening));
-                let weight = slope * mass * (stress + other.scalars[2] + viscous);
-                for d in 0..D {
-                    force[d] = Number::mul_add(weight, dx[d], force[d]);
-                }
-                let spread = slope * volume;
-                compression = Number::mul_add(spread, approach, compression);
-                diffusion = Number::mul_add(spread, excess + excess, diffusion);
-            });
-        }
+        columns.pairs(&own, near, inverse_smoothing, |dx, square, other| {
+            let slope: Lanes = K::slope_over_q(Number::sqrt(square));
+            let [other_density, volume] = [other.scalars[0], other.scalars[1]];
+            let approach = {
+                let parts: [Lanes; D] = from_fn(|d| (u[d] - other.vectors[1][d]) * dx[d]);
+                parts.into_iter().reduce(|a, b| a + b).unwrap_or(zero)
+            };
+            let (mut kinematic, mut mass) = (same, Lanes::splat(1.0));
+            let mut excess = density - other_density;
+            if let (Some(m), Some(a), Some(b), Some(by), Some(other_by)) = (
+                other.scalars.get(3),
+                own.scalars.get(4),
+                other.scalars.get(4),
+                own.scalars.get(5),
+                other.scalars.get(5),
+            ) {
+                mass = *m;
+                kinematic = (*a + *a) * *b / (*a + *b + Lanes::splat(TINY));
+                excess = density * *by - other_density * *other_by;
+            }
+            let viscous = drag * kinematic * approach / ((density + other_density) * (square + softening));
+            let weight = slope * mass * (stress + other.scalars[2] + viscous);
+            for d in 0..D {
+                force[d] = Number::mul_add(weight, dx[d], force[d]);
+            }
+            let spread = slope * volume;
+            compression = Number::mul_add(spread, approach, compression);
+            diffusion = Number::mul_add(spread, excess + excess, diffusion);
+        });
         *rates = Rates { force: force.map(total), compression: total(compression), diffusion: total(diffusion) };
     })
 }

@@ -1,6 +1,6 @@
 //! Density by summation (PCP eq. B.1): how many particles there are to a unit of volume.
 
-use super::pair_sums::{Columns, apart, total};
+use super::pair_sums::{Columns, total};
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
 use crate::parallel::{Interrupt, Interrupted};
@@ -17,13 +17,9 @@ pub(super) fn sum_kernel<K: RadialKernel, const D: usize>(
     pencils.for_each_place(sums, interrupt, |place, near, sum| {
         let own = columns.at(place);
         let mut lanes = Lanes::splat(0.0);
-        for (shift, groups) in near.runs() {
-            let x: [Lanes; D] = std::array::from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(groups, |other| {
-                let (_, square) = apart(&x, &other.vectors[0]);
-                lanes += K::value(Number::sqrt(square));
-            });
-        }
+        columns.pairs(&own, near, inverse_smoothing, |_, square, _| {
+            lanes += K::value(Number::sqrt(square));
+        });
         *sum = total(lanes);
     })
 }

@@ -14,8 +14,6 @@ use crate::neighbors::pencils::BoxTooSmall;
 use crate::parallel::{Interrupt, Interrupted};
 use std::array::from_fn;
 
-/// How far anybody may move before neighbours are listed anew, in h: half of it.
-const SKIN_H: f64 = 0.3;
 /// Far from everybody, in ε.
 const FAR: f64 = 1e15;
 
@@ -47,12 +45,10 @@ fn slices<const N: usize>(columns: &[Vec<f64>]) -> [&[f64]; N] {
 
 impl<const D: usize> Hydrodynamics<D> {
     pub fn new(parts: &SphParts<D>, domain: &Domain<D>, cell: f64) -> Result<Self, BoxTooSmall> {
-        let skin = SKIN_H * parts.spacing;
-        let epsilon = parts.smoothing_length;
-        let reach = parts.kernel.support() * epsilon + skin;
+        let (skin, epsilon) = (parts.skin(), parts.smoothing_length);
         Ok(Self {
             domain: domain.clone(),
-            pencils: Pencils::new(domain, reach)?,
+            pencils: Pencils::new(domain, parts.reach())?,
             skin,
             epsilon,
             kernel: parts.kernel,
@@ -123,40 +119,36 @@ impl<const D: usize> Hydrodynamics<D> {
         Ok(())
     }
 
-    /// Forces by the volume form; `viscosity` is that of both fluids, or each particle's own.
+    /// Forces by the volume form.
+    #[expect(clippy::too_many_arguments, reason = "columns of one evaluation, each a slice of its own")]
     pub fn forces(
         &mut self,
+        parts: &SphParts<D>,
+        is_inside: &[u8],
         volume: &[f64],
         pressure: &[f64],
         velocity: &[Vector<D>],
-        viscosity: Result<f64, impl Fn(usize) -> f64>,
         forces: &mut [Vector<D>],
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
-        let by_cell = 1.0 / self.cell;
+        let (by_cell, inverse) = (1.0 / self.cell, 1.0 / self.epsilon);
         self.gather(0, 1.0, |i| volume[i] * by_cell);
         self.gather(1, 0.0, |i| volume[i] * by_cell * pressure[i]);
-        let inverse = 1.0 / self.epsilon;
-        let (pencils, sums) = (&self.pencils, &mut self.vectors);
-        match viscosity {
-            Ok(viscosity) => {
-                for (d, column) in self.u.iter_mut().enumerate() {
-                    pencils.gather(column, 0.0, |i| viscosity * inverse * velocity[i][d]);
-                }
-                let columns =
-                    Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<2>(&self.scalars) };
-                with_kernel!(self.kernel, K => sum_forces::<K, D, 2>(pencils, &columns, inverse, sums, interrupt))?;
-            }
-            Err(viscosity) => {
-                for (d, column) in self.u.iter_mut().enumerate() {
-                    pencils.gather(column, 0.0, |i| inverse * velocity[i][d]);
-                }
-                pencils.gather(&mut self.scalars[2], 1.0, viscosity);
-                let columns =
-                    Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<3>(&self.scalars) };
-                with_kernel!(self.kernel, K => sum_forces::<K, D, 3>(pencils, &columns, inverse, sums, interrupt))?;
-            }
+        let is_one = parts.has_one_viscosity();
+        if is_one {
+            self.gather_vectors(parts.inside.viscosity * inverse, |i| velocity[i]);
+        } else {
+            self.gather(2, 1.0, |i| parts.fluid(is_inside[i] == 1).viscosity);
+            self.gather_vectors(inverse, |i| velocity[i]);
         }
+        let (pencils, sums, vectors) = (&self.pencils, &mut self.vectors, [slices(&self.x), slices(&self.u)]);
+        with_kernel!(self.kernel, K => if is_one {
+            let columns = Columns { vectors, scalars: slices::<2>(&self.scalars) };
+            sum_forces::<K, D, 2>(pencils, &columns, inverse, sums, interrupt)
+        } else {
+            let columns = Columns { vectors, scalars: slices::<3>(&self.scalars) };
+            sum_forces::<K, D, 3>(pencils, &columns, inverse, sums, interrupt)
+        })?;
         // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
         let factor = self.cell * self.cell * self.normalisation * self.kernel.slope() / self.epsilon;
         for (place, i) in pencils.occupied() {

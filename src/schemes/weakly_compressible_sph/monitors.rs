@@ -48,7 +48,7 @@ impl<const D: usize> SphSystem<D> {
 
     /// Mean and standard deviation of the curvature over the particles that feel the tension: |φ| < 2 ε, or those of the
     /// colour field's interface.
-    pub(super) fn curvature_spread(&self) -> (f64, f64) {
+    fn curvature_spread(&self) -> (f64, f64) {
         let curvature = self.particles.scalar(self.columns.curvature);
         let band = self.particles.flag(self.columns.in_band);
         let phi = self.particles.scalar(self.columns.phi);
@@ -58,25 +58,18 @@ impl<const D: usize> SphSystem<D> {
 
     /// Means of the pressure well inside and well outside: by the equation of state, and with what the balanced force has
     /// absorbed inside.
-    pub(super) fn mean_pressures(&self) -> [(f64, f64); 2] {
+    fn mean_pressures(&self) -> [(f64, f64); 2] {
         let far = 2.0 * self.parts.smoothing_length;
         let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
         let mut sums = [[0.0; 3]; 2];
-        let is_balanced = self.parts.tension_force == super::parts::TensionForce::Balanced;
         for i in 0..phi.len() {
             if band[i] == 1 && phi[i].abs() <= far {
                 continue;
             }
-            let is_inside = self.phase[i] == 1;
-            let absorbed = if is_inside && is_balanced && self.parts.has_tension() {
-                self.parts.tension * self.ball_curvature(i)
-            } else {
-                0.0
-            };
-            let sum = &mut sums[usize::from(is_inside)];
+            let sum = &mut sums[usize::from(self.phase[i])];
             sum[0] += 1.0;
             sum[1] += self.pressure[i];
-            sum[2] += self.pressure[i] + absorbed;
+            sum[2] += self.pressure[i] + self.absorbed_pressure(i);
         }
         [1, 0].map(|side: usize| (sums[side][1] / sums[side][0], sums[side][2] / sums[side][0]))
     }

@@ -1,6 +1,7 @@
 //! Sums over pairs, gathered particle by particle in the order of pencils, several pairs side by side.
 
 use crate::linear_algebra::number::{LANES, Lanes, Number};
+use crate::neighbors::pencils::Near;
 use std::array::from_fn;
 
 /// `V` vector columns and `S` scalar columns in the order of places.
@@ -29,9 +30,27 @@ impl<const D: usize, const V: usize, const S: usize> Columns<'_, D, V, S> {
         }
     }
 
+    /// Calls `add` with x_i − x_j in units of ε, its square, and the values of the neighbours of a place, group by group.
+    #[inline(always)]
+    pub fn pairs(
+        &self,
+        own: &Side<D, V, S>,
+        near: &Near<'_, D>,
+        inverse_smoothing: f64,
+        mut add: impl FnMut(&[Lanes; D], Lanes, &Side<D, V, S>),
+    ) {
+        for (shift, groups) in near.runs() {
+            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
+            self.over(groups, |other| {
+                let (dx, square) = apart(&x, &other.vectors[0]);
+                add(&dx, square, other);
+            });
+        }
+    }
+
     /// Calls `add` with the values of groups of places.
     #[inline(always)]
-    pub fn over(&self, groups: &[u32], mut add: impl FnMut(&Side<D, V, S>)) {
+    fn over(&self, groups: &[u32], mut add: impl FnMut(&Side<D, V, S>)) {
         // Cut to one length, so that one comparison a group stands for all columns.
         let length = self.vectors[0][0].len();
         let vectors: [[&[f64]; D]; V] = from_fn(|v| from_fn(|d| &self.vectors[v][d][..length]));
@@ -60,7 +79,7 @@ pub(super) const TINY: f64 = 1e-300;
 
 /// x_i − x_j in units of ε and its square.
 #[inline(always)]
-pub(super) fn apart<const D: usize>(x: &[Lanes; D], other: &[Lanes; D]) -> ([Lanes; D], Lanes) {
+fn apart<const D: usize>(x: &[Lanes; D], other: &[Lanes; D]) -> ([Lanes; D], Lanes) {
     let dx: [Lanes; D] = from_fn(|d| x[d] - other[d]);
     let mut square = dx[0] * dx[0];
     for part in &dx[1..] {

@@ -5,6 +5,9 @@ use super::fluids::Fluid;
 use super::kernel_choice::KernelChoice;
 use crate::closest_point::PcpMethod;
 
+/// The skin in h.
+const SKIN_H: f64 = 0.3;
+
 /// Where normals and curvatures come from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Geometry {
@@ -95,11 +98,22 @@ impl<const D: usize> SphParts<D> {
         self.inside.density == self.outside.density
     }
 
-    /// Whether all pairs have one viscosity.
+    /// Whether all pairs have one dynamic viscosity.
     #[must_use]
     pub fn has_one_viscosity(&self) -> bool {
         self.inside.viscosity == self.outside.viscosity
-            && (self.has_one_mass() || self.density == DensityMethod::Summation)
+    }
+
+    /// Neighbours are listed anew when somebody has moved by half of it.
+    #[must_use]
+    pub fn skin(&self) -> f64 {
+        SKIN_H * self.spacing
+    }
+
+    /// How far from each other particles are listed as neighbours.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.kernel.support() * self.smoothing_length + self.skin()
     }
 
     /// Whether there is an interface to compute.

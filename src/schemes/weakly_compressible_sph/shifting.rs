@@ -1,12 +1,11 @@
 //! Particle shifting towards an even distribution (PCP eqs. B.15 and B.16).
 
-use super::pair_sums::{Columns, apart, total};
+use super::pair_sums::{Columns, total};
 use crate::geometry::Vector;
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::smoothing_kernels::RadialKernel;
-use std::array::from_fn;
 
 /// The longest displacement, in ε.
 pub(super) const MOST_SHIFT: f64 = 0.02;
@@ -24,20 +23,16 @@ pub(super) fn sum_concentration<K: RadialKernel, const D: usize>(
     pencils.for_each_place(gradients, interrupt, |place, near, gradient| {
         let own = columns.at(place);
         let mut sums = [Lanes::splat(0.0); D];
-        for (shift, groups) in near.runs() {
-            let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * inverse_smoothing));
-            columns.over(groups, |other| {
-                let (dx, square) = apart(&x, &other.vectors[0]);
-                let q = Number::sqrt(square);
-                let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
-                let ratio = value * by_spacing;
-                let ratio2 = ratio * ratio;
-                let weight = slope * other.scalars[0] * Number::mul_add(ratio2 * ratio2, fifth, one);
-                for d in 0..D {
-                    sums[d] = Number::mul_add(weight, dx[d], sums[d]);
-                }
-            });
-        }
+        columns.pairs(&own, near, inverse_smoothing, |dx, square, other| {
+            let q = Number::sqrt(square);
+            let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
+            let ratio = value * by_spacing;
+            let ratio2 = ratio * ratio;
+            let weight = slope * other.scalars[0] * Number::mul_add(ratio2 * ratio2, fifth, one);
+            for d in 0..D {
+                sums[d] = Number::mul_add(weight, dx[d], sums[d]);
+            }
+        });
         *gradient = sums.map(total);
     })
 }

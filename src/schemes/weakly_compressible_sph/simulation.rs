@@ -2,7 +2,6 @@
 
 use super::components::ball_curvature;
 use super::monitors::{Row, deformation, names};
-use super::parts::TensionForce;
 use super::summary::Summary;
 use super::system::{EvaluationError, SphSystem};
 use super::time_step::longest_step;
@@ -138,11 +137,11 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let moments = self.phases.measure("measure", || system.moments())?;
         self.row = self.phases.measure("measure", || system.row(time_step, moments.as_ref()));
         let Clock { time, .. } = self.clock();
-        let [(inside, full), (outside, _)] = self.system.mean_pressures();
-        let (mean, deviation) = self.system.curvature_spread();
-        let is_late = time >= 0.8 * self.end().time;
+        let of = |name: &str| names(D).iter().position(|n| *n == name).map_or(f64::NAN, |k| self.row[k]);
+        let jump = of("pressure_inside") - of("pressure_outside");
         let momentum = self.row[1..=D].iter().map(|m| m * m).sum::<f64>().sqrt();
-        self.summary.take(is_late, [full - outside, inside - outside, mean, deviation, momentum]);
+        let numbers = [jump, of("pressure_eos_jump"), of("curvature_mean"), of("curvature_std"), momentum];
+        self.summary.take(time >= 0.8 * self.end().time, numbers);
         if let Some(moments) = moments {
             let turned = self.summary.take_shape(time, moments.measure, deformation(&moments));
             if let Some((name, message)) = turned {
@@ -284,12 +283,8 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         }
         fields.vector("velocity", system.velocity.iter().copied());
         fields.scalar("density", system.density.clone());
-        let is_balanced = system.parts.has_tension() && system.parts.tension_force == TensionForce::Balanced;
-        let absorbed = |i: usize| {
-            let is_inside = is_balanced && system.phase[i] == 1;
-            if is_inside { system.parts.tension * system.ball_curvature(i) } else { 0.0 }
-        };
-        fields.scalar("pressure", system.pressure.iter().enumerate().map(|(i, p)| p + absorbed(i)).collect());
+        let pressures = system.pressure.iter().enumerate();
+        fields.scalar("pressure", pressures.map(|(i, p)| p + system.absorbed_pressure(i)).collect());
         fields.scalar("phase", system.phase.iter().map(|phase| f64::from(*phase)).collect());
         if !system.parts.has_one_mass() {
             fields.scalar("mass", (0..system.phase.len()).map(|i| system.mass(i)).collect());

@@ -289,9 +289,7 @@ impl<const D: usize> SphSystem<D> {
         let mass = |i: usize| parts.fluid(phase[i] == 1).density * cell;
         match parts.density {
             DensityMethod::Summation => {
-                let own = |i: usize| parts.fluid(phase[i] == 1).viscosity;
-                let viscosity = if parts.has_one_viscosity() { Ok(parts.inside.viscosity) } else { Err(own) };
-                hydrodynamics.forces(volume, pressure, predicted, viscosity, acceleration, interrupt)?;
+                hydrodynamics.forces(parts, phase, volume, pressure, predicted, acceleration, interrupt)?;
                 for (i, acceleration) in acceleration.iter_mut().enumerate() {
                     *acceleration /= mass(i);
                 }
@@ -321,6 +319,11 @@ impl<const D: usize> SphSystem<D> {
             [only] => *only,
             several => several.get(self.droplet[i] as usize).copied().unwrap_or(0.0),
         }
+    }
+
+    /// The part of the pressure that the balanced force has absorbed: τκ₀ inside.
+    pub(super) fn absorbed_pressure(&self, i: usize) -> f64 {
+        if self.phase[i] == 1 && self.parts.has_tension() { self.parts.tension * self.absorbed(i) } else { 0.0 }
     }
 
     /// What is taken from the curvature before it becomes a force.

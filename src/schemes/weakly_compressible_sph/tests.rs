@@ -115,9 +115,9 @@ fn check_volume_form<const D: usize>(kernel: KernelChoice, ratio: f64) {
     let pressure: Vec<f64> =
         density.iter().zip(&this.is_inside).map(|(d, p)| this.parts.fluid(*p == 1).pressure(*d)).collect();
     let own = |i: usize| this.parts.fluid(this.is_inside[i] == 1).viscosity;
-    let viscosity = if ratio == 1.0 { Ok(0.4) } else { Err(own) };
     let mut forces = vec![Vector::<D>::zeros(); volume.len()];
-    sums.forces(&volume, &pressure, &this.velocity, viscosity, &mut forces, &Interrupt::default()).unwrap();
+    let never = Interrupt::default();
+    sums.forces(&this.parts, &this.is_inside, &volume, &pressure, &this.velocity, &mut forces, &never).unwrap();
     for i in this.probes() {
         let mut number = this.w(0.0);
         let mut force = Vector::<D>::zeros();
@@ -125,7 +125,12 @@ fn check_volume_form<const D: usize>(kernel: KernelChoice, ratio: f64) {
         this.each(i, |j, dx, r| {
             number += this.w(r);
             let squares = volume[i] * volume[i] + volume[j] * volume[j];
+            // By volumes; of one mass, as the paper has it, by densities.
             let mean = (volume[i] * pressure[i] + volume[j] * pressure[j]) / (volume[i] + volume[j]);
+            if ratio == 1.0 {
+                let papers = (density[i] * pressure[j] + density[j] * pressure[i]) / (density[i] + density[j]);
+                near(mean, papers, 1.0, "mean pressure");
+            }
             let eta = 2.0 * own(i) * own(j) / (own(i) + own(j));
             let slope = this.slope(r);
             let along = dx * (-squares * mean * slope / r);
