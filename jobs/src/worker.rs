@@ -134,6 +134,8 @@ fn attempt(
     let threads = wishes.limits.threads.max(1) as usize;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
     log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
+    // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
+    let mut progress = ProgressMeter::new(order.usage, order.time.clone());
     pool.install(|| {
         let clouds = read_clouds(scene.as_ref(), order)?;
         let context = BuildContext {
@@ -150,7 +152,8 @@ fn attempt(
             return Err(Failure::Canceled);
         }
         let start = restore(order, simulation.as_mut(), sink, log)?;
-        let mut observers = prepare(order, directory, &wishes, control, sink, &start)?;
+        progress.continue_phases(start.counters.phases.clone());
+        let mut observers = prepare(order, directory, &wishes, control, sink, &start, progress)?;
         let step = simulation.clock().step;
         observers.sink.put(
             &Record::Started {
@@ -263,6 +266,7 @@ fn prepare<'a>(
     control: &'a Control,
     sink: &'a mut dyn RecordSink,
     start: &Start,
+    progress: ProgressMeter,
 ) -> Result<Observers<'a>, Failure> {
     let plan = wishes.plan();
     let counters = &start.counters;
@@ -289,8 +293,7 @@ fn prepare<'a>(
             wishes.checkpoint.every_wall_s,
             wishes.checkpoint.every_steps,
         ),
-        // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
-        progress: ProgressMeter::new(order.usage, counters.phases.clone(), order.time.clone()),
+        progress,
         control,
         sink,
         directory: directory.to_owned(),

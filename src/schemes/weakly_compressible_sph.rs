@@ -26,7 +26,7 @@ pub use body_force::BodyForce;
 pub use fluids::Fluid;
 pub use kernel_choice::KernelChoice;
 pub use parts::{DensityMethod, Geometry, Integrator, SphParts, TensionForce};
-pub use simulation::WeaklyCompressibleSph;
+pub use simulation::{WeaklyCompressibleSph, measurement_interval};
 pub use system::{Drop, SphSystem};
 
 #[cfg(test)]

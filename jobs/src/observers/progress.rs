@@ -36,13 +36,13 @@ pub struct ProgressMeter {
 }
 
 impl ProgressMeter {
-    /// For an attempt that adds to what earlier ones cost.
+    /// For an attempt that begins now and adds to what earlier ones cost.
     #[must_use]
-    pub fn new(baseline: Usage, baseline_phases: BTreeMap<String, f64>, forecast: Option<TimeForecast>) -> Self {
+    pub fn new(baseline: Usage, forecast: Option<TimeForecast>) -> Self {
         let now = Instant::now();
         Self {
             baseline,
-            baseline_phases,
+            baseline_phases: BTreeMap::new(),
             began: now,
             cpu_began: process::cpu_seconds(),
             own_phases: BTreeMap::new(),
@@ -52,6 +52,11 @@ impl ProgressMeter {
             forecast,
             last: None,
         }
+    }
+
+    /// Adds CPU seconds by phase that earlier attempts spent up to the checkpoint of this one.
+    pub fn continue_phases(&mut self, phases: BTreeMap<String, f64>) {
+        self.baseline_phases = phases;
     }
 
     /// Runs work and books its CPU time to a phase of the observers.

@@ -151,9 +151,9 @@ pub fn rows() -> Rows {
 /// Short scenes by which a machine is measured.
 pub(super) fn calibration() -> Vec<Value> {
     vec![
-        json!({"kind": "droplet", "spacing": 0.04, "end_time": 0.02}),
-        json!({"kind": "droplet", "case": "dividing", "spacing": 0.04, "end_time": 0.003}),
-        json!({"kind": "droplet", "spacing": 0.05, "geometry": "colorfield", "end_time": 0.01}),
-        json!({"kind": "droplet", "dimension": 3, "spacing": 0.1, "end_time": 0.005}),
+        json!({"kind": "droplet", "spacing": 0.04, "end_time": 0.03}),
+        json!({"kind": "droplet", "case": "dividing", "spacing": 0.04, "end_time": 0.01}),
+        json!({"kind": "droplet", "spacing": 0.04, "geometry": "colorfield", "end_time": 0.01}),
+        json!({"kind": "droplet", "dimension": 3, "spacing": 0.08, "end_time": 0.003}),
     ]
 }

@@ -14,7 +14,7 @@ use crate::scenes::{pcp_parameters, shapes, work_estimate};
 use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, longest_step};
 use crate::schemes::weakly_compressible_sph::{
     BodyForce, DensityMethod, Drop, Fluid, Geometry, Integrator, KernelChoice, SphParts, SphSystem, TensionForce,
-    WeaklyCompressibleSph,
+    WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Simulation};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
@@ -39,6 +39,8 @@ struct DropletScene<const D: usize> {
 const RATIO: f64 = 2.0;
 /// Particles of a run at most.
 const MOST_PARTICLES: f64 = 1e9;
+/// Units of a measurement by the particle near the interface, for the enclosed shape; the sums over all particles are 1.
+const QUADRATURE: f64 = 10.0;
 
 pub(super) fn understand(parameters: &Value) -> Understood {
     let written: Written = serde_json::from_value(parameters.clone())
@@ -421,6 +423,10 @@ impl<const D: usize> Scene for DropletScene<D> {
         if self.parts.is_shifted {
             work.push(PhaseWork::every_step("sph/shifting", pairs));
         }
+        // Steps that are measured for both reasons count twice: they are few.
+        let measurements =
+            steps_done / plan.series_every_steps.max(1) as f64 + steps_done / measurement_interval(steps) as f64;
+        let measured = |weight: f64| PhaseWork::every_step("measure", (measurements + 2.0) * weight);
         if self.parts.has_tension() {
             work.push(PhaseWork::every_step("droplets", particles * steps_done));
             match &self.parts.geometry {
@@ -435,10 +441,15 @@ impl<const D: usize> Scene for DropletScene<D> {
                         evaluations,
                         Course::EveryStep,
                     ));
-                    work.push(PhaseWork::every_step("measure", band * (steps_done / 10.0).max(400.0)));
+                    work.push(measured(particles + QUADRATURE * band));
                 }
-                Geometry::ColorField => work.push(PhaseWork::every_step("sph/color", 3.0 * pairs)),
+                Geometry::ColorField => {
+                    work.push(PhaseWork::every_step("sph/color", 3.0 * pairs));
+                    work.push(measured(particles));
+                }
             }
+        } else {
+            work.push(measured(particles));
         }
         work.extend(work_estimate::around(particles, steps, end_time, plan));
         work

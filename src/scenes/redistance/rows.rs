@@ -254,9 +254,9 @@ pub fn rows() -> Rows {
 /// Short scenes by which a machine is measured.
 pub(super) fn calibration() -> Vec<Value> {
     vec![
-        json!({"kind": "redistance", "spacing": 0.0078125, "repeat": 20}),
-        json!({"kind": "redistance", "dimension": 3, "spacing": 0.04, "repeat": 2}),
+        json!({"kind": "redistance", "spacing": 0.0078125, "repeat": 60}),
+        json!({"kind": "redistance", "dimension": 3, "spacing": 0.04, "repeat": 4}),
         json!({"kind": "redistance", "spacing": 0.0078125, "method": "remesh"}),
-        json!({"kind": "redistance", "preset": "paper", "spacing": 0.0078125, "repeat": 3}),
+        json!({"kind": "redistance", "preset": "paper", "spacing": 0.0078125, "repeat": 15}),
     ]
 }

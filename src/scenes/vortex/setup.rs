@@ -299,7 +299,9 @@ impl<const D: usize> Scene for VortexScene<D> {
     }
 
     fn family(&self) -> String {
-        format!("vortex/{D}/{}", work_estimate::method_name(&self.method))
+        // A rigid motion is known without sines of every place.
+        let motion = if flow::<D>(&self.flow).is_ok_and(|flow| flow.is_rigid()) { "/rigid" } else { "" };
+        format!("vortex/{D}/{}{motion}", work_estimate::method_name(&self.method))
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
@@ -324,10 +326,8 @@ impl<const D: usize> Scene for VortexScene<D> {
         // At a few moments of output the surface is as often short as long.
         let stretch = if course == Course::EveryStep { self.mean_stretch(end_time) } else { 1.0 };
         let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, stretch, times, course);
-        // A rigid motion is known without sines of every place.
         let is_rigid = flow.as_ref().is_some_and(|flow| flow.is_rigid());
-        let pace = if is_rigid { 0.25 } else { 1.0 };
-        work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages * pace));
+        work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages));
         work.push(PhaseWork { phase: "measure", units: particles * times, course });
         // At these times the exact front is carried along; a flow that is back or rigid needs none.
         let is_returned = turn.is_some_and(|turn| (end_time / turn - (end_time / turn).round()).abs() < 1e-9);

@@ -74,6 +74,12 @@ const LEAST_BETWEEN: u64 = 16;
 /// Measurements of a run, about.
 const MEASUREMENTS: u64 = 400;
 
+/// Steps from one measurement to the next in a run of `steps`, beside those that the series asks for.
+#[must_use]
+pub fn measurement_interval(steps: u64) -> u64 {
+    (steps / MEASUREMENTS).max(LEAST_BETWEEN)
+}
+
 impl<const D: usize> WeaklyCompressibleSph<D> {
     /// At time 0, with the first evaluation done; what went wrong with it is what the first step fails with.
     #[must_use]
@@ -154,7 +160,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
     fn is_row_due(&self, step: u64) -> bool {
         step >= self.pace.last
             || self.plan.is_series_due(&self.pace.fixed(), step)
-            || step.is_multiple_of((self.pace.last / MEASUREMENTS).max(LEAST_BETWEEN))
+            || step.is_multiple_of(measurement_interval(self.pace.last))
     }
 
     /// How many parts a step must be cut into, for the present speed.
