@@ -4,6 +4,7 @@
 
 mod body_force;
 mod color_field;
+mod column;
 mod components;
 mod continuity;
 mod density;

@@ -1,7 +1,8 @@
 //! Neighbours and the sums over them: columns gathered in the order of pencils, sums, and what comes of them written back.
 
 use super::color_field;
-use super::continuity::{Rates, sum_rates};
+use super::column::Column;
+use super::continuity::{sum_rates, sums_of};
 use super::density::sum_kernel;
 use super::kernel_choice::{KernelChoice, with_kernel};
 use super::momentum::sum_forces;
@@ -29,18 +30,15 @@ pub(super) struct Hydrodynamics<const D: usize> {
     normalisation: f64,
     /// The volume of a particle at rest, h^D.
     cell: f64,
-    x: [Vec<f64>; D],
-    u: [Vec<f64>; D],
-    scalars: [Vec<f64>; 6],
-    sums: Vec<f64>,
-    pairs: Vec<[f64; 2]>,
-    vectors: Vec<[f64; D]>,
-    rates: Vec<Rates<D>>,
+    x: [Column; D],
+    u: [Column; D],
+    scalars: [Column; 6],
+    sums: Vec<Column>,
 }
 
 /// The column slices of one length.
-fn slices<const N: usize>(columns: &[Vec<f64>]) -> [&[f64]; N] {
-    from_fn(|n| columns[n].as_slice())
+fn slices<const N: usize>(columns: &[Column]) -> [&[f64]; N] {
+    from_fn(|n| &columns[n][..])
 }
 
 impl<const D: usize> Hydrodynamics<D> {
@@ -54,13 +52,11 @@ impl<const D: usize> Hydrodynamics<D> {
             kernel: parts.kernel,
             normalisation: parts.kernel.normalisation(D) / epsilon.powi(D as i32),
             cell,
-            x: from_fn(|_| Vec::new()),
-            u: from_fn(|_| Vec::new()),
-            scalars: from_fn(|_| Vec::new()),
-            sums: Vec::new(),
-            pairs: Vec::new(),
-            vectors: Vec::new(),
-            rates: Vec::new(),
+            // Those that are used together are next to each other.
+            x: from_fn(Column::new),
+            u: from_fn(|d| Column::new(D + d)),
+            sums: (0..sums_of(D)).map(|n| Column::new(2 * D + n)).collect(),
+            scalars: from_fn(|n| Column::new(2 * D + sums_of(D) + n)),
         })
     }
 
@@ -80,10 +76,9 @@ impl<const D: usize> Hydrodynamics<D> {
     pub fn list(&mut self, reference: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
         self.pencils.rebuild(reference, interrupt)?;
         let places = self.pencils.places();
-        self.sums.resize(places, 0.0);
-        self.pairs.resize(places, [0.0; 2]);
-        self.vectors.resize(places, [0.0; D]);
-        self.rates.resize(places, Rates::default());
+        for column in &mut self.sums {
+            column.resize(places);
+        }
         Ok(())
     }
 
@@ -91,21 +86,26 @@ impl<const D: usize> Hydrodynamics<D> {
     pub fn take_positions(&mut self, positions: &[Vector<D>], reference: &[Vector<D>]) {
         let (domain, inverse) = (&self.domain, 1.0 / self.epsilon);
         for (d, column) in self.x.iter_mut().enumerate() {
-            self.pencils.gather(column, FAR, |i| {
+            column.refill(self.pencils.by_place(FAR, |i| {
                 let from = &reference[i];
                 (from[d] + domain.displacement(from, &positions[i])[d]) * inverse
-            });
+            }));
         }
     }
 
     fn gather_vectors(&mut self, factor: f64, value: impl Fn(usize) -> Vector<D>) {
         for (d, column) in self.u.iter_mut().enumerate() {
-            self.pencils.gather(column, 0.0, |i| value(i)[d] * factor);
+            column.refill(self.pencils.by_place(0.0, |i| value(i)[d] * factor));
         }
     }
 
+    /// The first D sums of a place.
+    fn vector(&self, place: usize) -> Vector<D> {
+        Vector::<D>::from_fn(|d, _| self.sums[d][place])
+    }
+
     fn gather(&mut self, slot: usize, nobodys: f64, value: impl Fn(usize) -> f64) {
-        self.pencils.gather(&mut self.scalars[slot], nobodys, value);
+        self.scalars[slot].refill(self.pencils.by_place(nobodys, value));
     }
 
     /// The volume of every particle by summation, 1/Σ W.
@@ -113,8 +113,9 @@ impl<const D: usize> Hydrodynamics<D> {
         let columns = Columns { vectors: [slices(&self.x)], scalars: [] };
         let inverse = 1.0 / self.epsilon;
         with_kernel!(self.kernel, K => sum_kernel::<K, D>(&self.pencils, &columns, inverse, &mut self.sums, interrupt))?;
+        let own = self.kernel.value(0.0);
         for (place, i) in self.pencils.occupied() {
-            volume[i] = 1.0 / (self.normalisation * self.sums[place]);
+            volume[i] = 1.0 / (self.normalisation * (own + self.sums[0][place]));
         }
         Ok(())
     }
@@ -141,18 +142,18 @@ impl<const D: usize> Hydrodynamics<D> {
             self.gather(2, 1.0, |i| parts.fluid(is_inside[i] == 1).viscosity);
             self.gather_vectors(inverse, |i| velocity[i]);
         }
-        let (pencils, sums, vectors) = (&self.pencils, &mut self.vectors, [slices(&self.x), slices(&self.u)]);
+        let (pencils, forces_of, vectors) = (&self.pencils, &mut self.sums, [slices(&self.x), slices(&self.u)]);
         with_kernel!(self.kernel, K => if is_one {
             let columns = Columns { vectors, scalars: slices::<2>(&self.scalars) };
-            sum_forces::<K, D, 2>(pencils, &columns, inverse, sums, interrupt)
+            sum_forces::<K, D, 2>(pencils, &columns, inverse, forces_of, interrupt)
         } else {
             let columns = Columns { vectors, scalars: slices::<3>(&self.scalars) };
-            sum_forces::<K, D, 3>(pencils, &columns, inverse, sums, interrupt)
+            sum_forces::<K, D, 3>(pencils, &columns, inverse, forces_of, interrupt)
         })?;
         // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
         let factor = self.cell * self.cell * self.normalisation * self.kernel.slope() / self.epsilon;
         for (place, i) in pencils.occupied() {
-            forces[i] = Vector::<D>::from(self.vectors[place]) * factor;
+            forces[i] = self.vector(place) * factor;
         }
         Ok(())
     }
@@ -187,19 +188,20 @@ impl<const D: usize> Hydrodynamics<D> {
             self.gather(4, 1.0, |i| factor * fluid(i).kinematic_viscosity());
             self.gather(5, 1.0, |i| 1.0 / fluid(i).density);
         }
-        let (pencils, rates, vectors) = (&self.pencils, &mut self.rates, [slices(&self.x), slices(&self.u)]);
-        with_kernel!(self.kernel, K => if is_one {
-            let columns = Columns { vectors, scalars: slices::<3>(&self.scalars) };
-            sum_rates::<K, D, 3>(pencils, &columns, inverse, viscosity, rates, interrupt)
-        } else {
-            let columns = Columns { vectors, scalars: slices::<6>(&self.scalars) };
-            sum_rates::<K, D, 6>(pencils, &columns, inverse, viscosity, rates, interrupt)
+        let (pencils, rates, vectors) = (&self.pencils, &mut self.sums, [slices(&self.x), slices(&self.u)]);
+        let same = Columns { vectors, scalars: slices::<3>(&self.scalars) };
+        let other = Columns { vectors, scalars: slices::<6>(&self.scalars) };
+        with_kernel!(self.kernel, K => match (is_one, D) {
+            (true, 2) => sum_rates::<K, D, 3, 4>(pencils, &same, inverse, viscosity, rates, interrupt),
+            (true, _) => sum_rates::<K, D, 3, 5>(pencils, &same, inverse, viscosity, rates, interrupt),
+            (false, 2) => sum_rates::<K, D, 6, 4>(pencils, &other, inverse, viscosity, rates, interrupt),
+            (false, _) => sum_rates::<K, D, 6, 5>(pencils, &other, inverse, viscosity, rates, interrupt),
         })?;
         let gradient = self.normalisation * self.kernel.slope() / self.epsilon;
         for (place, i) in pencils.occupied() {
-            let Rates { force, compression, diffusion: spread } = self.rates[place];
+            let [compression, spread] = [self.sums[D][place], self.sums[D + 1][place]];
             let fluid = fluid(i);
-            acceleration[i] = Vector::<D>::from(force) * (-unit * gradient);
+            acceleration[i] = self.vector(place) * (-unit * gradient);
             // Excesses are of ρ, or of ρ/ρ₀ where the fluids differ; W'/r has one more 1/ε than ∇W by x/ε.
             let scale = if is_one { 1.0 } else { fluid.density };
             let spread = diffusion * fluid.sound_speed * scale * spread;
@@ -220,13 +222,13 @@ impl<const D: usize> Hydrodynamics<D> {
         self.gather(0, 0.0, |i| volume(i) * by_cell);
         let at_spacing = self.kernel.value(spacing / self.epsilon);
         let columns = Columns { vectors: [slices(&self.x)], scalars: slices::<1>(&self.scalars) };
-        let (pencils, inverse, sums) = (&self.pencils, 1.0 / self.epsilon, &mut self.vectors);
+        let (pencils, inverse, sums) = (&self.pencils, 1.0 / self.epsilon, &mut self.sums);
         with_kernel!(self.kernel, K => {
             sum_concentration::<K, D>(pencils, &columns, inverse, at_spacing, sums, interrupt)
         })?;
         let factor = self.cell * self.normalisation * self.kernel.slope() / self.epsilon;
         for (place, i) in pencils.occupied() {
-            found(i, Vector::<D>::from(self.vectors[place]) * factor);
+            found(i, self.vector(place) * factor);
         }
         Ok(())
     }
@@ -249,16 +251,17 @@ impl<const D: usize> Hydrodynamics<D> {
         let columns = Columns { vectors: [slices(&self.x)], scalars: slices::<1>(&self.scalars) };
         let (pencils, sums) = (&self.pencils, &mut self.sums);
         with_kernel!(self.kernel, K => color_field::sum_color::<K, D>(pencils, &columns, inverse, sums, interrupt))?;
-        for (color, sum) in self.scalars[0].iter_mut().zip(&self.sums) {
-            *color = sum * kernel;
+        let own = self.kernel.value(0.0);
+        for (color, sum) in self.scalars[0].iter_mut().zip(&self.sums[0][..]) {
+            *color = (own * *color + sum) * kernel;
         }
         let columns = Columns { vectors: [slices(&self.x)], scalars: slices::<2>(&self.scalars) };
-        let sums = &mut self.vectors;
+        let sums = &mut self.sums;
         with_kernel!(self.kernel, K => color_field::sum_gradient::<K, D>(pencils, &columns, inverse, sums, interrupt))?;
         let least = color_field::THRESHOLD * inverse;
         for (place, i) in pencils.occupied() {
             // Colours fall outwards.
-            let found = Vector::<D>::from(self.vectors[place]) * (-kernel * slope * inverse);
+            let found = self.vector(place) * (-kernel * slope * inverse);
             let is_of_interface = found.norm() > least;
             gradient[i] = if is_of_interface { found } else { Vector::<D>::zeros() };
             normal[i] = if is_of_interface { found.normalize() } else { Vector::<D>::zeros() };
@@ -266,12 +269,15 @@ impl<const D: usize> Hydrodynamics<D> {
         self.gather_vectors(1.0, |i| normal[i]);
         self.gather(0, 0.0, |i| if normal[i] == Vector::<D>::zeros() { 0.0 } else { volume[i] * by_cell });
         let columns = Columns { vectors: [slices(&self.x), slices(&self.u)], scalars: slices::<1>(&self.scalars) };
-        let (pencils, sums) = (&self.pencils, &mut self.pairs);
+        let (pencils, sums) = (&self.pencils, &mut self.sums);
         with_kernel!(self.kernel, K => color_field::sum_curvature::<K, D>(pencils, &columns, inverse, sums, interrupt))?;
         for (place, i) in pencils.occupied() {
-            let [weights, divergence] = self.pairs[place];
+            let share = self.scalars[0][place];
+            // With its own share of the weights.
+            let weights = self.sums[0][place] + own * share;
             // ∇·n with ∇W about i, turned to the sign of a divergence.
-            curvature[i] = if weights > 0.0 { divergence * slope * inverse / weights } else { 0.0 };
+            let found = self.sums[1][place] * slope * inverse / weights;
+            curvature[i] = if share > 0.0 && weights > 0.0 { found } else { 0.0 };
         }
         Ok(())
     }

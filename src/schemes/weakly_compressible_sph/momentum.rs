@@ -1,7 +1,8 @@
 //! Pressure and viscous forces between particles in the volume form (PCP eq. B.2): antisymmetric in the pair, so that
 //! momentum is kept to round-off.
 
-use super::pair_sums::{Columns, TINY, total};
+use super::column::Column;
+use super::pair_sums::{Columns, TINY};
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
 use crate::parallel::{Interrupt, Interrupted};
@@ -19,22 +20,23 @@ pub(super) fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
     pencils: &Pencils<D>,
     columns: &Columns<'_, D, 2, S>,
     inverse_smoothing: f64,
-    forces: &mut [[f64; D]],
+    forces: &mut [Column],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
     let (one, half) = (Lanes::splat(1.0), Lanes::splat(-0.5));
-    pencils.for_each_place(forces, interrupt, |place, near, force| {
-        let own = columns.at(place);
-        let u = own.vectors[1];
-        let (volume, stress) = (own.scalars[0], own.scalars[1]);
-        let volume2 = volume * volume;
-        let mut sums = [Lanes::splat(0.0); D];
-        columns.pairs(&own, near, inverse_smoothing, |dx, square, other| {
+    columns.sum_pairs(
+        pencils,
+        inverse_smoothing,
+        forces,
+        interrupt,
+        |_| true,
+        |own, other, dx, square| {
             let slope: Lanes = K::slope_over_q(Number::sqrt(square));
+            let (volume, stress) = (own.scalars[0], own.scalars[1]);
             let (other_volume, other_stress) = (other.scalars[0], other.scalars[1]);
-            let common = slope * Number::mul_add(other_volume, other_volume, volume2);
+            let common = slope * Number::mul_add(other_volume, other_volume, volume * volume);
             let sum = (stress + other_stress) * half;
-            let mut across: [Lanes; D] = from_fn(|d| u[d] - other.vectors[1][d]);
+            let mut across: [Lanes; D] = from_fn(|d| own.vectors[1][d] - other.vectors[1][d]);
             if let ([_, _, a], [_, _, b]) = (&own.scalars[..], &other.scalars[..]) {
                 // The harmonic mean keeps the shear stress of two layers.
                 let viscosity = (*a + *a) * *b / (*a + *b + Lanes::splat(TINY));
@@ -45,10 +47,8 @@ pub(super) fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
             let first = Number::mul_add(sum, e, sum);
             let second = Number::mul_add(first, e2, first);
             let mean = Number::mul_add(second, e2 * e2, second);
-            for d in 0..D {
-                sums[d] = Number::mul_add(common, Number::mul_add(mean, dx[d], across[d]), sums[d]);
-            }
-        });
-        *force = sums.map(total);
-    })
+            let force: [Lanes; D] = from_fn(|d| common * Number::mul_add(mean, dx[d], across[d]));
+            (force, force.map(|part| -part))
+        },
+    )
 }

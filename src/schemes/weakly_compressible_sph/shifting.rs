@@ -1,6 +1,7 @@
 //! Particle shifting towards an even distribution (PCP eqs. B.15 and B.16).
 
-use super::pair_sums::{Columns, total};
+use super::column::Column;
+use super::pair_sums::Columns;
 use crate::geometry::Vector;
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::neighbors::Pencils;
@@ -16,25 +17,25 @@ pub(super) fn sum_concentration<K: RadialKernel, const D: usize>(
     columns: &Columns<'_, D, 1, 1>,
     inverse_smoothing: f64,
     at_spacing: f64,
-    gradients: &mut [[f64; D]],
+    gradients: &mut [Column],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
     let (one, fifth, by_spacing) = (Lanes::splat(1.0), Lanes::splat(0.2), Lanes::splat(1.0 / at_spacing));
-    pencils.for_each_place(gradients, interrupt, |place, near, gradient| {
-        let own = columns.at(place);
-        let mut sums = [Lanes::splat(0.0); D];
-        columns.pairs(&own, near, inverse_smoothing, |dx, square, other| {
+    columns.sum_pairs(
+        pencils,
+        inverse_smoothing,
+        gradients,
+        interrupt,
+        |_| true,
+        |own, other, dx, square| {
             let q = Number::sqrt(square);
             let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
             let ratio = value * by_spacing;
             let ratio2 = ratio * ratio;
-            let weight = slope * other.scalars[0] * Number::mul_add(ratio2 * ratio2, fifth, one);
-            for d in 0..D {
-                sums[d] = Number::mul_add(weight, dx[d], sums[d]);
-            }
-        });
-        *gradient = sums.map(total);
-    })
+            let weight = slope * Number::mul_add(ratio2 * ratio2, fifth, one);
+            (dx.map(|part| weight * other.scalars[0] * part), dx.map(|part| -(weight * own.scalars[0] * part)))
+        },
+    )
 }
 
 /// The displacement for a gradient of concentration: −0.05 ε² ∇C, at most 0.02 ε long.

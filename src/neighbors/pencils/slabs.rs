@@ -1,0 +1,99 @@
+//! Pencils make slabs across the last axis, each as thick as the reach: points of one find those of it and of the next alone.
+//! All even slabs are summed at once, then all odd ones, so that nobody writes where another does, and the order of every
+//! sum is the same for any number of threads. The first slab stands once more behind the last, as what closes the ring.
+
+use super::{Near, Pencils, Slab};
+use crate::parallel::{Interrupt, Interrupted};
+use std::ops::Range;
+
+/// What a slab writes to: `N` columns, of its own places and those of the next slab.
+#[derive(Debug)]
+pub struct Window<'a, const N: usize> {
+    /// The place that the columns begin at.
+    pub begin: usize,
+    /// Columns of one length.
+    pub columns: [&'a mut [f64]; N],
+}
+
+impl<const D: usize> Pencils<D> {
+    /// Sets `sums`, one number a place (the same where a place stands twice), to what `work` adds: it is called with every place that
+    /// lists anybody, whom it lists and the window of its slab, in parallel.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when somebody asked to stop.
+    pub fn sum<const N: usize>(
+        &self,
+        mut sums: [&mut [f64]; N],
+        interrupt: &Interrupt,
+        work: impl Fn(usize, &Near<'_, D>, &mut Window<'_, N>) + Sync,
+    ) -> Result<(), Interrupted> {
+        sums.iter_mut().for_each(|column| column.fill(0.0));
+        for color in 0..2 {
+            let begin = self.slabs.get(color).map_or(0, |slab| slab.places.start);
+            let columns = sums.each_mut().map(|column| &mut column[begin..]);
+            let of_color = self.slabs.len().saturating_sub(color).div_ceil(2);
+            self.sum_slabs(color, 0..of_color, Window { begin, columns }, interrupt, &work);
+        }
+        let once = self.sorted.len();
+        for column in sums {
+            let (own, again) = column.split_at_mut(once);
+            own.iter_mut().zip(&mut *again).for_each(|(sum, more)| *sum += *more);
+            again.copy_from_slice(&own[..again.len()]);
+        }
+        interrupt.check()
+    }
+
+    /// Slabs of a colour, halved until one is left.
+    fn sum_slabs<const N: usize>(
+        &self,
+        color: usize,
+        numbers: Range<usize>,
+        mut window: Window<'_, N>,
+        interrupt: &Interrupt,
+        work: &(impl Fn(usize, &Near<'_, D>, &mut Window<'_, N>) + Sync),
+    ) {
+        if numbers.len() > 1 {
+            let middle = numbers.start + numbers.len() / 2;
+            let cut = self.slabs[2 * middle + color].places.start;
+            let Window { begin, columns } = window;
+            let mut right: [&mut [f64]; N] = std::array::from_fn(|_| Default::default());
+            let mut halves = right.iter_mut();
+            let left = columns.map(|column| {
+                let (left, rest) = column.split_at_mut(cut - begin);
+                if let Some(half) = halves.next() {
+                    *half = rest;
+                }
+                left
+            });
+            rayon::join(
+                || self.sum_slabs(color, numbers.start..middle, Window { begin, columns: left }, interrupt, work),
+                || self.sum_slabs(color, middle..numbers.end, Window { begin: cut, columns: right }, interrupt, work),
+            );
+            return;
+        }
+        let Some(slab) = self.slabs.get(2 * numbers.start + color).filter(|_| !numbers.is_empty()) else { return };
+        if interrupt.is_raised() {
+            return;
+        }
+        let (mut first, mut begin) = (0, 0);
+        for (place, end) in slab.places.clone().zip(&slab.ends) {
+            let runs = &slab.runs[first..*end as usize];
+            first = *end as usize;
+            let Some(last) = runs.last() else { continue };
+            work(place, &Near { groups: &slab.groups, runs, begin, shifts: &self.shifts }, &mut window);
+            begin = last.end;
+        }
+    }
+
+    /// Slabs of as many layers of pencils as the reach may span; what is left over belongs to the last.
+    pub(super) fn cut(&self, slabs: &mut Vec<Slab>) {
+        let (layers, thickness) = (self.counts[D - 1], self.spans[D - 1].max(1) as usize);
+        let layer = self.starts.len().saturating_sub(1) / layers;
+        let number = (layers / thickness).max(1);
+        slabs.resize_with(number, Slab::default);
+        for (k, slab) in slabs.iter_mut().enumerate() {
+            let last = if k + 1 == number { layers } else { (k + 1) * thickness };
+            slab.places = self.starts[k * thickness * layer] as usize..self.starts[last * layer] as usize;
+        }
+    }
+}
