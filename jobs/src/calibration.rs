@@ -6,7 +6,7 @@ use crate::{local_run, process};
 use meniscus::scene::PhaseWork;
 use meniscus::scene::work::Course;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -160,7 +160,9 @@ pub fn measure_here(directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>
 }
 
 fn measure_run(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
-    let body = local_run::run(scene, directory, threads).map_err(|cause| format!("{scene}: {cause}"))?;
+    let body = json!({"scene": scene});
+    let body = local_run::run(&body, directory, threads, local_run::Keep::Report)
+        .map_err(|cause| format!("{scene}: {cause}"))?;
     let report = std::fs::read(directory.join("report.json")).map_err(|error| error.to_string())?;
     let report: Value = serde_json::from_slice(&report).map_err(|error| error.to_string())?;
     Ok(measured(&body.forecast.to_json(), &report["cost"], threads))

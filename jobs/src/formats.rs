@@ -1,5 +1,6 @@
 //! Files that others read: VTKHDF frames, CSV series, SVG pictures.
 
+pub mod chart;
 pub mod cloud_file;
 pub mod csv;
 pub mod frame_index;

@@ -1,21 +1,30 @@
-//! One scene in this process, on so many threads, for its report alone.
+//! One job in this process, on so many threads, for its report alone or its frames too.
 
 use crate::body::{self, Allowance, JobBody, NoSources};
 use crate::observers::Control;
 use crate::order::Order;
 use crate::records::{Record, RecordSink, Usage, Verdict};
 use crate::{process, worker};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Runs a scene into a directory, which is emptied before, and returns how it was understood.
+/// What is left of a run beside its report, series and picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// Nothing: frames of large runs would fill the disk.
+    Report,
+    /// Its frames.
+    Frames,
+}
+
+/// Runs a job body into a directory, which is emptied before, and returns how it was understood.
 ///
 /// # Errors
 /// A sentence.
-pub fn run(scene: &Value, directory: &Path, threads: u64) -> Result<JobBody, String> {
+pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<JobBody, String> {
     let system = |error: io::Error| error.to_string();
     if directory.exists() {
         fs::remove_dir_all(directory).map_err(system)?;
@@ -23,7 +32,7 @@ pub fn run(scene: &Value, directory: &Path, threads: u64) -> Result<JobBody, Str
     fs::create_dir_all(directory).map_err(system)?;
     let memory_bytes = process::total_memory().unwrap_or(4 << 30) / 5 * 4;
     let allowance = Allowance { threads, memory_bytes, local_files: false };
-    let body = body::parse(&json!({"scene": scene}), allowance, &NoSources).map_err(|violations| {
+    let body = body::parse(body, allowance, &NoSources).map_err(|violations| {
         violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
     })?;
     let order = Order {
@@ -40,9 +49,9 @@ pub fn run(scene: &Value, directory: &Path, threads: u64) -> Result<JobBody, Str
     };
     match worker::run_attempt(&order, directory, &Control::default(), &mut Silent) {
         Verdict::Succeeded => {
-            // The report is what is wanted; frames of large runs would fill the disk.
-            for part in ["frames", "checkpoints"] {
-                let _ = fs::remove_dir_all(directory.join(part));
+            let _ = fs::remove_dir_all(directory.join("checkpoints"));
+            if keep == Keep::Report {
+                let _ = fs::remove_dir_all(directory.join("frames"));
             }
             Ok(body)
         }

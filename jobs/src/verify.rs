@@ -1,20 +1,21 @@
 //! `verify`: runs the rows that scenes must show and compares figures. Runs are jobs of one thread in a directory of
 //! their own; those of this build that are already there are not repeated.
 
+mod figures;
 mod measure;
 mod table;
 
 pub use table::Outcome;
 
-use crate::formats::speed_error;
-use crate::{build, digest, local_run};
+use crate::local_run::{self, Keep};
+use crate::{build, digest};
 use meniscus::scene::SceneKind;
 use meniscus::scene::rows::{Figure, Row};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What to verify, and where.
 #[derive(Debug, Clone)]
@@ -81,18 +82,17 @@ pub fn verify(request: &Request, mut shown: impl FnMut(&Outcome) -> io::Result<(
         fs::create_dir_all(&request.results)?;
         for figure in figures {
             let path = request.results.join(format!("{}.svg", figure.name));
-            bench
-                .lines(figure)
-                .and_then(|lines| speed_error::draw(figure.title, "CPU seconds of redistancing", &lines))
-                .and_then(|text| fs::write(&path, text).map_err(|error| error.to_string()))
-                .map_err(|cause| VerifyError::Picture { name: figure.name, cause })?;
+            bench.draw(figure, &path).map_err(|cause| VerifyError::Picture { name: figure.name, cause })?;
         }
         // A document that several kinds share is not replaced by the table of one.
         let sharing = meniscus::scenes::SCENES.iter().filter(|kind| (kind.rows)().document == *name);
         let is_whole = sharing.clone().all(|kind| is_wanted(&kind));
         let part: Vec<&str> = sharing.filter(|kind| !is_whole && is_wanted(kind)).map(|kind| kind.kind).collect();
         let file = std::iter::once(*name).chain(part).collect::<Vec<_>>().join("-");
-        fs::write(request.results.join(format!("{file}.md")), table::document(outcomes, figures))?;
+        let notes = format!("{file}-notes.md");
+        let notes = request.results.join(&notes).is_file().then_some(notes);
+        let text = table::document(outcomes, figures, notes.as_deref());
+        fs::write(request.results.join(format!("{file}.md")), text)?;
     }
     Ok(all_met)
 }
@@ -123,32 +123,23 @@ impl Bench {
         Outcome::new(kind, row, figure, cpu_s, failure)
     }
 
-    fn lines(&self, figure: &Figure) -> Result<speed_error::Lines, String> {
-        let point = |scene: &Value| {
-            let report = self.report(scene)?;
-            let found = || {
-                Some(speed_error::Point {
-                    spacing: scene["spacing"].as_f64()?,
-                    seconds: measure::seconds(&report, figure.phases),
-                    error: measure::error(&report, figure.quantity)?,
-                })
-            };
-            found().ok_or_else(|| format!("{scene} reports no {} {}", figure.quantity.name, figure.quantity.norm))
-        };
-        let line = |(label, runs): &(String, Vec<Value>)| {
-            Ok((label.clone(), runs.iter().map(point).collect::<Result<_, String>>()?))
-        };
-        figure.lines.iter().map(line).collect()
-    }
-
     /// The report of a scene: of its earlier run with this build, or of one made now.
     fn report(&self, scene: &Value) -> Result<Value, String> {
-        let directory = self.runs.join(&digest::of_bytes(scene.to_string().as_bytes())[..16]);
-        let read = || -> Option<Value> { serde_json::from_slice(&fs::read(directory.join("report.json")).ok()?).ok() };
-        if let Some(report) = read() {
-            return Ok(report);
-        }
-        local_run::run(scene, &directory, 1)?;
-        read().ok_or_else(|| "the run left no report".to_owned())
+        let directory = self.ran(&json!({"scene": scene}), Keep::Report)?;
+        read_report(&directory).ok_or_else(|| "the run left no report".to_owned())
     }
+
+    /// Where a run of this build is kept: an earlier one, or one made now.
+    fn ran(&self, body: &Value, keep: Keep) -> Result<PathBuf, String> {
+        let key = format!("{body} {keep:?}");
+        let directory = self.runs.join(&digest::of_bytes(key.as_bytes())[..16]);
+        if read_report(&directory).is_none() {
+            local_run::run(body, &directory, 1, keep)?;
+        }
+        Ok(directory)
+    }
+}
+
+fn read_report(directory: &Path) -> Option<Value> {
+    serde_json::from_slice(&fs::read(directory.join("report.json")).ok()?).ok()
 }

@@ -103,19 +103,69 @@ impl Reach {
     }
 }
 
-/// A picture of error over spacing and over CPU time, one line a method.
+/// A picture of the full table.
 #[derive(Debug, Clone)]
 pub struct Figure {
     /// Name of its file.
     pub name: &'static str,
     /// Heading.
     pub title: &'static str,
-    /// The error shown.
-    pub quantity: Quantity,
-    /// Prefix of the phases whose CPU time is shown.
-    pub phases: &'static str,
-    /// A label and the runs of each line.
-    pub lines: Vec<(String, Vec<Value>)>,
+    /// What it shows.
+    pub plot: Plot,
+}
+
+/// What a picture shows. Runs are scenes.
+#[derive(Debug, Clone)]
+pub enum Plot {
+    /// Error over spacing and over CPU time, log-log, one line a method.
+    SpeedAgainstError {
+        /// The error shown.
+        quantity: Quantity,
+        /// Prefix of the phases whose CPU time is shown.
+        phases: &'static str,
+        /// A label and the runs of each line.
+        lines: Vec<(String, Vec<Value>)>,
+    },
+    /// A column of the series over time, one line a run.
+    History {
+        /// The column.
+        column: &'static str,
+        /// Whether the ordinate is logarithmic.
+        is_log: bool,
+        /// A label and the run of each line.
+        lines: Vec<(String, Value)>,
+        /// Reference points, (time, value).
+        marks: Vec<(f64, f64)>,
+    },
+    /// A field of the last frame over φ, a dot a particle, one colour a run.
+    Profile {
+        /// The field.
+        field: &'static str,
+        /// Largest |φ| shown.
+        reach: f64,
+        /// A label and the run of each colour.
+        lines: Vec<(String, Value)>,
+    },
+    /// A quantity of the report over a number that stands for the run.
+    Points {
+        /// What the number is.
+        across: &'static str,
+        /// The quantity.
+        quantity: Quantity,
+        /// A label, and the number and the run of each point.
+        lines: Vec<(String, Vec<(f64, Value)>)>,
+        /// Reference line, (number, value).
+        expected: Vec<(f64, f64)>,
+    },
+    /// Frames of one run side by side.
+    Frames {
+        /// The run.
+        scene: Value,
+        /// Scene time from one frame to the next.
+        every_time: f64,
+        /// Which of them.
+        chosen: Vec<usize>,
+    },
 }
 
 /// What a kind must show.

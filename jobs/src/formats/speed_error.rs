@@ -1,9 +1,9 @@
 //! Error over spacing and over CPU time, log-log, one line a method (SVG).
 
+use super::chart::{self, style};
 use plotters::coord::Shift;
 use plotters::prelude::{
-    ChartBuilder, Circle, DrawingArea, IntoDrawingArea, IntoFont, IntoLogRange, Palette, Palette99, PathElement,
-    SVGBackend, ShapeStyle, Text, WHITE,
+    ChartBuilder, Circle, DrawingArea, IntoDrawingArea, IntoLogRange, PathElement, SVGBackend, WHITE,
 };
 use plotters::style::{BLACK, Color};
 use std::ops::Range;
@@ -17,11 +17,6 @@ pub struct Point {
     pub seconds: f64,
     /// The error.
     pub error: f64,
-}
-
-/// The look of line k.
-fn style(k: usize) -> ShapeStyle {
-    ShapeStyle::from(&Palette99::pick(k).to_rgba()).stroke_width(2)
 }
 
 /// Labels and runs.
@@ -41,12 +36,7 @@ pub fn draw(title: &str, seconds: &str, lines: &[(String, Vec<Point>)]) -> Resul
         let panels = charts.split_evenly((1, 2));
         panel(&panels[0], lines, "spacing h", |p| p.spacing)?;
         panel(&panels[1], lines, seconds, |p| p.seconds)?;
-        for (k, (label, _)) in lines.iter().enumerate() {
-            let y = 60 + 24 * k as i32;
-            legend.draw(&PathElement::new(vec![(8, y), (34, y)], style(k))).map_err(|e| e.to_string())?;
-            let font = ("sans-serif", 15).into_font();
-            legend.draw(&Text::new(label.clone(), (42, y - 8), font)).map_err(|e| e.to_string())?;
-        }
+        chart::legend(&legend, lines.iter().map(|(label, _)| label))?;
         root.present().map_err(|e| e.to_string())?;
     }
     Ok(text)

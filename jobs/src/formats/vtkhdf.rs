@@ -90,6 +90,16 @@ pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
     }))
 }
 
+/// φ and a scalar field of a frame, where it has both.
+///
+/// # Errors
+/// Whatever libhdf5 reports.
+pub fn read_profile(path: &Path, field: &str) -> hdf5::Result<Option<Vec<(f64, f64)>>> {
+    let data = File::open(path)?.group("VTKHDF/PointData")?;
+    let (Ok(phi), Ok(values)) = (data.dataset("phi"), data.dataset(field)) else { return Ok(None) };
+    Ok(Some(phi.read_raw()?.into_iter().zip(values.read_raw()?).collect()))
+}
+
 /// Reads points, and `phi` where there is one, from a frame or any file that is laid out like one.
 ///
 /// # Errors

@@ -80,8 +80,8 @@ impl Display for Outcome {
     }
 }
 
-/// A table as a Markdown document.
-pub(super) fn document(outcomes: &[Outcome], figures: &[Figure]) -> String {
+/// A table as a Markdown document; `notes` names a file beside it that tells more.
+pub(super) fn document(outcomes: &[Outcome], figures: &[Figure], notes: Option<&str>) -> String {
     let mut kinds: Vec<&str> = outcomes.iter().map(|outcome| outcome.kind.as_str()).collect();
     kinds.dedup();
     let kinds = kinds.join(",");
@@ -112,6 +112,9 @@ pub(super) fn document(outcomes: &[Outcome], figures: &[Figure]) -> String {
             outcome.cpu_s,
             outcome.verdict()
         );
+    }
+    if let Some(notes) = notes {
+        let _ = write!(text, "\nWhat was tried, and why rows are missed: [{notes}]({notes}).\n");
     }
     for figure in figures {
         let _ = write!(text, "\n![{}]({}.svg)\n", figure.title, figure.name);

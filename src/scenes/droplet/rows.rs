@@ -1,6 +1,6 @@
 //! The rows of `droplet`: PCP paper, sections 4.3 and 4.4.
 
-use crate::scene::rows::{Figure, Measure, Quantity, Reach, Row, Rows};
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
 use serde_json::{Value, json};
 
 /// The oscillating drop, off the centre: a centred one would hide errors of momentum by its symmetry.
@@ -126,26 +126,96 @@ pub fn rows() -> Rows {
     row("3D, 1/16: largest vertical elongation".into(), "t ≈ 0.19", vec![ellipsoid.clone()], elongation, near, true);
     row("3D, 1/16: CPU seconds".into(), "–", vec![ellipsoid], Measure::Seconds(""), Reach::AtMost(120.0), true);
 
-    let line =
-        |label: &str, more: Value| (label.to_owned(), [16, 24, 32, 48].map(|cells| oscillating(cells, &more)).to_vec());
-    let lines = || {
-        vec![
-            line("pcp, balanced", json!({})),
-            line("pcp, csf (the paper's force)", json!({"tension_force": "csf"})),
-            line("colour field", json!({"geometry": "colorfield"})),
-        ]
+    Rows { document: "droplet", rows, figures: figures() }
+}
+
+/// The geometries and forces that are compared.
+fn variants() -> [(&'static str, Value); 3] {
+    [
+        ("pcp, balanced", json!({})),
+        ("pcp, csf (the paper's force)", json!({"tension_force": "csf"})),
+        ("colour field", json!({"geometry": "colorfield"})),
+    ]
+}
+
+/// Passages and extremes of the deformation that errata.md gives.
+const DEFORMATION: [(f64, f64); 3] = [(0.0, 0.384_615), (0.0872, 0.0), (0.2418, 0.0)];
+
+fn figures() -> Vec<Figure> {
+    let errors = |name, title, quantity| {
+        let runs = |more: &Value| [16, 24, 32, 48].map(|cells| oscillating(cells, more)).to_vec();
+        let lines = variants().iter().map(|(label, more)| ((*label).to_owned(), runs(more))).collect();
+        Figure { name, title, plot: Plot::SpeedAgainstError { quantity, phases: "", lines } }
     };
-    let figure = |name, title, quantity| Figure { name, title, quantity, phases: "", lines: lines() };
-    let figures = vec![
-        figure("droplet-scatter", "Oscillating drop: scatter of κ at the end", Quantity::at_end("curvature", "std")),
-        figure(
+    let each = || variants().map(|(label, more)| (format!("{label}, 1/32"), oscillating(32, &more))).to_vec();
+    let history = |name, title, column, is_log, marks| {
+        let mut lines = each();
+        lines.push(("pcp, balanced, 1/64".to_owned(), plain(64)));
+        Figure { name, title, plot: Plot::History { column, is_log, lines, marks } }
+    };
+    let radii = [0.2, 0.3, 0.4, 0.5, 0.6];
+    let resting_with = |more: &Value| {
+        let mut points = Vec::new();
+        for radius in radii {
+            let mut scene = resting(radius);
+            if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
+                scene.extend(more.clone());
+            }
+            points.push((1.0 / radius, scene));
+        }
+        points
+    };
+    let young_laplace = Plot::Points {
+        across: "1/R",
+        quantity: Quantity::at_end("pressure_jump", "mean"),
+        lines: variants().map(|(label, more)| (label.to_owned(), resting_with(&more))).to_vec(),
+        expected: [0.0, 5.5].map(|bend| (bend, 50.0 * bend)).to_vec(),
+    };
+    let frames = |name, title, scene, every_time, chosen: &[usize]| Figure {
+        name,
+        title,
+        plot: Plot::Frames { scene, every_time, chosen: chosen.to_vec() },
+    };
+    let ellipsoid = json!({"kind": "droplet", "dimension": 3, "spacing": 0.0625, "end_time": 0.22});
+    vec![
+        errors("droplet-scatter", "Oscillating drop: scatter of κ at the end", Quantity::at_end("curvature", "std")),
+        errors(
             "droplet-pressure",
             "Oscillating drop: relative error of Δp",
             Quantity::at_end("pressure_jump", "relative"),
         ),
-        figure("droplet-area", "Oscillating drop: drift of the area", Quantity::at_end("area", "relative")),
-    ];
-    Rows { document: "droplet", rows, figures }
+        errors("droplet-area", "Oscillating drop: drift of the area", Quantity::at_end("area", "relative")),
+        history("droplet-scatter-time", "Scatter of κ over time (fig. C.15)", "curvature_std", true, Vec::new()),
+        history(
+            "droplet-curvature-time",
+            "Mean κ over time (fig. C.16)",
+            "curvature_mean",
+            false,
+            vec![(1.0, 1.0 / 0.375_f64.sqrt())],
+        ),
+        history("droplet-deformation", "Deformation over time", "deformation", false, DEFORMATION.to_vec()),
+        Figure {
+            name: "droplet-profile",
+            title: "Pressure across the interface at the end (fig. C.17)",
+            plot: Plot::Profile { field: "pressure", reach: 0.3, lines: each() },
+        },
+        Figure { name: "droplet-young-laplace", title: "Δp over 1/R (fig. 11)", plot: young_laplace },
+        frames(
+            "droplet-oscillating",
+            "Oscillating drop, 1/32 (fig. 10)",
+            oscillating(32, &json!({"end_time": 0.25})),
+            0.0625,
+            &[0, 1, 2, 4],
+        ),
+        frames(
+            "droplet-dividing",
+            "Dividing drop, 1/32 (figs. 12 and 13)",
+            json!({"kind": "droplet", "case": "dividing", "spacing": 1.0 / 32.0, "end_time": 0.4}),
+            0.1,
+            &[0, 1, 2, 4],
+        ),
+        frames("droplet-space", "Ellipsoid drop, 1/16, middle plane (fig. 14)", ellipsoid, 0.055, &[0, 1, 2, 4]),
+    ]
 }
 
 /// Short scenes by which a machine is measured.

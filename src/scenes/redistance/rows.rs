@@ -1,6 +1,6 @@
 //! The rows of `redistance`: PCP paper, section 4.1, and what goes beyond it.
 
-use crate::scene::rows::{Figure, Measure, Quantity, Reach, Row, Rows};
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
 use serde_json::{Value, json};
 
 const PHI_RMS: Quantity = Quantity::at_end("phi", "rms");
@@ -234,19 +234,21 @@ pub fn rows() -> Rows {
     let figure = Figure {
         name: "redistance",
         title: "Ellipse, α = .3: max error of φ within 1/16",
-        quantity: PHI_MAX,
-        phases: "redistancing",
-        lines: vec![
-            line("minter, QR", &minter, &grid),
-            line("monomial, QR", &monomial, &grid),
-            line("unscaled monomial, QR", &unscaled, &grid),
-            line("degree 4, moments", &moments, &grid),
-            line("degree 6, moments", &sixth, &grid),
-            line("Λ₄,₄ + grid", &remesh("lambda44"), &grid),
-            line("Λ₄,₄* + grid", &remesh("lambda44_normalized"), &grid),
-            line("Wendland C2 + grid", &remesh("wendland_c2"), &grid),
-            line("Gaussian + grid", &remesh("gaussian"), &grid),
-        ],
+        plot: Plot::SpeedAgainstError {
+            quantity: PHI_MAX,
+            phases: "redistancing",
+            lines: vec![
+                line("minter, QR", &minter, &grid),
+                line("monomial, QR", &monomial, &grid),
+                line("unscaled monomial, QR", &unscaled, &grid),
+                line("degree 4, moments", &moments, &grid),
+                line("degree 6, moments", &sixth, &grid),
+                line("Λ₄,₄ + grid", &remesh("lambda44"), &grid),
+                line("Λ₄,₄* + grid", &remesh("lambda44_normalized"), &grid),
+                line("Wendland C2 + grid", &remesh("wendland_c2"), &grid),
+                line("Gaussian + grid", &remesh("gaussian"), &grid),
+            ],
+        },
     };
     Rows { document: "pcp", rows, figures: vec![figure] }
 }

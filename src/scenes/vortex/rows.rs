@@ -1,6 +1,6 @@
 //! The rows of `vortex` with closest points: PCP paper, section 4.2, and what goes beyond it.
 
-use crate::scene::rows::{Figure, Measure, Quantity, Reach, Row, Rows};
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -125,7 +125,11 @@ pub fn rows() -> Rows {
             line("dual, material fits", &material),
         ]
     };
-    let figure = |name, title, quantity| Figure { name, title, quantity, phases: "redistancing", lines: lines() };
+    let figure = |name, title, quantity| Figure {
+        name,
+        title,
+        plot: Plot::SpeedAgainstError { quantity, phases: "redistancing", lines: lines() },
+    };
     let figures = vec![
         figure("vortex-end", "Single vortex, T = 8: RMS error of φ at T", END),
         figure("vortex-halfway", "Single vortex, T = 8: RMS error of φ at T/2", HALFWAY),

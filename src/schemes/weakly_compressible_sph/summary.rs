@@ -146,6 +146,7 @@ impl Summary {
         if count.is_finite() && self.droplets < 1.5 {
             let late = "Young–Laplace, mean of the last fifth";
             add("pressure_jump", "relative", (jumps / jump - 1.0).abs(), time, late);
+            add("pressure_jump", "mean", jumps, time, "mean of the last fifth");
             add("pressure_eos_jump", "relative", (eos / jump).abs(), time, late);
             add("curvature", "mean_error", (means - curvature).abs(), time, "ball of the initial measure");
         }
