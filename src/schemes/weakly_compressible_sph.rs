@@ -19,6 +19,7 @@ pub mod parts;
 mod shifting;
 mod simulation;
 mod stepping;
+mod strays;
 mod summary;
 mod system;
 pub mod time_step;

@@ -16,10 +16,6 @@ const MARGIN_H: f64 = 1.0;
 /// Within so many h a particle counts as next to the surface when others are selected.
 const NEAR_H: f64 = 2.0;
 
-/// Curvature by h, and cosine between the last normal and the present one, of an interface that shifted particles may cross.
-const BEND: f64 = 0.3;
-const FACING: f64 = 0.8;
-
 /// The surface and the particles near it.
 #[derive(Debug)]
 pub(super) struct Interface<const D: usize> {
@@ -36,14 +32,12 @@ pub(super) struct Interface<const D: usize> {
     level: Vec<f64>,
     normals: Vec<Vector<D>>,
     answers: Answers<D>,
-    /// How far particles are moved between rebuild and answer at most; negative where nobody is.
-    most_shift: f64,
     /// Curvatures that were cut to 1/h.
     pub bounded: u64,
 }
 
 impl<const D: usize> Interface<D> {
-    pub fn new(method: PcpMethod, domain: &Domain<D>, spacing: f64, half_band: f64, most_shift: f64) -> Self {
+    pub fn new(method: PcpMethod, domain: &Domain<D>, spacing: f64, half_band: f64) -> Self {
         let keep = half_band.max(method.reach_h::<D>() * spacing) + MARGIN_H * spacing;
         Self {
             surface: LevelSurface::Spatial(Box::new(Redistancing::new(method, domain.clone(), spacing))),
@@ -58,7 +52,6 @@ impl<const D: usize> Interface<D> {
             level: Vec::new(),
             normals: Vec::new(),
             answers: Answers::default(),
-            most_shift,
             bounded: 0,
         }
     }
@@ -151,17 +144,9 @@ impl<const D: usize> Interface<D> {
                 if is_selection {
                     candidate[i] = 1;
                 }
-                let was_inside = self.level[k] < 0.0;
-                // Nobody crosses over but who lay nearer to the interface than it was moved aside, and where that is known
-                // well: gently bent, and facing as before.
-                let is_known = !answer.is_sample
-                    && answer.curvature.abs() * self.spacing < BEND
-                    && answer.normal.dot(&self.normals[k]) > FACING;
-                let may_cross = is_known && self.level[k].abs() <= self.most_shift;
-                let is_inside = if may_cross { !answer.is_outside } else { was_inside };
-                // Who lies off a mere sample keeps what it has carried.
+                // Nobody changes side; who lies off a mere sample keeps what it has carried.
                 if !answer.is_sample {
-                    particles.scalar_mut(columns.phi)[i] = if is_inside { -answer.distance } else { answer.distance };
+                    particles.scalar_mut(columns.phi)[i] = answer.distance.copysign(self.level[k]);
                 }
                 particles.vector_mut(columns.closest_point)[i] = answer.point;
                 particles.vector_mut(columns.normal)[i] = answer.normal;

@@ -6,7 +6,6 @@ use crate::geometry::Vector;
 use crate::geometry::domain::Axis;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::Interrupted;
-use std::f64::consts::TAU;
 
 /// Numbers of one moment, in the order of [`names`].
 pub(super) type Row = Vec<f64>;
@@ -82,16 +81,18 @@ impl<const D: usize> SphSystem<D> {
         enclosed_moments(&interface.surface, unwrap, &self.interrupt).map(Some)
     }
 
-    /// The middle of points on the circles that periodic axes are.
+    /// A centre from which nothing is cut: along periodic axes opposite to the widest gap between points.
     fn circular_centre(&self, points: &[Vector<D>]) -> Vector<D> {
         Vector::<D>::from_fn(|d, _| match self.domain.axes()[d] {
             Axis::Unbounded => points.iter().map(|x| x[d]).sum::<f64>() / points.len().max(1) as f64,
             Axis::Periodic { start, length } => {
-                let (sine, cosine) = points.iter().fold((0.0, 0.0), |(s, c), x| {
-                    let angle = TAU * (x[d] - start) / length;
-                    (s + angle.sin(), c + angle.cos())
-                });
-                start + length * f64::atan2(sine, cosine).rem_euclid(TAU) / TAU
+                let mut places: Vec<f64> = points.iter().map(|x| x[d]).collect();
+                places.sort_by(f64::total_cmp);
+                let last = places.last().map_or(start, |last| last - length);
+                let before = std::iter::once(last).chain(places.iter().copied());
+                let gaps = before.zip(&places).map(|(from, to)| (to - from, 0.5 * (from + to)));
+                let (_, middle) = gaps.fold((0.0, start), |most, gap| if gap.0 > most.0 { gap } else { most });
+                start + (middle + 0.5 * length - start).rem_euclid(length)
             }
         })
     }

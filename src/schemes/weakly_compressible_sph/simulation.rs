@@ -320,7 +320,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             (counts, soundness.worst_condition, interface.bounded)
         });
         state.push_counts("rescues", counts);
-        state.push_counts("counters", vec![self.parts_of_step, self.resting, bounded]);
+        state.push_counts("counters", vec![self.parts_of_step, self.resting, bounded, system.strays.absorbed]);
         state.push_reals("monitors", &[self.max_cfl, condition, system.initial_measure]);
         let Clock { step, time } = self.pace.origin;
         state.push_counts("origin_step", vec![step]);
@@ -359,7 +359,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             (state.counts("rescues")?, state.counts("counters")?, state.reals("monitors")?);
         let entries = self.system.interface.as_ref().map_or(0, |i| i.surface.soundness().counts.entries().len());
         check_length("rescues", rescues.len(), entries)?;
-        check_length("counters", counters.len(), 3)?;
+        check_length("counters", counters.len(), 4)?;
         check_length("monitors", monitors.len(), 3)?;
         check_length("row", state.counts("row")?.len(), self.row.len())?;
         let numbers = |name| -> Result<Vec<f64>, RestoreError> {
@@ -394,6 +394,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         flags("droplet", &mut system.droplet)?;
         system.ball_curvatures = state.reals("ball_curvatures")?.to_vec();
         system.initial_measure = monitors[2];
+        system.strays.absorbed = counters[3];
         if let Some(interface) = &mut system.interface {
             let soundness = interface.surface.soundness_mut();
             soundness.counts.restore(rescues);
@@ -423,6 +424,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let mut report = closest_point_report(soundness, errors, self.health(), self.method.clone());
         if let Some(interface) = self.system.interface.as_ref().filter(|interface| interface.bounded > 0) {
             report.newton.rescued.insert("curvature.bounded", interface.bounded);
+        }
+        if self.system.strays.absorbed > 0 {
+            report.newton.rescued.insert("strays.absorbed", self.system.strays.absorbed);
         }
         report
     }

@@ -4,8 +4,9 @@ use super::components::{Components, FRAGMENT, ball_curvature};
 use super::hydrodynamics::Hydrodynamics;
 use super::interface::Interface;
 use super::parts::{DensityMethod, Geometry, Integrator, SphParts, TensionForce};
-use super::shifting::{MOST_SHIFT, displacement};
+use super::shifting::{displacement, part_along};
 use super::stepping::Start;
+use super::strays::Strays;
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::pencils::BoxTooSmall;
@@ -55,6 +56,7 @@ pub struct SphSystem<const D: usize> {
     pub(super) hydrodynamics: Hydrodynamics<D>,
     pub(super) interface: Option<Interface<D>>,
     components: Components<D>,
+    pub(super) strays: Strays<D>,
     volume: Vec<f64>,
     pub(super) pressure: Vec<f64>,
     /// n̂ of a colour field, with its unit normals and curvatures.
@@ -100,8 +102,7 @@ impl<const D: usize> SphSystem<D> {
         particles.scalar_mut(columns.phi).copy_from_slice(&drop.level);
         let interface = match &parts.geometry {
             Geometry::Pcp { method, half_band } if parts.has_tension() => {
-                let most_shift = if parts.is_shifted { MOST_SHIFT * parts.smoothing_length } else { -1.0 };
-                Some(Interface::new(method.clone(), &domain, parts.spacing, *half_band, most_shift))
+                Some(Interface::new(method.clone(), &domain, parts.spacing, *half_band))
             }
             _ => None,
         };
@@ -122,6 +123,7 @@ impl<const D: usize> SphSystem<D> {
             sizes: Vec::new(),
             initial_measure: drop.measure,
             components: Components::new(domain.clone()),
+            strays: Strays::new(domain.clone()),
             hydrodynamics,
             interface,
             volume: vec![cell; count],
@@ -175,13 +177,6 @@ impl<const D: usize> SphSystem<D> {
         if let Some(interface) = &mut self.interface {
             let (particles, candidate) = (&mut self.particles, &mut self.candidate);
             interface.answer(particles, &self.columns, candidate, is_listed, &self.interrupt, phases)?;
-            if self.parts.is_shifted && self.parts.inside == self.parts.outside {
-                // Of one fluid, whoever is shifted across is of the other side from then on.
-                let phi = self.particles.scalar(self.columns.phi);
-                for i in interface.candidates() {
-                    self.phase[*i] = u8::from(phi[*i] < 0.0);
-                }
-            }
         }
         let is_due = is_listed && self.parts.has_tension();
         let changed = if is_due { phases.measure("droplets", || self.count_droplets()) } else { None };
@@ -208,10 +203,14 @@ impl<const D: usize> SphSystem<D> {
         if is_stale {
             self.reference.copy_from_slice(positions);
             phases.measure("neighbors", || self.hydrodynamics.list(&self.reference, &self.interrupt))?;
-            if let Some(interface) = &mut self.interface {
-                let candidate = &mut self.candidate;
-                phases
-                    .measure("redistancing/detection", || interface.select(&self.particles, &self.columns, candidate));
+            let Self { interface, candidate, particles, columns, phase, strays, parts, .. } = self;
+            if let Some(interface) = interface {
+                phases.measure("redistancing/detection", || interface.select(particles, columns, candidate));
+                if parts.is_shifted && parts.inside == parts.outside {
+                    phases.measure("droplets", || {
+                        strays.absorb(particles, columns.phi, interface.candidates(), parts.spacing, phase);
+                    });
+                }
             }
         }
         Ok(is_stale)
@@ -238,17 +237,24 @@ impl<const D: usize> SphSystem<D> {
         self.hydrodynamics.take_positions(self.particles.positions(), &self.reference);
     }
 
-    /// Moves particles towards evenness (B.16); the interface stays where it is.
+    /// Moves particles towards evenness (B.16), those at the interface along it, so that it stays where it is and nobody
+    /// changes side.
     fn shift(&mut self) -> Result<(), Interrupted> {
         self.derive_volumes();
-        let Self { hydrodynamics, particles, parts, volume, domain, interrupt, .. } = self;
-        let positions = particles.positions_mut();
+        let Self { hydrodynamics, particles, columns, interface, parts, volume, domain, interrupt, .. } = self;
+        let has_interface = interface.is_some();
         hydrodynamics.concentration(
             |i| volume[i],
             parts.spacing,
             interrupt,
             |i, gradient| {
-                positions[i] = domain.wrap(positions[i] + displacement(gradient, parts.smoothing_length));
+                let mut shift = displacement(gradient, parts.smoothing_length);
+                if has_interface {
+                    let (phi, normal) = (particles.scalar(columns.phi)[i], particles.vector(columns.normal)[i]);
+                    shift -= normal * (normal.dot(&shift) * part_along(phi / parts.spacing));
+                }
+                let x = &mut particles.positions_mut()[i];
+                *x = domain.wrap(*x + shift);
             },
         )?;
         self.gather_positions();
