@@ -144,11 +144,17 @@ fn too_long_a_step_is_named_and_a_shorter_one_goes_on() {
     });
 }
 
+/// The neck parts, its threads are drawn in, and what remains are two drops of half the measure each, with the curvature of
+/// such: √(2π/A).
 #[test]
-fn a_drop_is_torn_apart_by_a_pulse() {
-    let (simulation, findings) = finish(&json!({"kind": "droplet", "case": "dividing", "end_time": 0.17}));
-    assert!(findings.iter().any(|name| name == "split"), "{findings:?}");
-    assert!(simulation.health().volume_drift.unwrap().abs() < 0.06, "{:?}", simulation.health());
+fn a_drop_is_torn_into_two_by_a_pulse() {
+    let (simulation, findings) = finish(&json!({"kind": "droplet", "case": "dividing", "end_time": 0.7}));
+    assert_eq!(findings.iter().filter(|name| *name == "split").count(), 1, "{findings:?}");
+    assert_eq!(last(simulation.as_ref(), "droplets"), 2.0);
+    assert!(simulation.health().volume_drift.unwrap().abs() < 0.03, "{:?}", simulation.health());
+    let curvature = last(simulation.as_ref(), "curvature_mean");
+    let expected = 32.0_f64.sqrt();
+    assert!((curvature - expected).abs() < 0.04 * expected, "{curvature}");
 }
 
 #[test]
