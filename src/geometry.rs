@@ -1,6 +1,7 @@
 //! Where things are: the domain, exact surfaces, prescribed flows and seeded point lattices.
 
 pub mod domain;
+pub mod fibonacci;
 pub mod flows;
 pub mod lattice;
 pub mod random;
