@@ -7,13 +7,14 @@ pub mod particle_estimate;
 pub mod pcp_parameters;
 pub mod redistance;
 pub mod shapes;
+pub mod surface_pde;
 pub mod vortex;
 pub mod work_estimate;
 
 use crate::scene::SceneKind;
 
 /// Every kind of scene.
-pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND, &droplet::KIND];
+pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND, &droplet::KIND, &surface_pde::KIND];
 
 /// A kind by its name.
 #[must_use]

@@ -5,4 +5,5 @@ pub mod advected_level_set;
 pub mod measured_errors;
 pub mod measured_redistancing;
 pub mod static_redistancing;
+pub mod surface_equation;
 pub mod weakly_compressible_sph;

@@ -142,9 +142,9 @@ fn variants() -> [(&'static str, Value); 3] {
 const DEFORMATION: [(f64, f64); 3] = [(0.0, 0.384_615), (0.0872, 0.0), (0.2418, 0.0)];
 
 fn figures() -> Vec<Figure> {
-    let errors = |name, title, quantity| {
+    let errors = |name, title, quantity, number| {
         let runs = |more: &Value| [16, 24, 32, 48].map(|cells| oscillating(cells, more)).to_vec();
-        let lines = variants().iter().map(|(label, more)| ((*label).to_owned(), runs(more))).collect();
+        let lines = variants()[..number].iter().map(|(label, more)| ((*label).to_owned(), runs(more))).collect();
         Figure { name, title, plot: Plot::SpeedAgainstError { quantity, phases: "", lines } }
     };
     let each = || variants().map(|(label, more)| (format!("{label}, 1/32"), oscillating(32, &more))).to_vec();
@@ -178,13 +178,15 @@ fn figures() -> Vec<Figure> {
     };
     let ellipsoid = json!({"kind": "droplet", "dimension": 3, "spacing": 0.0625, "end_time": 0.22});
     vec![
-        errors("droplet-scatter", "Oscillating drop: scatter of κ at the end", Quantity::at_end("curvature", "std")),
+        errors("droplet-scatter", "Oscillating drop: scatter of κ at the end", Quantity::at_end("curvature", "std"), 3),
         errors(
             "droplet-pressure",
             "Oscillating drop: relative error of Δp",
             Quantity::at_end("pressure_jump", "relative"),
+            3,
         ),
-        errors("droplet-area", "Oscillating drop: drift of the area", Quantity::at_end("area", "relative")),
+        // A colour field encloses nothing.
+        errors("droplet-area", "Oscillating drop: drift of the area", Quantity::at_end("area", "relative"), 2),
         history("droplet-scatter-time", "Scatter of κ over time (fig. C.15)", "curvature_std", true, Vec::new()),
         history(
             "droplet-curvature-time",

@@ -1,0 +1,118 @@
+//! Fields whose Laplace–Beltrami operator is known.
+
+use crate::geometry::Vector;
+use std::f64::consts::PI;
+
+/// A field on a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ExactField {
+    /// Real orthonormal Y_lm on a sphere about the origin: m > 0 ∝ cos mφ, m < 0 ∝ sin |m|φ.
+    SphericalHarmonic {
+        /// Degree.
+        l: u32,
+        /// Order, |m| ≤ l.
+        m: i32,
+    },
+    /// sin(k·x), on any surface.
+    PlaneWave {
+        /// k.
+        k: Vector<3>,
+    },
+}
+
+impl ExactField {
+    /// The field at a point.
+    #[must_use]
+    pub fn value(&self, x: &Vector<3>) -> f64 {
+        match self {
+            Self::SphericalHarmonic { l, m } => spherical_harmonic(*l, *m, x),
+            Self::PlaneWave { k } => k.dot(x).sin(),
+        }
+    }
+
+    /// Δ_S at a point with unit normal `n` and curvature ∇·n: the part of a surface in Δf − nᵀ(∇∇f)n − (∇·n) n·∇f.
+    #[must_use]
+    pub fn laplace_beltrami(&self, x: &Vector<3>, n: &Vector<3>, curvature: f64) -> f64 {
+        match self {
+            Self::SphericalHarmonic { l, m } => {
+                -f64::from(l * (l + 1)) / x.norm_squared() * spherical_harmonic(*l, *m, x)
+            }
+            Self::PlaneWave { k } => {
+                let (phase, along) = (k.dot(x), k.dot(n));
+                -(k.norm_squared() - along * along) * phase.sin() - curvature * along * phase.cos()
+            }
+        }
+    }
+}
+
+/// Y_lm at the direction of x, by the recurrence in l of normalised associated Legendre functions.
+fn spherical_harmonic(l: u32, m: i32, x: &Vector<3>) -> f64 {
+    let z = (x[2] / x.norm()).clamp(-1.0, 1.0);
+    let (order, sine) = (f64::from(m.unsigned_abs()), (1.0 - z * z).sqrt());
+    // P_mm, then up in l.
+    let mut last = 0.0;
+    let mut now = (1..=m.unsigned_abs()).fold((0.25 / PI).sqrt(), |value, k| {
+        let k = f64::from(k);
+        value * ((2.0 * k + 1.0) / (2.0 * k)).sqrt() * sine
+    });
+    for degree in m.unsigned_abs() + 1..=l {
+        let n = f64::from(degree);
+        let a = ((4.0 * n * n - 1.0) / (n * n - order * order)).sqrt();
+        let before = n - 1.0;
+        let b = if degree == m.unsigned_abs() + 1 {
+            0.0
+        } else {
+            ((before * before - order * order) / (4.0 * before * before - 1.0)).sqrt()
+        };
+        (last, now) = (now, a * (z * now - b * last));
+    }
+    let angle = order * f64::atan2(x[1], x[0]);
+    match m {
+        0 => now,
+        1.. => 2.0_f64.sqrt() * now * angle.cos(),
+        _ => 2.0_f64.sqrt() * now * angle.sin(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ExactField, Vector, spherical_harmonic};
+    use crate::geometry::fibonacci;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn harmonics_are_orthonormal() {
+        let points = fibonacci::sphere(20_000);
+        let share = 4.0 * PI / points.len() as f64;
+        let pairs = [(0, 0), (1, -1), (2, 0), (4, 0), (4, 3), (4, -3), (6, 6)];
+        for (i, (l, m)) in pairs.iter().enumerate() {
+            for (k, (l2, m2)) in pairs.iter().enumerate() {
+                let product = |x: &Vector<3>| spherical_harmonic(*l, *m, x) * spherical_harmonic(*l2, *m2, x);
+                let sum: f64 = points.iter().map(product).sum::<f64>() * share;
+                assert!((sum - f64::from(u8::from(i == k))).abs() < 1e-4, "({l}, {m}) ({l2}, {m2}): {sum}");
+            }
+        }
+        // √(5/16π) (3z² − 1) and the like.
+        let x = Vector::<3>::new(0.48, 0.6, 0.64);
+        let expected = (5.0 / (16.0 * PI)).sqrt() * (3.0 * x[2] * x[2] - 1.0);
+        assert!((spherical_harmonic(2, 0, &x) - expected).abs() < 1e-14);
+        assert!((spherical_harmonic(1, -1, &(3.0 * x)) - (3.0 / (4.0 * PI)).sqrt() * x[1]).abs() < 1e-14);
+    }
+
+    /// On a sphere of radius R the plane wave's formula against differences along great circles.
+    #[test]
+    fn plane_waves_have_the_operator_of_their_surface() {
+        let (radius, step) = (1.7, 1e-3);
+        let wave = ExactField::PlaneWave { k: Vector::<3>::new(1.0, -0.5, 2.0) };
+        let n = Vector::<3>::new(0.48, 0.6, 0.64);
+        let t1 = Vector::<3>::new(0.6, -0.48, 0.0).normalize();
+        let t2 = n.cross(&t1);
+        let on = |t: &Vector<3>, angle: f64| (n * angle.cos() + t * angle.sin()) * radius;
+        let here = wave.value(&(n * radius));
+        let second = |t: &Vector<3>| {
+            (wave.value(&on(t, step)) + wave.value(&on(t, -step)) - 2.0 * here) / (step * radius).powi(2)
+        };
+        let exact = wave.laplace_beltrami(&(n * radius), &n, 2.0 / radius);
+        assert!((second(&t1) + second(&t2) - exact).abs() < 1e-5);
+    }
+}
