@@ -54,6 +54,7 @@ fn steps_allocate_nothing_after_warm_up() {
         json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.02}),
         json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.02, "geometry": "colorfield", "integrator": "predictor_corrector"}),
         json!({"kind": "droplet", "case": "dividing", "spacing": 0.05, "end_time": 0.002}),
+        json!({"kind": "surface_pde", "count": 500, "repeat": 12}),
     ];
     let plan = meniscus::simulation::OutputPlan { every_time: None, series_every_steps: 1000 };
     for body in bodies {

@@ -62,6 +62,10 @@ fn bodies() -> Vec<Value> {
         "shape": {"type": "sphere", "radius": 0.7}, "integrator": "predictor_corrector", "shifting": "pst"
     }));
     bodies.push(vortex(json!({"flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3}})));
+    bodies.push(json!({
+        "kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 0.6, 0.8]}, "count": 700, "repeat": 5,
+        "problem": {"type": "laplace_beltrami", "field": "plane_wave"}, "method": {"type": "surface_dcpse", "order": 6, "cutoff_dn": 3.5}
+    }));
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
         "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,
@@ -269,6 +273,17 @@ fn nonsense_is_refused_at_its_place() {
             "/geometry/neighborhood/type",
         ),
         (json!({"kind": "droplet", "time_step": 1e-3, "steps": 7}), "/time_step"),
+        (json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "order": 3}}), "/method/order"),
+        (json!({"kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 2]}}), "/surface/semi_axes"),
+        (json!({"kind": "surface_pde", "surface": "ellipsoid"}), "/problem/field"),
+        (
+            json!({"kind": "surface_pde", "problem": {"type": "laplace_beltrami", "field": {"type": "spherical_harmonic", "l": 2, "m": -3}}}),
+            "/problem/field/m",
+        ),
+        (
+            json!({"kind": "surface_pde", "problem": {"type": "laplace_beltrami", "field": {"type": "plane_wave", "k": [1, 2]}}}),
+            "/problem/field/k",
+        ),
     ] {
         let found = meniscus::scene::understand(&body, SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == place), "{body}: {found:?}");

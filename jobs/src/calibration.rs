@@ -156,7 +156,7 @@ pub fn measure_here(directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>
     }
     // Only what has just been made here.
     let _ = std::fs::remove_dir_all(directory);
-    Ok(medians(rounds))
+    Ok(medians(&rounds))
 }
 
 fn measure_run(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
@@ -169,7 +169,7 @@ fn measure_run(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<Phas
 }
 
 /// Of every phase of every run the round in the middle; all rounds list the same.
-fn medians(rounds: Vec<Vec<PhaseMeasured>>) -> Vec<PhaseMeasured> {
+fn medians(rounds: &[Vec<PhaseMeasured>]) -> Vec<PhaseMeasured> {
     let length = rounds.iter().map(Vec::len).min().unwrap_or(0);
     let pace = |one: &PhaseMeasured| one.measured.seconds / one.measured.work;
     (0..length)
@@ -194,7 +194,7 @@ mod tests {
             })
         };
         let rounds = [[1.0, 9.0], [1.2, 3.0], [7.0, 2.0]].map(|seconds| round(seconds).collect()).to_vec();
-        let found: Vec<f64> = medians(rounds).iter().map(|one| one.measured.seconds).collect();
+        let found: Vec<f64> = medians(&rounds).iter().map(|one| one.measured.seconds).collect();
         assert_eq!(found, [1.2, 3.0]);
     }
 }

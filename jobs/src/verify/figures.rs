@@ -52,7 +52,7 @@ impl Bench {
             let report = self.report(scene)?;
             let found = || {
                 Some(speed_error::Point {
-                    spacing: scene["spacing"].as_f64()?,
+                    spacing: measure::spacing(scene)?,
                     seconds: measure::seconds(&report, phases),
                     error: measure::error(&report, quantity)?,
                 })

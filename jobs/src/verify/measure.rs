@@ -16,6 +16,12 @@ pub fn error(report: &Value, quantity: Quantity) -> Option<f64> {
     found?["value"].as_f64()
 }
 
+/// The length that errors are held against: h, or where a scene has a number of points on a surface N^(−1/2).
+#[must_use]
+pub fn spacing(scene: &Value) -> Option<f64> {
+    scene["spacing"].as_f64().or_else(|| Some(1.0 / scene["count"].as_f64()?.sqrt()))
+}
+
 /// CPU seconds in phases whose names begin so.
 #[must_use]
 pub fn seconds(report: &Value, prefix: &str) -> f64 {
@@ -29,12 +35,11 @@ pub fn seconds(report: &Value, prefix: &str) -> f64 {
 pub fn measure(measure: Measure, scenes: &[Value], reports: &[Value]) -> f64 {
     let nothing = Value::Null;
     let (first, last) = (reports.first().unwrap_or(&nothing), reports.last().unwrap_or(&nothing));
-    let spacing = |scene: Option<&Value>| scene.and_then(|s| s["spacing"].as_f64()).unwrap_or(f64::NAN);
+    let spacing = |scene: &Value| spacing(scene).unwrap_or(f64::NAN);
     match measure {
         Measure::Error(of) => error(last, of).unwrap_or(f64::NAN),
         Measure::WorstInSpacings(of) => {
-            let ratio =
-                |(scene, report): (&Value, &Value)| error(report, of).unwrap_or(f64::NAN) / spacing(Some(scene));
+            let ratio = |(scene, report): (&Value, &Value)| error(report, of).unwrap_or(f64::NAN) / spacing(scene);
             // A NaN must not be lost in the maximum.
             scenes.iter().zip(reports).map(ratio).fold(0.0, |worst, r| if r <= worst { worst } else { r })
         }
@@ -42,7 +47,7 @@ pub fn measure(measure: Measure, scenes: &[Value], reports: &[Value]) -> f64 {
             let points: Vec<(f64, f64)> = scenes
                 .iter()
                 .zip(reports)
-                .filter_map(|(scene, report)| Some((spacing(Some(scene)).ln(), error(report, of)?)))
+                .filter_map(|(scene, report)| Some((spacing(scene).ln(), error(report, of)?)))
                 .filter(|(_, error)| *error > floor)
                 .map(|(x, error)| (x, error.ln()))
                 .collect();

@@ -95,7 +95,7 @@ static METHODS: &[Variant] = &[Variant {
         ),
         Parameter::new(
             "cutoff_dn",
-            "r_c by δn = √(area/N); 2.9, 3.9, 5 for orders 2, 4, 6 when not given",
+            "r_c by δn = √(area/N); 2.4, 3.3, 4.2 for orders 2, 4, 6 when not given",
             Kind::Number { above: Some(1.0), least: None, below: None, most: Some(20.0) },
             DefaultValue::Absent,
         ),

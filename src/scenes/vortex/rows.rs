@@ -147,6 +147,6 @@ pub(super) fn calibration() -> Vec<Value> {
                "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15}, "end_time": 1, "steps": 20}),
         json!({"kind": "vortex", "preset": "paper", "spacing": 0.03125, "flow": vortex, "end_time": 2, "time_step": 0.1}),
         json!({"kind": "vortex", "spacing": 0.008, "end_time": 1,
-               "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3.14}}),
+               "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3}}),
     ]
 }
