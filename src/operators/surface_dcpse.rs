@@ -5,7 +5,7 @@
 //! projection is the identity up to it. One weighted fit of polynomials in (X, Y) a point gives the row.
 
 use super::stencil_operator::StencilOperator;
-use super::tangent_basis::{MOST_DEGREE, laplacians, size, values};
+use super::tangent_basis::TangentBasis;
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::normal_equations::{LaneSystems, packed_row};
 use crate::linear_algebra::number::{LANES, Lanes};
@@ -84,8 +84,8 @@ impl SurfaceDcpse<'_> {
     ) -> Result<(StencilOperator, Soundness), Interrupted> {
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(self.points.iter().copied(), support.radius);
-        let degree = support.degree.min(MOST_DEGREE);
-        let functional = laplacians(degree);
+        let basis = TangentBasis::new(support.degree);
+        let functional = basis.laplacians();
         let blocks: Vec<Work> = (0..self.points.len().div_ceil(BLOCK))
             .into_par_iter()
             .with_min_len(1)
@@ -100,7 +100,7 @@ impl SurfaceDcpse<'_> {
                     self.rows_of(
                         &cells,
                         first..(first + LANES).min(end),
-                        degree,
+                        &basis,
                         support.radius,
                         &functional,
                         &mut work,
@@ -126,12 +126,12 @@ impl SurfaceDcpse<'_> {
         &self,
         cells: &CellList<3>,
         points: std::ops::Range<usize>,
-        degree: usize,
+        basis: &TangentBasis,
         radius: f64,
         functional: &[f64],
         work: &mut Work,
     ) {
-        let number = size(degree);
+        let number = basis.size();
         let wanted = (NEIGHBORS_A_FUNCTION * number as f64).ceil() as usize;
         let mut reach = [radius; LANES];
         for (lane, i) in points.clone().enumerate() {
@@ -150,7 +150,7 @@ impl SurfaceDcpse<'_> {
             reach[lane] = reach[0];
         }
         loop {
-            let pivots = work.solve(degree, &reach, functional);
+            let pivots = work.solve(basis, &reach, functional);
             let mut is_again = false;
             for (lane, i) in points.clone().enumerate() {
                 let is_sound = pivots[lane] > LEAST_PIVOT && work.near[lane].len() >= number;
@@ -206,8 +206,8 @@ fn tangents(n: &Vector<3>) -> [Vector<3>; 2] {
 
 impl Work {
     /// Moments and the solution for the functional in each lane. Returns the least share of a pivot in its diagonal.
-    fn solve(&mut self, degree: usize, reach: &[f64; LANES], functional: &[f64]) -> [f64; LANES] {
-        let number = size(degree);
+    fn solve(&mut self, functions: &TangentBasis, reach: &[f64; LANES], functional: &[f64]) -> [f64; LANES] {
+        let number = functions.size();
         let most = self.near.iter().map(Vec::len).max().unwrap_or(0);
         self.systems.reset(number);
         self.systems.matrix_mut().fill(Lanes::splat(0.0));
@@ -218,7 +218,7 @@ impl Work {
                 |part: usize| Lanes::new(std::array::from_fn(|lane| self.near[lane].get(k).map_or(0.0, |n| n.1[part])));
             let (x, y, window) = (of(0), of(1), of(2));
             let basis = &mut self.basis[k * number..(k + 1) * number];
-            values(degree, x, y, basis);
+            functions.values(x, y, basis);
             self.windows.push(window);
             let matrix = self.systems.matrix_mut();
             for (a, value) in basis.iter().enumerate() {
