@@ -64,7 +64,7 @@ fn bodies() -> Vec<Value> {
     bodies.push(vortex(json!({"flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3}})));
     bodies.push(json!({
         "kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 0.6, 0.8]}, "count": 700, "repeat": 5,
-        "problem": {"type": "laplace_beltrami", "field": "plane_wave"}, "method": {"type": "surface_dcpse", "order": 6, "cutoff_dn": 3.5}
+        "problem": {"type": "laplace_beltrami", "field": "plane_wave"}, "method": {"type": "surface_dcpse", "order": 6, "cutoff_dn": 3.8}
     }));
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
@@ -276,6 +276,15 @@ fn nonsense_is_refused_at_its_place() {
         (json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "order": 3}}), "/method/order"),
         (json!({"kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 2]}}), "/surface/semi_axes"),
         (json!({"kind": "surface_pde", "surface": "ellipsoid"}), "/problem/field"),
+        (json!({"kind": "surface_pde", "count": 200, "method": {"type": "surface_dcpse", "order": 6}}), "/count"),
+        (
+            json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "order": 4, "cutoff_dn": 1.5}}),
+            "/method/cutoff_dn",
+        ),
+        (
+            json!({"kind": "surface_pde", "problem": {"type": "laplace_beltrami", "field": {"type": "plane_wave", "k": [0, 0, 0]}}}),
+            "/problem/field/k",
+        ),
         (
             json!({"kind": "surface_pde", "problem": {"type": "laplace_beltrami", "field": {"type": "spherical_harmonic", "l": 2, "m": -3}}}),
             "/problem/field/m",

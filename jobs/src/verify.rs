@@ -78,12 +78,9 @@ pub fn verify(request: &Request, mut shown: impl FnMut(&Outcome) -> io::Result<(
         }
         figures.extend(rows.figures);
     }
+    let mut undrawn = None;
     for (name, (outcomes, figures)) in documents.iter().filter(|_| request.full) {
         fs::create_dir_all(&request.results)?;
-        for figure in figures {
-            let path = request.results.join(format!("{}.svg", figure.name));
-            bench.draw(figure, &path).map_err(|cause| VerifyError::Picture { name: figure.name, cause })?;
-        }
         // A document that several kinds share is not replaced by the table of one.
         let sharing = meniscus::scenes::SCENES.iter().filter(|kind| (kind.rows)().document == *name);
         let is_whole = sharing.clone().all(|kind| is_wanted(&kind));
@@ -93,8 +90,15 @@ pub fn verify(request: &Request, mut shown: impl FnMut(&Outcome) -> io::Result<(
         let notes = request.results.join(&notes).is_file().then_some(notes);
         let text = table::document(outcomes, figures, notes.as_deref());
         fs::write(request.results.join(format!("{file}.md")), text)?;
+        // The table stands whatever becomes of the pictures, and each of them whatever becomes of the others.
+        for figure in figures {
+            let path = request.results.join(format!("{}.svg", figure.name));
+            if let Err(cause) = bench.draw(figure, &path) {
+                undrawn = undrawn.or(Some(VerifyError::Picture { name: figure.name, cause }));
+            }
+        }
     }
-    Ok(all_met)
+    undrawn.map_or(Ok(all_met), Err)
 }
 
 /// A name for this build, so that runs of another one are not taken for its own.

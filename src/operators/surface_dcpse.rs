@@ -27,7 +27,7 @@ pub struct Support {
 pub struct Soundness {
     /// Points whose support was enlarged, as often as it was.
     pub enlarged: u64,
-    /// Points that no support of [`MOST_GROWTH`] r_c was enough for: their rows are empty.
+    /// Points that no support of [`MOST_GROWTH`] r_c was enough for: their rows give no number.
     pub failed: u64,
     /// The least share of a pivot in its diagonal, of all points.
     pub least_pivot: f64,
@@ -55,7 +55,7 @@ const SAME_SHEET: f64 = 0.5;
 /// Points of a parallel task; a multiple of the lanes.
 const BLOCK: usize = 64;
 
-/// Storage of a task.
+/// Storage of a thread, and what it makes of a task.
 #[derive(Default)]
 struct Work {
     systems: LaneSystems,
@@ -86,37 +86,30 @@ impl SurfaceDcpse<'_> {
         cells.rebuild(self.points.iter().copied(), support.radius);
         let basis = TangentBasis::new(support.degree);
         let functional = basis.laplacians();
-        let blocks: Vec<Work> = (0..self.points.len().div_ceil(BLOCK))
+        let blocks: Vec<(StencilOperator, Soundness)> = (0..self.points.len().div_ceil(BLOCK))
             .into_par_iter()
             .with_min_len(1)
-            .map(|block| {
-                let mut work = Work { rows: StencilOperator::new(), ..Work::default() };
-                work.soundness.least_pivot = 1.0;
+            .map_init(Work::default, |work, block| {
+                work.rows = StencilOperator::new();
+                work.soundness = Soundness { least_pivot: 1.0, ..Soundness::default() };
                 let end = ((block + 1) * BLOCK).min(self.points.len());
                 for first in (block * BLOCK..end).step_by(LANES) {
                     if interrupt.is_raised() {
                         break;
                     }
-                    self.rows_of(
-                        &cells,
-                        first..(first + LANES).min(end),
-                        &basis,
-                        support.radius,
-                        &functional,
-                        &mut work,
-                    );
+                    self.rows_of(&cells, first..(first + LANES).min(end), &basis, support.radius, &functional, work);
                 }
-                work
+                (std::mem::take(&mut work.rows), work.soundness)
             })
             .collect();
         interrupt.check()?;
         let mut operator = StencilOperator::new();
         let mut soundness = Soundness { least_pivot: 1.0, ..Soundness::default() };
-        for work in &blocks {
-            operator.append(&work.rows);
-            soundness.enlarged += work.soundness.enlarged;
-            soundness.failed += work.soundness.failed;
-            soundness.least_pivot = soundness.least_pivot.min(work.soundness.least_pivot);
+        for (rows, found) in &blocks {
+            operator.append(rows);
+            soundness.enlarged += found.enlarged;
+            soundness.failed += found.failed;
+            soundness.least_pivot = soundness.least_pivot.min(found.least_pivot);
         }
         Ok((operator, soundness))
     }
@@ -169,7 +162,8 @@ impl SurfaceDcpse<'_> {
                         work.push_row(lane, i);
                     } else {
                         work.soundness.failed += 1;
-                        work.rows.push_row(&[], &[]);
+                        // What is not known must not look like a number.
+                        work.rows.push_row(&[i as u32], &[f64::NAN]);
                     }
                 }
                 return;

@@ -67,7 +67,7 @@ static FIELDS: &[Variant] = &[
         name: "spherical_harmonic",
         doc: "real orthonormal Y_lm, on a sphere: m > 0 ∝ cos mφ, m < 0 ∝ sin |m|φ",
         parameters: &[
-            Parameter::new("l", "degree", Kind::Integer { least: 0, most: 64 }, DefaultValue::Json("4")),
+            Parameter::new("l", "degree", Kind::Integer { least: 1, most: 64 }, DefaultValue::Json("4")),
             Parameter::new(
                 "m",
                 "order, a whole number from −l to l",

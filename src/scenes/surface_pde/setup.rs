@@ -74,6 +74,34 @@ pub(super) fn understand(parameters: &Value) -> Understood {
     }
     let surface = Ellipsoid(surface);
     let cutoff_dn = written.method.cutoff_dn.unwrap_or(default_cutoff);
+    let terms = ((degree + 1) * (degree + 2) / 2 - 1) as f64;
+    if let ExactField::PlaneWave { k } = field
+        && !(1e-6..1e6).contains(&(k.norm() * surface.0.max()))
+    {
+        let detail = "by the size of the surface a wave must have a length that numbers can tell";
+        violations.push(Violation::new("/problem/field/k", "range", detail, &written.problem.field["k"], Value::Null));
+    }
+    // Only points whose normals differ by less than 60° count: a quarter of a sphere, less where it is flat.
+    let least_count = (8.0 * terms).ceil();
+    if (written.count as f64) < least_count {
+        let detail = format!("a fit of {terms} functions wants {least_count} points at least on a closed surface");
+        violations.push(Violation::new(
+            "/count",
+            "range",
+            detail,
+            &json!(written.count),
+            json!({"least": least_count}),
+        ));
+    }
+    let least_cutoff = (1.2 * terms / std::f64::consts::PI).sqrt();
+    if cutoff_dn < least_cutoff {
+        let detail = format!("a support must hold the neighbours that a fit of {terms} functions needs");
+        let allowed = json!({"least": least_cutoff});
+        violations.push(Violation::new("/method/cutoff_dn", "range", detail, &json!(cutoff_dn), allowed));
+    }
+    if !violations.is_empty() {
+        return Err(violations);
+    }
     resolved["method"]["cutoff_dn"] = json!(cutoff_dn);
     let support = Support { degree, radius: cutoff_dn * surface.spacing(written.count) };
     let parts = PointwiseParts { field, support, repeats: written.repeat };

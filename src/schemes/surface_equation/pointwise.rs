@@ -58,7 +58,7 @@ impl PointwiseOperator {
         let field = surface.points.iter().map(|x| parts.field.value(x)).collect();
         let known = surface.points.iter().zip(&surface.normals).zip(&surface.curvatures);
         let reference = known.map(|((x, n), curvature)| parts.field.laplace_beltrami(x, n, *curvature)).collect();
-        let value = vec![f64::NAN; surface.points.len()];
+        let value = vec![0.0; surface.points.len()];
         let fixed = FixedStep { time_step: 1.0, steps: parts.repeats };
         let soundness = Soundness { least_pivot: 1.0, ..Soundness::default() };
         let phases = Phases::new(cpu_clock);
@@ -131,7 +131,9 @@ impl Simulation for PointwiseOperator {
     fn fields(&self) -> Fields {
         let mut fields = Fields::at(&self.surface.points);
         fields.scalar("field", self.field.clone());
-        fields.scalar("value", self.value.clone());
+        // Nothing is computed before the first step.
+        let value = if self.step == 0 { vec![f64::NAN; self.value.len()] } else { self.value.clone() };
+        fields.scalar("value", value);
         fields.scalar("reference", self.reference.clone());
         fields.vector("normal", self.surface.normals.iter().copied());
         fields.scalar("curvature", self.surface.curvatures.clone());
@@ -166,7 +168,8 @@ impl Simulation for PointwiseOperator {
 
     fn report(&self) -> Report {
         let Support { degree, radius } = self.parts.support;
-        let rescued_fits = [("supports.larger_radius", self.soundness.enlarged), ("rows.empty", self.soundness.failed)];
+        let rescued_fits =
+            [("supports.larger_radius", self.soundness.enlarged), ("rows.failed", self.soundness.failed)];
         Report {
             errors: self.errors(),
             health: self.health(),
