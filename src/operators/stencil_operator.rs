@@ -3,7 +3,7 @@
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
 /// Rows of (column, weight); compressed.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct StencilOperator {
     starts: Vec<usize>,
     columns: Vec<u32>,
@@ -13,13 +13,14 @@ pub struct StencilOperator {
 /// Rows that one task applies at least.
 const ROWS: usize = 512;
 
-impl StencilOperator {
+impl Default for StencilOperator {
     /// No rows yet.
-    #[must_use]
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self { starts: vec![0], columns: Vec::new(), weights: Vec::new() }
     }
+}
 
+impl StencilOperator {
     /// Adds a row.
     pub fn push_row(&mut self, columns: &[u32], weights: &[f64]) {
         self.columns.extend_from_slice(columns);
@@ -27,12 +28,19 @@ impl StencilOperator {
         self.starts.push(self.columns.len());
     }
 
-    /// Adds the rows of another one.
-    pub fn append(&mut self, other: &Self) {
-        let before = self.columns.len();
-        self.columns.extend_from_slice(&other.columns);
-        self.weights.extend_from_slice(&other.weights);
-        self.starts.extend(other.starts[1..].iter().map(|start| start + before));
+    /// The rows of several operators, one after another, in room of their size.
+    pub fn stacked<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Self {
+        let entries = parts.clone().map(Self::entries).sum();
+        let mut starts = Vec::with_capacity(parts.clone().map(Self::rows).sum::<usize>() + 1);
+        starts.push(0);
+        let mut whole = Self { starts, columns: Vec::with_capacity(entries), weights: Vec::with_capacity(entries) };
+        for part in parts {
+            let before = whole.columns.len();
+            whole.columns.extend_from_slice(&part.columns);
+            whole.weights.extend_from_slice(&part.weights);
+            whole.starts.extend(part.starts[1..].iter().map(|start| start + before));
+        }
+        whole
     }
 
     /// Rows.
@@ -63,10 +71,12 @@ mod tests {
 
     #[test]
     fn rows_are_sums() {
-        let mut operator = StencilOperator::new();
-        operator.push_row(&[0, 2], &[1.0, -2.0]);
-        operator.push_row(&[], &[]);
-        operator.push_row(&[1], &[3.0]);
+        let mut first = StencilOperator::default();
+        first.push_row(&[0, 2], &[1.0, -2.0]);
+        first.push_row(&[], &[]);
+        let mut second = StencilOperator::default();
+        second.push_row(&[1], &[3.0]);
+        let operator = StencilOperator::stacked([&first, &second].into_iter());
         let mut out = [7.0; 3];
         operator.apply(&[1.0, 2.0, 3.0], &mut out);
         assert_eq!((out, operator.rows(), operator.entries()), ([-5.0, 0.0, 6.0], 3, 3));

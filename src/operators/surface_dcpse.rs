@@ -90,7 +90,6 @@ impl SurfaceDcpse<'_> {
             .into_par_iter()
             .with_min_len(1)
             .map_init(Work::default, |work, block| {
-                work.rows = StencilOperator::new();
                 work.soundness = Soundness { least_pivot: 1.0, ..Soundness::default() };
                 let end = ((block + 1) * BLOCK).min(self.points.len());
                 for first in (block * BLOCK..end).step_by(LANES) {
@@ -103,10 +102,9 @@ impl SurfaceDcpse<'_> {
             })
             .collect();
         interrupt.check()?;
-        let mut operator = StencilOperator::new();
+        let operator = StencilOperator::stacked(blocks.iter().map(|(rows, _)| rows));
         let mut soundness = Soundness { least_pivot: 1.0, ..Soundness::default() };
-        for (rows, found) in &blocks {
-            operator.append(rows);
+        for (_, found) in &blocks {
             soundness.enlarged += found.enlarged;
             soundness.failed += found.failed;
             soundness.least_pivot = soundness.least_pivot.min(found.least_pivot);

@@ -23,6 +23,18 @@ impl<const D: usize> Ellipsoid<D> {
         (x - self.center).component_div(&self.semi_axes).norm() - 1.0
     }
 
+    /// Unit normal and ∇·n = (tr A − nᵀ A n)/|A x|, A = diag(2/e²), at a point of the surface, taken from the centre.
+    #[must_use]
+    pub fn normal_and_curvature(&self, foot: &Vector<D>) -> (Vector<D>, f64) {
+        let e = &self.semi_axes;
+        let gradient = Vector::<D>::from_fn(|i, _| 2.0 * foot[i] / (e[i] * e[i]));
+        let length = gradient.norm();
+        let normal = gradient / length;
+        let trace: f64 = (0..D).map(|i| 2.0 / (e[i] * e[i])).sum();
+        let bent: f64 = (0..D).map(|i| 2.0 / (e[i] * e[i]) * normal[i] * normal[i]).sum();
+        (normal, (trace - bent) / length)
+    }
+
     /// The closest point for a query in the first orthant of the centred frame.
     fn closest_in_first_orthant(&self, y: &Vector<D>) -> Vector<D> {
         let e = &self.semi_axes;
@@ -66,18 +78,14 @@ impl<const D: usize> Surface<D> for Ellipsoid<D> {
         // Round-off of the root is removed by one normalisation onto the surface.
         let foot = foot / foot.component_div(e).norm();
         let foot = Vector::<D>::from_fn(|i, _| foot[i].copysign(local[i]));
-        let gradient = Vector::<D>::from_fn(|i, _| 2.0 * foot[i] / (e[i] * e[i]));
-        let length = gradient.norm();
-        let normal = gradient / length;
-        let trace: f64 = (0..D).map(|i| 2.0 / (e[i] * e[i])).sum();
-        let bent: f64 = (0..D).map(|i| 2.0 / (e[i] * e[i]) * normal[i] * normal[i]).sum();
+        let (normal, curvature) = self.normal_and_curvature(&foot);
         let inside = local.component_div(e).norm_squared() < 1.0;
         let distance = (local - foot).norm();
         SurfacePoint {
             distance: if inside { -distance } else { distance },
             point: self.center + foot,
             normal: Some(normal),
-            curvature: Some((trace - bent) / length),
+            curvature: Some(curvature),
         }
     }
 

@@ -3,21 +3,29 @@
 use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
 use serde_json::{Value, json};
 
-/// The oscillating drop, off the centre: a centred one would hide errors of momentum by its symmetry.
-fn oscillating(cells: u32, more: &Value) -> Value {
-    let mut scene = json!({
-        "kind": "droplet", "spacing": 1.0 / f64::from(cells),
-        "shape": {"type": "ellipse", "center": [0.0131, 0.0072], "semi_axes": [0.75, 0.5]}
-    });
+/// A scene with something else laid over it.
+fn with(mut scene: Value, more: &Value) -> Value {
     if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
         scene.extend(more.clone());
     }
     scene
 }
 
+/// The oscillating drop, off the centre: a centred one would hide errors of momentum by its symmetry.
+fn oscillating(cells: u32, more: &Value) -> Value {
+    let scene = json!({
+        "kind": "droplet", "spacing": 1.0 / f64::from(cells),
+        "shape": {"type": "ellipse", "center": [0.0131, 0.0072], "semi_axes": [0.75, 0.5]}
+    });
+    with(scene, more)
+}
+
 fn plain(cells: u32) -> Value {
     oscillating(cells, &json!({}))
 }
+
+/// Radii of circles at rest.
+const RADII: [f64; 5] = [0.2, 0.3, 0.4, 0.5, 0.6];
 
 /// A circle at rest in a box of four radii, sixteen particles to a radius.
 fn resting(radius: f64) -> Value {
@@ -26,6 +34,11 @@ fn resting(radius: f64) -> Value {
         "shape": {"type": "circle", "center": [0.0131 * radius, 0.0072 * radius], "radius": radius},
         "domain": {"low": [-2.0 * radius, -2.0 * radius], "high": [2.0 * radius, 2.0 * radius]}
     })
+}
+
+/// An ellipsoid in space, to its largest vertical elongation.
+fn ellipsoid() -> Value {
+    json!({"kind": "droplet", "dimension": 3, "spacing": 0.0625, "end_time": 0.22})
 }
 
 fn dividing(cells: u32) -> Value {
@@ -90,7 +103,7 @@ pub fn rows() -> Rows {
         false,
     );
     row("colour field, 1/32: Δp".into(), "2e-2", vec![colors], end("pressure_jump", "relative"), Reach::Shown, false);
-    for radius in [0.2, 0.3, 0.4, 0.5, 0.6] {
+    for radius in RADII {
         let case = format!("Young–Laplace, R = {radius}, 16 h to a radius: Δp");
         row(case, "3e-3", vec![resting(radius)], end("pressure_jump", "relative"), Reach::AtMost(1e-3), true);
     }
@@ -120,11 +133,10 @@ pub fn rows() -> Rows {
         let reach = Reach::Within { of: paper, by: 0.03 * paper };
         row(case, text, vec![dividing(cells)], end("curvature", "mean"), reach, true);
     }
-    let ellipsoid = json!({"kind": "droplet", "dimension": 3, "spacing": 0.0625, "end_time": 0.22});
     let elongation = end("deformation_time", "extreme_1");
     let near = Reach::Within { of: 0.19, by: 0.01 };
-    row("3D, 1/16: largest vertical elongation".into(), "t ≈ 0.19", vec![ellipsoid.clone()], elongation, near, true);
-    row("3D, 1/16: CPU seconds".into(), "–", vec![ellipsoid], Measure::Seconds(""), Reach::AtMost(120.0), true);
+    row("3D, 1/16: largest vertical elongation".into(), "t ≈ 0.19", vec![ellipsoid()], elongation, near, true);
+    row("3D, 1/16: CPU seconds".into(), "–", vec![ellipsoid()], Measure::Seconds(""), Reach::AtMost(120.0), true);
 
     Rows { document: "droplet", rows, figures: figures() }
 }
@@ -153,18 +165,7 @@ fn figures() -> Vec<Figure> {
         lines.push(("pcp, balanced, 1/64".to_owned(), plain(64)));
         Figure { name, title, plot: Plot::History { column, is_log, lines, marks } }
     };
-    let radii = [0.2, 0.3, 0.4, 0.5, 0.6];
-    let resting_with = |more: &Value| {
-        let mut points = Vec::new();
-        for radius in radii {
-            let mut scene = resting(radius);
-            if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
-                scene.extend(more.clone());
-            }
-            points.push((1.0 / radius, scene));
-        }
-        points
-    };
+    let resting_with = |more: &Value| RADII.map(|radius| (1.0 / radius, with(resting(radius), more))).to_vec();
     let young_laplace = Plot::Points {
         across: "1/R",
         quantity: Quantity::at_end("pressure_jump", "mean"),
@@ -176,7 +177,6 @@ fn figures() -> Vec<Figure> {
         title,
         plot: Plot::Frames { scene, every_time, chosen: chosen.to_vec() },
     };
-    let ellipsoid = json!({"kind": "droplet", "dimension": 3, "spacing": 0.0625, "end_time": 0.22});
     vec![
         errors("droplet-scatter", "Oscillating drop: scatter of κ at the end", Quantity::at_end("curvature", "std"), 3),
         errors(
@@ -213,11 +213,11 @@ fn figures() -> Vec<Figure> {
         frames(
             "droplet-dividing",
             "Dividing drop, 1/32 (figs. 12 and 13)",
-            json!({"kind": "droplet", "case": "dividing", "spacing": 1.0 / 32.0, "end_time": 0.4}),
+            with(dividing(32), &json!({"end_time": 0.4})),
             0.1,
             &[0, 1, 2, 4],
         ),
-        frames("droplet-space", "Ellipsoid drop, 1/16, middle plane (fig. 14)", ellipsoid, 0.055, &[0, 1, 2, 4]),
+        frames("droplet-space", "Ellipsoid drop, 1/16, middle plane (fig. 14)", ellipsoid(), 0.055, &[0, 1, 2, 4]),
     ]
 }
 

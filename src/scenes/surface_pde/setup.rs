@@ -1,8 +1,9 @@
 //! From parameters to points and an operator.
 
 use super::parameters::Written;
-use super::surfaces::Ellipsoid;
+use super::surfaces;
 use crate::geometry::Vector;
+use crate::geometry::surfaces::Ellipsoid;
 use crate::operators::Support;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
@@ -14,7 +15,7 @@ use serde_json::{Value, json};
 
 struct SurfaceScene {
     resolved: Value,
-    surface: Ellipsoid,
+    surface: Ellipsoid<3>,
     count: u64,
     parts: PointwiseParts,
     cutoff_dn: f64,
@@ -44,7 +45,7 @@ pub(super) fn understand(parameters: &Value) -> Understood {
         numbers(value)
     };
     let is_sphere = written.surface["type"] == "sphere";
-    let surface = if is_sphere {
+    let semi_axes = if is_sphere {
         Vector::<3>::repeat(written.surface["radius"].as_f64().unwrap_or(1.0))
     } else {
         in_space(&written.surface["semi_axes"], "/surface/semi_axes")
@@ -72,11 +73,11 @@ pub(super) fn understand(parameters: &Value) -> Understood {
     if !violations.is_empty() {
         return Err(violations);
     }
-    let surface = Ellipsoid(surface);
+    let surface = Ellipsoid { center: Vector::<3>::zeros(), semi_axes };
     let cutoff_dn = written.method.cutoff_dn.unwrap_or(default_cutoff);
     let terms = ((degree + 1) * (degree + 2) / 2 - 1) as f64;
     if let ExactField::PlaneWave { k } = field
-        && !(1e-6..1e6).contains(&(k.norm() * surface.0.max()))
+        && !(1e-6..1e6).contains(&(k.norm() * surface.semi_axes.max()))
     {
         let detail = "by the size of the surface a wave must have a length that numbers can tell";
         violations.push(Violation::new("/problem/field/k", "range", detail, &written.problem.field["k"], Value::Null));
@@ -103,7 +104,7 @@ pub(super) fn understand(parameters: &Value) -> Understood {
         return Err(violations);
     }
     resolved["method"]["cutoff_dn"] = json!(cutoff_dn);
-    let support = Support { degree, radius: cutoff_dn * surface.spacing(written.count) };
+    let support = Support { degree, radius: cutoff_dn * surfaces::spacing(&surface, written.count) };
     let parts = PointwiseParts { field, support, repeats: written.repeat };
     Ok(Box::new(SurfaceScene { resolved, surface, count: written.count, parts, cutoff_dn }))
 }
@@ -154,7 +155,7 @@ impl Scene for SurfaceScene {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let points = self.surface.points(self.count as usize);
+        let points = surfaces::points(&self.surface, self.count as usize);
         Ok(Box::new(PointwiseOperator::new(points, self.parts, context.interrupt, context.cpu_clock)))
     }
 }

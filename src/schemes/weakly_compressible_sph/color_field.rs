@@ -19,17 +19,10 @@ pub(super) fn sum_color<K: RadialKernel, const D: usize>(
     colors: &mut [Column],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
-    columns.sum_pairs(
-        pencils,
-        inverse_smoothing,
-        colors,
-        interrupt,
-        |_| true,
-        |own, other, _, square| {
-            let value: Lanes = K::value(Number::sqrt(square));
-            ([value * other.scalars[0]], [value * own.scalars[0]])
-        },
-    )
+    columns.sum_pairs(pencils, inverse_smoothing, colors, interrupt, |own, other, _, square| {
+        let value: Lanes = K::value(Number::sqrt(square));
+        ([value * other.scalars[0]], [value * own.scalars[0]])
+    })
 }
 
 /// Σ (c_j − c_i) ∇W V_j (B.6) but for the kernel's factor. Columns: position in ε; c, V in h^D.
@@ -40,19 +33,12 @@ pub(super) fn sum_gradient<K: RadialKernel, const D: usize>(
     gradients: &mut [Column],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
-    columns.sum_pairs(
-        pencils,
-        inverse_smoothing,
-        gradients,
-        interrupt,
-        |_| true,
-        |own, other, dx, square| {
-            let slope: Lanes = K::slope_over_q(Number::sqrt(square));
-            // Both the difference and ∇W turn round with the pair.
-            let common = slope * (other.scalars[0] - own.scalars[0]);
-            (dx.map(|part| common * other.scalars[1] * part), dx.map(|part| common * own.scalars[1] * part))
-        },
-    )
+    columns.sum_pairs(pencils, inverse_smoothing, gradients, interrupt, |own, other, dx, square| {
+        let slope: Lanes = K::slope_over_q(Number::sqrt(square));
+        // Both the difference and ∇W turn round with the pair.
+        let common = slope * (other.scalars[0] - own.scalars[0]);
+        (dx.map(|part| common * other.scalars[1] * part), dx.map(|part| common * own.scalars[1] * part))
+    })
 }
 
 /// The sums of B.9 over the others, Σ N_j W V_j and Σ N_j (n_j − n_i)·∇W V_j, each but for the kernel's factor; nothing where
@@ -66,7 +52,7 @@ pub(super) fn sum_curvature<K: RadialKernel, const D: usize>(
 ) -> Result<(), Interrupted> {
     // Of a pair with a particle away from the interface neither side gets anything that is used.
     let is_met = |place: usize| columns.scalars[0][place] != 0.0;
-    columns.sum_pairs(pencils, inverse_smoothing, sums, interrupt, is_met, |own, other, dx, square| {
+    columns.sum_pairs_of(pencils, inverse_smoothing, sums, interrupt, is_met, |own, other, dx, square| {
         let q = Number::sqrt(square);
         let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
         let mut turn = Lanes::splat(0.0);

@@ -34,37 +34,30 @@ pub(super) fn sum_rates<K: RadialKernel, const D: usize, const S: usize, const N
     // Π = −k ν u·x/(ε ρ̄ (q² + μ̂)), with ρ̄ = (ρ_i + ρ_j)/2.
     let drag = Lanes::splat(-2.0 * inverse_smoothing);
     let same = Lanes::splat(viscosity);
-    columns.sum_pairs(
-        pencils,
-        inverse_smoothing,
-        rates,
-        interrupt,
-        |_| true,
-        |own, other, dx, square| {
-            let slope: Lanes = K::slope_over_q(Number::sqrt(square));
-            let ([density, volume, stress], [other_density, other_volume, other_stress]) = (first(own), first(other));
-            let mut approach = zero;
-            for (d, part) in dx.iter().enumerate() {
-                approach = Number::mul_add(own.vectors[1][d] - other.vectors[1][d], *part, approach);
-            }
-            let (mut kinematic, mut mass, mut other_mass) = (same, one, one);
-            let mut excess = density - other_density;
-            if let (&[_, _, _, m, a, by], &[_, _, _, other_m, b, other_by]) = (&own.scalars[..], &other.scalars[..]) {
-                (mass, other_mass) = (m, other_m);
-                kinematic = (a + a) * b / (a + b + Lanes::splat(TINY));
-                excess = density * by - other_density * other_by;
-            }
-            let viscous = drag * kinematic * approach / ((density + other_density) * (square + softening));
-            let force = slope * (stress + other_stress + viscous);
-            let (compression, diffusion) = (slope * approach, slope * (excess + excess));
-            // Force and diffusion change their sign with the side, compression does not.
-            let parts = |mass: Lanes, volume: Lanes, sign: Lanes| -> [Lanes; N] {
-                let (weight, spread) = (sign * mass * force, sign * volume * diffusion);
-                from_fn(|n| dx.get(n).map_or(if n == D { volume * compression } else { spread }, |part| weight * *part))
-            };
-            (parts(other_mass, other_volume, one), parts(mass, volume, -one))
-        },
-    )
+    columns.sum_pairs(pencils, inverse_smoothing, rates, interrupt, |own, other, dx, square| {
+        let slope: Lanes = K::slope_over_q(Number::sqrt(square));
+        let ([density, volume, stress], [other_density, other_volume, other_stress]) = (first(own), first(other));
+        let mut approach = zero;
+        for (d, part) in dx.iter().enumerate() {
+            approach = Number::mul_add(own.vectors[1][d] - other.vectors[1][d], *part, approach);
+        }
+        let (mut kinematic, mut mass, mut other_mass) = (same, one, one);
+        let mut excess = density - other_density;
+        if let (&[_, _, _, m, a, by], &[_, _, _, other_m, b, other_by]) = (&own.scalars[..], &other.scalars[..]) {
+            (mass, other_mass) = (m, other_m);
+            kinematic = (a + a) * b / (a + b + Lanes::splat(TINY));
+            excess = density * by - other_density * other_by;
+        }
+        let viscous = drag * kinematic * approach / ((density + other_density) * (square + softening));
+        let force = slope * (stress + other_stress + viscous);
+        let (compression, diffusion) = (slope * approach, slope * (excess + excess));
+        // Force and diffusion change their sign with the side, compression does not.
+        let parts = |mass: Lanes, volume: Lanes, sign: Lanes| -> [Lanes; N] {
+            let (weight, spread) = (sign * mass * force, sign * volume * diffusion);
+            from_fn(|n| dx.get(n).map_or(if n == D { volume * compression } else { spread }, |part| weight * *part))
+        };
+        (parts(other_mass, other_volume, one), parts(mass, volume, -one))
+    })
 }
 
 fn first<const D: usize, const S: usize>(side: &Side<D, 2, S>) -> [Lanes; 3] {

@@ -15,15 +15,8 @@ pub(super) fn sum_kernel<K: RadialKernel, const D: usize>(
     sums: &mut [Column],
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
-    columns.sum_pairs(
-        pencils,
-        inverse_smoothing,
-        sums,
-        interrupt,
-        |_| true,
-        |_, _, _, square| {
-            let value = K::value(Number::sqrt(square));
-            ([value], [value])
-        },
-    )
+    columns.sum_pairs(pencils, inverse_smoothing, sums, interrupt, |_, _, _, square| {
+        let value = K::value(Number::sqrt(square));
+        ([value], [value])
+    })
 }

@@ -24,31 +24,24 @@ pub(super) fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
     let (one, half) = (Lanes::splat(1.0), Lanes::splat(-0.5));
-    columns.sum_pairs(
-        pencils,
-        inverse_smoothing,
-        forces,
-        interrupt,
-        |_| true,
-        |own, other, dx, square| {
-            let slope: Lanes = K::slope_over_q(Number::sqrt(square));
-            let (volume, stress) = (own.scalars[0], own.scalars[1]);
-            let (other_volume, other_stress) = (other.scalars[0], other.scalars[1]);
-            let common = slope * Number::mul_add(other_volume, other_volume, volume * volume);
-            let sum = (stress + other_stress) * half;
-            let mut across: [Lanes; D] = from_fn(|d| own.vectors[1][d] - other.vectors[1][d]);
-            if let ([_, _, a], [_, _, b]) = (&own.scalars[..], &other.scalars[..]) {
-                // The harmonic mean keeps the shear stress of two layers.
-                let viscosity = (*a + *a) * *b / (*a + *b + Lanes::splat(TINY));
-                across = across.map(|c| c * viscosity);
-            }
-            let e = Number::mul_add(volume + other_volume, half, one);
-            let e2 = e * e;
-            let first = Number::mul_add(sum, e, sum);
-            let second = Number::mul_add(first, e2, first);
-            let mean = Number::mul_add(second, e2 * e2, second);
-            let force: [Lanes; D] = from_fn(|d| common * Number::mul_add(mean, dx[d], across[d]));
-            (force, force.map(|part| -part))
-        },
-    )
+    columns.sum_pairs(pencils, inverse_smoothing, forces, interrupt, |own, other, dx, square| {
+        let slope: Lanes = K::slope_over_q(Number::sqrt(square));
+        let (volume, stress) = (own.scalars[0], own.scalars[1]);
+        let (other_volume, other_stress) = (other.scalars[0], other.scalars[1]);
+        let common = slope * Number::mul_add(other_volume, other_volume, volume * volume);
+        let sum = (stress + other_stress) * half;
+        let mut across: [Lanes; D] = from_fn(|d| own.vectors[1][d] - other.vectors[1][d]);
+        if let ([_, _, a], [_, _, b]) = (&own.scalars[..], &other.scalars[..]) {
+            // The harmonic mean keeps the shear stress of two layers.
+            let viscosity = (*a + *a) * *b / (*a + *b + Lanes::splat(TINY));
+            across = across.map(|c| c * viscosity);
+        }
+        let e = Number::mul_add(volume + other_volume, half, one);
+        let e2 = e * e;
+        let first = Number::mul_add(sum, e, sum);
+        let second = Number::mul_add(first, e2, first);
+        let mean = Number::mul_add(second, e2 * e2, second);
+        let force: [Lanes; D] = from_fn(|d| common * Number::mul_add(mean, dx[d], across[d]));
+        (force, force.map(|part| -part))
+    })
 }

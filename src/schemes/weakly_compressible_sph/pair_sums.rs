@@ -34,9 +34,20 @@ impl<const D: usize, const V: usize, const S: usize> Columns<'_, D, V, S> {
     }
 
     /// Sets `sums` to Σ_j of what `pair` gives for both sides of each pair but a particle with itself: it is called with the
-    /// values of i, those of several j, x_i − x_j in units of ε and its square. Places that `is_met` denies meet nobody whom
-    /// they would list; one who lists them still meets them.
+    /// values of i, those of several j, x_i − x_j in units of ε and its square.
     pub fn sum_pairs<const N: usize>(
+        &self,
+        pencils: &Pencils<D>,
+        inverse_smoothing: f64,
+        sums: &mut [Column],
+        interrupt: &Interrupt,
+        pair: impl Fn(&Side<D, V, S>, &Side<D, V, S>, &[Lanes; D], Lanes) -> ([Lanes; N], [Lanes; N]) + Sync,
+    ) -> Result<(), Interrupted> {
+        self.sum_pairs_of(pencils, inverse_smoothing, sums, interrupt, |_| true, pair)
+    }
+
+    /// The same, where places that `is_met` denies meet nobody whom they would list; one who lists them still meets them.
+    pub fn sum_pairs_of<const N: usize>(
         &self,
         pencils: &Pencils<D>,
         inverse_smoothing: f64,

@@ -21,21 +21,14 @@ pub(super) fn sum_concentration<K: RadialKernel, const D: usize>(
     interrupt: &Interrupt,
 ) -> Result<(), Interrupted> {
     let (one, fifth, by_spacing) = (Lanes::splat(1.0), Lanes::splat(0.2), Lanes::splat(1.0 / at_spacing));
-    columns.sum_pairs(
-        pencils,
-        inverse_smoothing,
-        gradients,
-        interrupt,
-        |_| true,
-        |own, other, dx, square| {
-            let q = Number::sqrt(square);
-            let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
-            let ratio = value * by_spacing;
-            let ratio2 = ratio * ratio;
-            let weight = slope * Number::mul_add(ratio2 * ratio2, fifth, one);
-            (dx.map(|part| weight * other.scalars[0] * part), dx.map(|part| -(weight * own.scalars[0] * part)))
-        },
-    )
+    columns.sum_pairs(pencils, inverse_smoothing, gradients, interrupt, |own, other, dx, square| {
+        let q = Number::sqrt(square);
+        let (value, slope): (Lanes, Lanes) = (K::value(q), K::slope_over_q(q));
+        let ratio = value * by_spacing;
+        let ratio2 = ratio * ratio;
+        let weight = slope * Number::mul_add(ratio2 * ratio2, fifth, one);
+        (dx.map(|part| weight * other.scalars[0] * part), dx.map(|part| -(weight * own.scalars[0] * part)))
+    })
 }
 
 /// The displacement for a gradient of concentration: −0.05 ε² ∇C, at most 0.02 ε long.

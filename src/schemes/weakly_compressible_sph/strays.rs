@@ -1,6 +1,6 @@
 //! Particles that have nobody of their own fluid next to them, of either fluid: what is left of a neck that has parted. Fits take
 //! them for droplets of a spacing's size that never come back. Where the fluids are one and the same but for the interface
-//! between them, such particles take the side of their neighbours. Strays of several particles are left alone: tension draws
+//! between them, such particles take the side of their neighbours. Threads of several particles are left alone: tension draws
 //! them in (measured: to absorb rows as well costs up to a third of a drop at h = 1/32).
 
 use crate::geometry::Domain;
