@@ -14,6 +14,7 @@ pub mod particles;
 pub mod neighbors;
 pub mod polynomials;
 pub mod closest_point;
+pub mod point_clouds;
 pub mod operators;
 pub mod time;
 pub mod simulation;

@@ -1,8 +1,13 @@
 //! Differential operators on scattered points, as sparse rows.
+//!
+//! One construction ([`construction`]) serves all: a chart says which points lie about a point and what their
+//! coordinates are ([`charts`]), polynomials of these ([`basis`]) are fitted with one factorization a point
+//! ([`moment_fit`]), and every functional asked for is one more right-hand side.
 
-pub mod stencil_operator;
-pub mod surface_dcpse;
-mod tangent_basis;
+mod basis;
+pub mod charts;
+pub mod construction;
+mod moment_fit;
 
-pub use stencil_operator::StencilOperator;
-pub use surface_dcpse::{Soundness, Support, SurfaceDcpse};
+pub use charts::{Chart, FlatChart, Functional, NormalCopies, TangentChart};
+pub use construction::{Construction, Soundness, Support, construct};

@@ -2,6 +2,7 @@
 //! `impl Simulation`; no scheme uses another's inside.
 
 pub mod advected_level_set;
+pub mod embedding_closest_point;
 pub mod measured_errors;
 pub mod measured_redistancing;
 pub mod static_redistancing;

@@ -127,6 +127,16 @@ pub enum StepError {
         /// At what time.
         time: f64,
     },
+    /// A system of equations has no solution that the method finds, or a tolerance cannot be kept.
+    #[error("{reason}, at step {step}, time {time}")]
+    Unsolved {
+        /// What was tried, and what it left.
+        reason: String,
+        /// In which step.
+        step: u64,
+        /// At what time.
+        time: f64,
+    },
     /// The surface vanished: no particle has a neighbour of the other sign, or no fit reaches a zero.
     #[error("no sample particle is left on the interface at step {step}, time {time}")]
     InterfaceLost {

@@ -66,6 +66,7 @@ fn bodies() -> Vec<Value> {
         "kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 0.6, 0.8]}, "count": 700, "repeat": 5,
         "problem": {"type": "laplace_beltrami", "field": "plane_wave"}, "method": {"type": "surface_dcpse", "order": 6, "cutoff_dn": 3.8}
     }));
+    bodies.extend(surface_bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
         "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,
@@ -73,6 +74,42 @@ fn bodies() -> Vec<Value> {
         "field": "overwrite", "method": {"type": "pcp", "degree": 2}
     }));
     bodies
+}
+
+/// Every problem, form, surface, sampling, solver and integrator of `surface_pde` once.
+fn surface_bodies() -> Vec<Value> {
+    let dopri5 = json!({"type": "dopri5", "tolerance": 1e-6});
+    let scene = |more: Value| {
+        let mut body = json!({"kind": "surface_pde", "count": 400});
+        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        body
+    };
+    let evolving = |more: Value| {
+        let mut problem = json!({"type": "diffusion", "end_time": 0.02, "time_step": 0.005});
+        problem.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        problem
+    };
+    vec![
+        scene(json!({"repeat": 3, "method": {"type": "surface_dcpse", "form": "copies"}, "sampling": "random"})),
+        scene(json!({"repeat": 3, "method": {"type": "closest_point", "order": 4}, "surface": {"type": "torus"}})),
+        scene(json!({"repeat": 3, "surface": "circle", "method": {"type": "surface_dcpse", "form": "copies"}})),
+        scene(
+            json!({"problem": {"type": "poisson", "condition": "dirichlet"}, "solver": "gmres", "sampling": "random"}),
+        ),
+        scene(json!({"problem": "poisson", "method": {"type": "surface_dcpse", "order": 4}})),
+        scene(json!({"problem": "poisson", "solver": "sparse_lu", "surface": "torus", "normals": "perturbed"})),
+        scene(json!({"problem": "curvature", "surface": "ellipsoid"})),
+        scene(json!({"problem": "curvature", "surface": "circle", "normals": "estimated"})),
+        scene(json!({"problem": evolving(json!({}))})),
+        scene(json!({"problem": evolving(json!({"integrator": "bdf2"}))})),
+        scene(json!({"problem": evolving(json!({"integrator": dopri5})), "surface": {"type": "bump"}, "count": 1500})),
+        scene(json!({"problem": {
+            "type": "reaction_diffusion", "end_time": 0.4, "time_step": 0.1, "tolerance": 1e-6, "manufactured": "plane_wave"
+        }})),
+        scene(
+            json!({"problem": {"type": "reaction_diffusion", "model": "gray_scott", "end_time": 0.4, "time_step": 0.1}}),
+        ),
+    ]
 }
 
 fn states(body: &Value, threads: usize) -> Vec<State> {
@@ -275,7 +312,22 @@ fn nonsense_is_refused_at_its_place() {
         (json!({"kind": "droplet", "time_step": 1e-3, "steps": 7}), "/time_step"),
         (json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "order": 3}}), "/method/order"),
         (json!({"kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 2]}}), "/surface/semi_axes"),
-        (json!({"kind": "surface_pde", "surface": "ellipsoid"}), "/problem/field"),
+        (
+            json!({"kind": "surface_pde", "surface": "ellipsoid", "problem": {"type": "poisson", "field": "spherical_harmonic"}}),
+            "/problem/field",
+        ),
+        (json!({"kind": "surface_pde", "dimension": 2}), "/dimension"),
+        (json!({"kind": "surface_pde", "sampling": "regular"}), "/sampling"),
+        (json!({"kind": "surface_pde", "surface": {"type": "torus", "minor_radius": 2}}), "/surface/minor_radius"),
+        (json!({"kind": "surface_pde", "problem": "curvature", "repeat": 3}), "/repeat"),
+        (json!({"kind": "surface_pde", "problem": "curvature", "method": "closest_point"}), "/problem"),
+        (json!({"kind": "surface_pde", "surface": "circle", "method": "closest_point"}), "/method"),
+        (json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "layers": 3}}), "/method/layers"),
+        (
+            json!({"kind": "surface_pde", "normals": "estimated", "method": {"type": "surface_dcpse", "form": "copies"}}),
+            "/method/form",
+        ),
+        (json!({"kind": "surface_pde", "surface": "bump", "problem": "poisson"}), "/problem"),
         (json!({"kind": "surface_pde", "count": 200, "method": {"type": "surface_dcpse", "order": 6}}), "/count"),
         (
             json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "order": 4, "cutoff_dn": 1.5}}),

@@ -8,4 +8,5 @@ pub mod hdf5_file;
 pub mod picture;
 pub mod speed_error;
 pub mod structure;
+pub mod surface_view;
 pub mod vtkhdf;

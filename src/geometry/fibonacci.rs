@@ -1,16 +1,43 @@
-//! Points spread evenly over a sphere.
+//! Points spread evenly over surfaces of revolution: equal shares of the area from one to the next, turned by the golden angle.
 
 use super::Vector;
 use std::f64::consts::PI;
 
+/// The angle from one point to the next, π (3 − √5).
+fn golden(i: usize) -> f64 {
+    PI * (3.0 - 5.0_f64.sqrt()) * i as f64
+}
+
 /// Fibonacci points of the unit sphere: z_i = 1 − 2 (i + ½)/N, turned by the golden angle from one to the next.
 #[must_use]
 pub fn sphere(count: usize) -> Vec<Vector<3>> {
-    let golden = PI * (3.0 - 5.0_f64.sqrt());
     (0..count)
         .map(|i| {
             let z = 1.0 - 2.0 * (i as f64 + 0.5) / count as f64;
-            let (across, angle) = ((1.0 - z * z).sqrt(), golden * i as f64);
+            let (across, angle) = ((1.0 - z * z).sqrt(), golden(i));
+            Vector::<3>::new(across * angle.cos(), across * angle.sin(), z)
+        })
+        .collect()
+}
+
+/// Points of a surface of revolution about z: `share(s)`, rising from 0 to 1 over [0, 1], is the part of the area up to the
+/// parameter s, `profile(s)` the distance from the axis and z there.
+#[must_use]
+pub fn of_revolution(count: usize, share: impl Fn(f64) -> f64, profile: impl Fn(f64) -> (f64, f64)) -> Vec<Vector<3>> {
+    (0..count)
+        .map(|i| {
+            let wanted = (i as f64 + 0.5) / count as f64;
+            let (mut low, mut high) = (0.0, 1.0);
+            // Sixty halvings leave nothing of a double's digits.
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if share(middle) < wanted {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let ((across, z), angle) = (profile(low), golden(i));
             Vector::<3>::new(across * angle.cos(), across * angle.sin(), z)
         })
         .collect()
@@ -18,14 +45,24 @@ pub fn sphere(count: usize) -> Vec<Vector<3>> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     #[test]
     fn points_are_on_the_sphere_and_as_far_apart_as_their_share_of_it() {
         let points = super::sphere(500);
-        let share = (4.0 * std::f64::consts::PI / 500.0_f64).sqrt();
+        let share = (4.0 * PI / 500.0_f64).sqrt();
         for (i, x) in points.iter().enumerate() {
             assert!((x.norm() - 1.0).abs() < 1e-14);
             let nearest = points[..i].iter().map(|y| (x - y).norm()).fold(f64::INFINITY, f64::min);
             assert!(nearest > 0.8 * share, "{nearest}");
+        }
+    }
+
+    #[test]
+    fn the_sphere_is_a_surface_of_revolution() {
+        let turned = super::of_revolution(300, |s| 0.5 * (1.0 - (PI * s).cos()), |s| ((PI * s).sin(), (PI * s).cos()));
+        for (x, y) in turned.iter().zip(super::sphere(300)) {
+            assert!((x - y).norm() < 1e-12);
         }
     }
 }

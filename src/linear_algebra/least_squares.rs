@@ -47,7 +47,7 @@ impl LeastSquares {
         self.rhs[row] = rhs;
     }
 
-    /// Factorises and solves. The solution is meaningful only for full rank.
+    /// Factorises and solves. For lower rank it is a basic solution: the columns beyond the rank are left out.
     pub fn solve(&mut self) -> (Factorisation, &[f64]) {
         let (m, n) = (self.rows, self.columns);
         for k in 0..n {
@@ -78,9 +78,7 @@ impl LeastSquares {
                 .fold((0.0_f64, f64::INFINITY), |(most, least), d| (most.max(d.abs()), least.min(d.abs())));
             largest / least
         };
-        if rank == n {
-            self.back_substitute();
-        }
+        self.back_substitute(rank);
         (Factorisation { rank, condition }, &self.solution[..n])
     }
 
@@ -113,18 +111,18 @@ impl LeastSquares {
         tail.iter_mut().zip(v.iter()).for_each(|(a, v)| *a -= s * v);
     }
 
-    fn back_substitute(&mut self) {
+    fn back_substitute(&mut self, rank: usize) {
         let (m, n) = (self.rows, self.columns);
-        for k in (0..n).rev() {
+        for k in (0..rank).rev() {
             let mut sum = self.rhs[k];
-            for j in k + 1..n {
+            for j in k + 1..rank {
                 // Rows of R above the diagonal stay in place of the matrix.
                 sum -= self.matrix[j * m + k] * self.rhs[j];
             }
             self.rhs[k] = sum / self.diagonal[k];
         }
         for k in 0..n {
-            self.solution[self.order[k]] = self.rhs[k] * self.scales[k];
+            self.solution[self.order[k]] = if k < rank { self.rhs[k] * self.scales[k] } else { 0.0 };
         }
     }
 }

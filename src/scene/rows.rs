@@ -62,6 +62,10 @@ pub enum Measure {
     },
     /// The error of the last run by that of the first.
     Growth(Quantity),
+    /// The distance of the last run's quantity from the first's.
+    Difference(Quantity),
+    /// Largest resident memory of the last run, bytes.
+    Memory,
     /// CPU seconds that the last run spent in phases whose names begin so, per step.
     SecondsPerStep(&'static str),
     /// CPU seconds that the last run spent in such phases.

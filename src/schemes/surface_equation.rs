@@ -1,7 +1,26 @@
-//! Equations on surfaces by operators on scattered points.
+//! Equations on surfaces by operators on scattered points (Surface DC-PSE paper, section 4).
+//!
+//! One simulation ([`simulation`]) keeps the cloud, constructs the operators that its problem asks for and lets the problem
+//! step; one file a problem.
 
+mod cloud;
+mod curvature;
+mod evolution;
 pub mod fields;
+mod method;
 mod pointwise;
+mod poisson;
+mod problem;
+mod reactions;
+mod simulation;
 
+pub use cloud::SurfaceCloud;
+pub use curvature::Curvature;
+pub use evolution::{Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse};
 pub use fields::ExactField;
-pub use pointwise::{PointwiseOperator, PointwiseParts, SurfacePoints};
+pub use method::{Form, Method};
+pub use pointwise::Pointwise;
+pub use poisson::{Condition, Poisson, Solver};
+pub use problem::Problem;
+pub use reactions::{Model, Reaction};
+pub use simulation::SurfaceEquation;

@@ -3,6 +3,7 @@
 //! VTK's reader needs all four topology groups, and numbers only under `FieldData`.
 
 use super::hdf5_file::write;
+use super::surface_view;
 use hdf5::types::FixedAscii;
 use hdf5::{File, Group};
 use meniscus::scene::Cloud;
@@ -57,13 +58,13 @@ pub struct FrameView {
     pub time: f64,
     /// Positions.
     pub points: Vec<[f64; 3]>,
-    /// Signed distances, NaN outside the band.
+    /// Signed distances, NaN outside the band; of a field on a surface its values about the middle of their range.
     pub phi: Vec<f64>,
     /// Closest points and normals, where the frame has both.
     pub surface: Vec<([f64; 3], [f64; 3])>,
 }
 
-/// Reads a frame back; None where it has no `phi`.
+/// Reads a frame back, for a picture; None where it has neither `phi` nor a `value` on a surface.
 ///
 /// # Errors
 /// Whatever libhdf5 reports.
@@ -71,23 +72,21 @@ pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
     let file = File::open(path)?;
     let root = file.group("VTKHDF")?;
     let data = root.group("PointData")?;
-    let Ok(phi) = data.dataset("phi") else {
-        return Ok(None);
-    };
     let triples = |values: Vec<f64>| values.as_chunks::<3>().0.to_vec();
+    let time = root.dataset("FieldData/Time")?.read_raw::<f64>()?.first().copied().unwrap_or(0.0);
+    let points = triples(root.dataset("Points")?.read_raw()?);
+    let Ok(phi) = data.dataset("phi") else {
+        let (Ok(values), Ok(normals)) = (data.dataset("value"), data.dataset("normal")) else { return Ok(None) };
+        let (points, phi) = surface_view::seen(&points, &triples(normals.read_raw()?), &values.read_raw::<f64>()?);
+        return Ok(Some(FrameView { time, points, phi, surface: Vec::new() }));
+    };
     let surface = match (data.dataset("closest_point"), data.dataset("normal")) {
         (Ok(points), Ok(normals)) => {
             triples(points.read_raw()?).into_iter().zip(triples(normals.read_raw()?)).collect()
         }
         _ => Vec::new(),
     };
-    let time = root.dataset("FieldData/Time")?.read_raw::<f64>()?;
-    Ok(Some(FrameView {
-        time: time.first().copied().unwrap_or(0.0),
-        points: triples(root.dataset("Points")?.read_raw()?),
-        phi: phi.read_raw()?,
-        surface,
-    }))
+    Ok(Some(FrameView { time, points, phi: phi.read_raw()?, surface }))
 }
 
 /// φ and a scalar field of a frame, where it has both.

@@ -16,10 +16,12 @@ pub fn error(report: &Value, quantity: Quantity) -> Option<f64> {
     found?["value"].as_f64()
 }
 
-/// The length that errors are held against: h, or where a scene has a number of points on a surface N^(−1/2).
+/// The length that errors are held against: h, or where a scene has a number of points on a surface N^(−1/2), on a circle 1/N.
 #[must_use]
 pub fn spacing(scene: &Value) -> Option<f64> {
-    scene["spacing"].as_f64().or_else(|| Some(1.0 / scene["count"].as_f64()?.sqrt()))
+    let is_curve = [&scene["surface"], &scene["surface"]["type"]].iter().any(|surface| **surface == "circle");
+    let apart = |count: f64| if is_curve { 1.0 / count } else { 1.0 / count.sqrt() };
+    scene["spacing"].as_f64().or_else(|| scene["count"].as_f64().map(apart))
 }
 
 /// CPU seconds in phases whose names begin so.
@@ -54,6 +56,8 @@ pub fn measure(measure: Measure, scenes: &[Value], reports: &[Value]) -> f64 {
             slope(&points)
         }
         Measure::Growth(of) => error(last, of).unwrap_or(f64::NAN) / error(first, of).unwrap_or(f64::NAN),
+        Measure::Difference(of) => (error(last, of).unwrap_or(f64::NAN) - error(first, of).unwrap_or(f64::NAN)).abs(),
+        Measure::Memory => last["cost"]["peak_memory_bytes"].as_f64().unwrap_or(f64::NAN),
         Measure::Seconds(prefix) => seconds(last, prefix),
         Measure::SecondsPerStep(prefix) => seconds(last, prefix) / last["cost"]["steps"].as_f64().unwrap_or(f64::NAN),
         Measure::SecondsShare(prefix) => seconds(last, prefix) / seconds(first, prefix),

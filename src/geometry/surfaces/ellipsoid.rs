@@ -35,6 +35,14 @@ impl<const D: usize> Ellipsoid<D> {
         (normal, (trace - bent) / length)
     }
 
+    /// Gauss curvature at a point of the surface, taken from the centre: 1/(∏ e² (Σ x_i²/e_i⁴)²); 0 in the plane.
+    #[must_use]
+    pub fn gauss_curvature(&self, foot: &Vector<D>) -> f64 {
+        let e = &self.semi_axes;
+        let sum: f64 = (0..D).map(|i| (foot[i] / (e[i] * e[i])).powi(2)).sum();
+        if D == 3 { 1.0 / (e.product().powi(2) * sum * sum) } else { 0.0 }
+    }
+
     /// The closest point for a query in the first orthant of the centred frame.
     fn closest_in_first_orthant(&self, y: &Vector<D>) -> Vector<D> {
         let e = &self.semi_axes;

@@ -14,6 +14,16 @@ pub struct Torus {
     pub minor_radius: f64,
 }
 
+impl Torus {
+    /// Gauss curvature at a point of the surface: cos θ/(r ρ) with ρ = R + r cos θ its distance from the axis.
+    #[must_use]
+    pub fn gauss_curvature(&self, x: &Vector<3>) -> f64 {
+        let local = x - self.center;
+        let rho = local[0].hypot(local[1]);
+        (rho - self.major_radius) / (self.minor_radius * self.minor_radius * rho)
+    }
+}
+
 impl Surface<3> for Torus {
     fn nearest(&self, x: &Vector<3>) -> SurfacePoint<3> {
         let local = x - self.center;

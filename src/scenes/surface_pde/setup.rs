@@ -1,35 +1,70 @@
-//! From parameters to points and an operator.
+//! From parameters to points, a method and a problem.
 
 use super::parameters::Written;
-use super::surfaces;
+use super::problems::{self, ProblemChoice};
+use super::surfaces::{self, Sampling, Shape};
 use crate::geometry::Vector;
-use crate::geometry::surfaces::Ellipsoid;
+use crate::geometry::random::CounterRandom;
+use crate::geometry::surfaces::{Ellipsoid, Torus};
 use crate::operators::Support;
+use crate::operators::charts::tangent::Metric;
+use crate::point_clouds::{Bump, normals};
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::work_estimate;
-use crate::schemes::surface_equation::{ExactField, PointwiseOperator, PointwiseParts};
+use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
+use crate::schemes::surface_equation::{Form, Method, SurfaceCloud, SurfaceEquation};
 use crate::simulation::{OutputPlan, Simulation};
+use crate::time::FixedStep;
 use serde_json::{Value, json};
+
+/// Where normals come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Normals {
+    Exact,
+    Estimated,
+    Perturbed { sigma: f64 },
+}
+
+/// The method of the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Scheme {
+    Dcpse(Method),
+    Embedding { order: usize, spacing: f64 },
+}
 
 struct SurfaceScene {
     resolved: Value,
-    surface: Ellipsoid<3>,
+    shape: Shape,
     count: u64,
-    parts: PointwiseParts,
-    cutoff_dn: f64,
+    sampling: Sampling,
+    seed: u64,
+    normals: Normals,
+    scheme: Scheme,
+    problem: ProblemChoice,
+    fixed: FixedStep,
 }
 
 /// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbours as there are functions, about; larger
 /// ones have larger errors (measured on plane waves).
-fn support(order: u64) -> Option<(usize, f64)> {
-    match order {
-        2 => Some((3, 2.4)),
-        4 => Some((5, 3.3)),
-        6 => Some((7, 4.2)),
-        _ => None,
-    }
+fn support(order: u64, is_curve: bool, is_copies: bool) -> Option<(usize, f64)> {
+    let degree = match order {
+        2 | 4 | 6 => order as usize + 1,
+        _ => return None,
+    };
+    let cutoff = match (is_copies, is_curve, order) {
+        (true, true, _) => 4.1,
+        (true, false, _) => 2.9,
+        // On a curve neighbours lie in a row.
+        (false, true, 2) => 3.4,
+        (false, true, 4) => 5.4,
+        (false, true, _) => 7.4,
+        (false, false, 2) => 2.4,
+        (false, false, 4) => 3.3,
+        (false, false, _) => 4.2,
+    };
+    Some((degree, cutoff))
 }
 
 pub(super) fn understand(parameters: &Value) -> Understood {
@@ -37,82 +72,229 @@ pub(super) fn understand(parameters: &Value) -> Understood {
         .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
     let mut violations = Vec::new();
     let mut resolved = parameters.clone();
-    let numbers = |value: &Value| Vector::<3>::from_fn(|d, _| value[d].as_f64().unwrap_or(f64::NAN));
-    let mut in_space = |value: &Value, pointer: &str| {
-        if value.as_array().map_or(0, Vec::len) != 3 {
-            violations.push(Violation::new(pointer, "range", "a vector in space has three numbers", value, json!(3)));
-        }
-        numbers(value)
+    let shape = shape(&written.surface, &mut violations);
+    let dimension = if let Shape::Circle { .. } = shape { 2 } else { 3 };
+    if let Some(given) = written.dimension.filter(|given| *given != dimension) {
+        let detail = format!("this surface lies in {dimension} dimensions");
+        violations.push(Violation::new("/dimension", "conflict", detail, &json!(given), json!(dimension)));
+    }
+    resolved["dimension"] = json!(dimension);
+    let default_sampling = if let Shape::Circle { .. } | Shape::Bump(_) = shape { "regular" } else { "fibonacci" };
+    let name = written.sampling.as_deref().unwrap_or(default_sampling);
+    let sampling = match name {
+        "regular" => Sampling::Regular,
+        "random" => Sampling::Random { is_relaxed: true },
+        "random_raw" => Sampling::Random { is_relaxed: false },
+        _ => Sampling::Fibonacci,
     };
-    let is_sphere = written.surface["type"] == "sphere";
-    let semi_axes = if is_sphere {
-        Vector::<3>::repeat(written.surface["radius"].as_f64().unwrap_or(1.0))
-    } else {
-        in_space(&written.surface["semi_axes"], "/surface/semi_axes")
+    let has_lattice = matches!(shape, Shape::Circle { .. } | Shape::Bump(_));
+    let allowed: &[&str] = match shape {
+        Shape::Circle { .. } => &["regular", "random", "random_raw"],
+        Shape::Bump(_) => &["regular"],
+        _ => &["fibonacci", "random", "random_raw"],
     };
-    let field = &written.problem.field;
-    let field = if field["type"] == "plane_wave" {
-        ExactField::PlaneWave { k: in_space(&field["k"], "/problem/field/k") }
-    } else {
-        let (l, m) = (field["l"].as_u64().unwrap_or(4) as u32, field["m"].as_f64().unwrap_or(0.0));
-        if m.abs() > f64::from(l) || m.fract() != 0.0 {
-            let detail = format!("the order is a whole number from −{l} to {l}");
-            violations.push(Violation::new("/problem/field/m", "range", detail, &json!(m), json!([-f64::from(l), l])));
-        }
-        if !is_sphere {
-            let detail = "spherical harmonics belong to a sphere";
-            violations.push(Violation::new("/problem/field", "conflict", detail, field, json!(["plane_wave"])));
-        }
-        ExactField::SphericalHarmonic { l, m: m as i32 }
+    if !allowed.contains(&name) {
+        let detail = if has_lattice { "not on this surface" } else { "this surface has no lattice" };
+        violations.push(Violation::new("/sampling", "conflict", detail, &json!(name), json!(allowed)));
+    }
+    resolved["sampling"] = json!(name);
+    let normals = match written.normals["type"].as_str() {
+        Some("estimated") => Normals::Estimated,
+        Some("perturbed") => Normals::Perturbed { sigma: written.normals["sigma"].as_f64().unwrap_or(0.01) },
+        _ => Normals::Exact,
     };
-    let Some((degree, default_cutoff)) = support(written.method.order) else {
-        let (got, allowed) = (json!(written.method.order), json!([2, 4, 6]));
-        violations.push(Violation::new("/method/order", "range", "orders are 2, 4 and 6", &got, allowed));
+    let metric = match normals {
+        Normals::Exact => Metric::OfNormals,
+        Normals::Perturbed { .. } if written.normals["metric"] == "normals" => Metric::OfNormals,
+        _ => Metric::OfHeights,
+    };
+    let scheme = scheme(&written, &shape, metric, &mut resolved, &mut violations);
+    let problem = problems::understand(&written, &shape, metric, &mut resolved, &mut violations);
+    if let (Some(Scheme::Embedding { .. }), Some(problem)) = (&scheme, &problem) {
+        if shape.in_space().is_none() {
+            let detail = "the embedding method is for spheres, ellipsoids and tori";
+            violations.push(Violation::new(
+                "/method",
+                "conflict",
+                detail,
+                &json!("closest_point"),
+                json!(["surface_dcpse"]),
+            ));
+        }
+        if !matches!(problem, ProblemChoice::LaplaceBeltrami { .. }) {
+            let detail = "the embedding method is there for the operator applied to a field";
+            let allowed = json!(["laplace_beltrami"]);
+            violations.push(Violation::new("/problem", "conflict", detail, &written.problem["type"], allowed));
+        }
+    }
+    let is_applied = matches!(problem, Some(ProblemChoice::LaplaceBeltrami { .. }) | None);
+    if written.repeat > 1 && !is_applied {
+        let detail = "only the operator that is applied to a field is applied again";
+        violations.push(Violation::new("/repeat", "conflict", detail, &json!(written.repeat), json!(1)));
+    }
+    let (Some(scheme), Some(problem)) = (scheme, problem.filter(|_| violations.is_empty())) else {
         return Err(violations);
     };
-    if !violations.is_empty() {
-        return Err(violations);
+    let fixed = match &problem {
+        ProblemChoice::LaplaceBeltrami { .. } => FixedStep { time_step: 1.0, steps: written.repeat },
+        ProblemChoice::Poisson { .. } | ProblemChoice::Curvature { .. } => FixedStep { time_step: 1.0, steps: 1 },
+        ProblemChoice::Evolution { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
+    };
+    if let ProblemChoice::Evolution { .. } = problem {
+        resolved["problem"]["time_step"] = json!(fixed.time_step);
     }
-    let surface = Ellipsoid { center: Vector::<3>::zeros(), semi_axes };
-    let cutoff_dn = written.method.cutoff_dn.unwrap_or(default_cutoff);
-    let terms = ((degree + 1) * (degree + 2) / 2 - 1) as f64;
-    if let ExactField::PlaneWave { k } = field
-        && !(1e-6..1e6).contains(&(k.norm() * surface.semi_axes.max()))
-    {
-        let detail = "by the size of the surface a wave must have a length that numbers can tell";
-        violations.push(Violation::new("/problem/field/k", "range", detail, &written.problem.field["k"], Value::Null));
+    let (count, seed) = (written.count, written.seed);
+    Ok(Box::new(SurfaceScene { resolved, shape, count, sampling, seed, normals, scheme, problem, fixed }))
+}
+
+fn shape(surface: &Value, violations: &mut Vec<Violation>) -> Shape {
+    let number = |name: &str| surface[name].as_f64().unwrap_or(1.0);
+    let center = Vector::<3>::zeros();
+    match surface["type"].as_str() {
+        Some("circle") => Shape::Circle { radius: number("radius") },
+        Some("ellipsoid") => {
+            let axes = &surface["semi_axes"];
+            let semi_axes = problems::in_space(axes, "/surface/semi_axes", violations);
+            Shape::Ellipsoid(Ellipsoid { center, semi_axes })
+        }
+        Some("torus") => {
+            let (major_radius, minor_radius) = (number("major_radius"), number("minor_radius"));
+            if minor_radius >= major_radius {
+                let detail = "the tube must be thinner than its circle";
+                let (got, allowed) = (json!(minor_radius), json!({"below": major_radius}));
+                violations.push(Violation::new("/surface/minor_radius", "range", detail, &got, allowed));
+            }
+            Shape::Torus(Torus { center, major_radius, minor_radius })
+        }
+        Some("bump") => Shape::Bump(Bump { height: number("height") }),
+        _ => Shape::Ellipsoid(Ellipsoid { center, semi_axes: Vector::<3>::repeat(number("radius")) }),
     }
+}
+
+fn scheme(
+    written: &Written,
+    shape: &Shape,
+    metric: Metric,
+    resolved: &mut Value,
+    violations: &mut Vec<Violation>,
+) -> Option<Scheme> {
+    let method = &written.method;
+    let order = method["order"].as_u64().unwrap_or(2);
+    let spacing = shape.spacing(written.count);
+    let wrong_order = |allowed: Value| {
+        Violation::new("/method/order", "range", "there is no method of this order", &json!(order), allowed)
+    };
+    if method["type"] == "closest_point" {
+        if order != 2 && order != 4 {
+            violations.push(wrong_order(json!([2, 4])));
+        }
+        if !matches!(written.normals["type"].as_str(), Some("exact")) {
+            let detail = "the embedding method has exact closest points and asks for no normals";
+            let got = &written.normals["type"];
+            violations.push(Violation::new("/normals", "conflict", detail, got, json!(["exact"])));
+        }
+        let grid = method["spacing"].as_f64().unwrap_or(spacing);
+        resolved["method"]["spacing"] = json!(grid);
+        return Some(Scheme::Embedding { order: order as usize, spacing: grid });
+    }
+    let is_curve = matches!(shape, Shape::Circle { .. });
+    let is_copies = method["form"] == "copies";
+    let Some((degree, default_cutoff)) = support(order, is_curve, is_copies) else {
+        violations.push(wrong_order(json!([2, 4, 6])));
+        return None;
+    };
+    let cutoff_dn = method["cutoff_dn"].as_f64().unwrap_or(default_cutoff);
+    resolved["method"]["cutoff_dn"] = json!(cutoff_dn);
+    if is_copies {
+        let n = written.count as f64;
+        let apart = if is_curve { 3.0 / (n - 1.0) } else { spacing };
+        let apart = method["normal_spacing"].as_f64().unwrap_or(apart);
+        let layers = method["layers"].as_u64().unwrap_or(if is_curve { 4 } else { 2 }) as u32;
+        resolved["method"]["normal_spacing"] = json!(apart);
+        resolved["method"]["layers"] = json!(layers);
+        if metric == Metric::OfHeights || matches!(shape, Shape::Bump(_)) {
+            let detail = "copies along normals want exact normals and a closed surface";
+            violations.push(Violation::new("/method/form", "conflict", detail, &json!("copies"), json!(["intrinsic"])));
+        }
+        let support = Support { degree, radius: cutoff_dn * apart };
+        return Some(Scheme::Dcpse(Method { support, form: Form::Copies { layers, spacing: apart } }));
+    }
+    for name in ["layers", "normal_spacing"] {
+        if !method[name].is_null() {
+            let (place, detail) = (format!("/method/{name}"), "there are no copies in the intrinsic form");
+            violations.push(Violation::new(place, "conflict", detail, &method[name], Value::Null));
+        }
+    }
+    let terms = if is_curve { degree as f64 } else { ((degree + 1) * (degree + 2) / 2 - 1) as f64 };
     // Only points whose normals differ by less than 60° count: a quarter of a sphere, less where it is flat.
     let least_count = (8.0 * terms).ceil();
     if (written.count as f64) < least_count {
         let detail = format!("a fit of {terms} functions wants {least_count} points at least on a closed surface");
-        violations.push(Violation::new(
-            "/count",
-            "range",
-            detail,
-            &json!(written.count),
-            json!({"least": least_count}),
-        ));
+        let allowed = json!({"least": least_count});
+        violations.push(Violation::new("/count", "range", detail, &json!(written.count), allowed));
     }
-    let least_cutoff = (1.2 * terms / std::f64::consts::PI).sqrt();
+    let least_cutoff = if is_curve { 0.6 * terms } else { (1.2 * terms / std::f64::consts::PI).sqrt() };
     if cutoff_dn < least_cutoff {
         let detail = format!("a support must hold the neighbours that a fit of {terms} functions needs");
         let allowed = json!({"least": least_cutoff});
         violations.push(Violation::new("/method/cutoff_dn", "range", detail, &json!(cutoff_dn), allowed));
     }
-    if !violations.is_empty() {
-        return Err(violations);
-    }
-    resolved["method"]["cutoff_dn"] = json!(cutoff_dn);
-    let support = Support { degree, radius: cutoff_dn * surfaces::spacing(&surface, written.count) };
-    let parts = PointwiseParts { field, support, repeats: written.repeat };
-    Ok(Box::new(SurfaceScene { resolved, surface, count: written.count, parts, cutoff_dn }))
+    Some(Scheme::Dcpse(Method {
+        support: Support { degree, radius: cutoff_dn * spacing },
+        form: Form::Intrinsic { metric },
+    }))
 }
 
 impl SurfaceScene {
-    /// Neighbours of a point, about.
-    fn neighbors(&self) -> f64 {
-        std::f64::consts::PI * self.cutoff_dn * self.cutoff_dn
+    /// Nodes of a fit, about.
+    fn nodes(&self, method: &Method) -> f64 {
+        let cutoff = method.support.radius / self.shape.spacing(self.count);
+        let is_curve = matches!(self.shape, Shape::Circle { .. });
+        let surface = if is_curve { 2.0 * cutoff } else { std::f64::consts::PI * cutoff * cutoff };
+        match method.form {
+            Form::Intrinsic { .. } => surface,
+            Form::Copies { layers, .. } => surface * (1.0 + 1.6 * f64::from(layers)),
+        }
+    }
+
+    /// Functions of a fit.
+    fn terms(&self, method: &Method) -> f64 {
+        let n = method.support.degree as f64;
+        let is_curve = matches!(self.shape, Shape::Circle { .. });
+        let coordinates = if is_curve { 1 } else { 2 } + usize::from(matches!(method.form, Form::Copies { .. }));
+        match coordinates {
+            1 => n,
+            2 => (n + 1.0) * (n + 2.0) / 2.0 - 1.0,
+            _ => (n + 1.0) * (n + 2.0) * (n + 3.0) / 6.0 - 1.0,
+        }
+    }
+
+    /// The cloud with the normals that operators are made with.
+    fn cloud<const D: usize>(
+        &self,
+        mut cloud: SurfaceCloud<D>,
+        radius: f64,
+    ) -> Result<SurfaceCloud<D>, Vec<Violation>> {
+        match self.normals {
+            Normals::Exact => {}
+            Normals::Perturbed { sigma } => {
+                let random = CounterRandom::new(self.seed ^ 0x6e6f_726d);
+                for (i, normal) in cloud.normals[..cloud.rows].iter_mut().enumerate() {
+                    let off = Vector::<D>::from_fn(|d, _| sigma * random.symmetric(&[i as i64, d as i64]));
+                    *normal = (*normal + off).normalize();
+                }
+            }
+            Normals::Estimated => {
+                let found = normals::estimate::<D>(&cloud.points, radius);
+                let found = found.map_err(|failed| {
+                    let refused =
+                        Violation::new("/normals", "data", failed.to_string(), &json!("estimated"), Value::Null);
+                    vec![refused]
+                })?;
+                cloud.normals = found;
+            }
+        }
+        Ok(cloud)
     }
 }
 
@@ -122,40 +304,103 @@ impl Scene for SurfaceScene {
     }
 
     fn field_names(&self) -> Vec<&'static str> {
-        vec!["field", "value", "reference", "normal", "curvature", "particle_id"]
+        let mut names = self.problem.field_names();
+        names.extend(["normal", "curvature", "particle_id"]);
+        names
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
-        // Points, normals, four columns; entries once in the rows of the tasks and once in those of the operator.
-        let a_point = 150.0 + 2.4 * 12.0 * (self.neighbors() + 1.0);
+        // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
+        let a_point = match &self.scheme {
+            Scheme::Dcpse(method) => {
+                let entries = method.support.radius / self.shape.spacing(self.count);
+                250.0 + 2.4 * 12.0 * (std::f64::consts::PI * entries * entries + 1.0) * self.problem.copies()
+            }
+            Scheme::Embedding { order, spacing } => {
+                let nodes =
+                    2.0 * EmbeddingParts::half_band(*order) * (self.shape.spacing(self.count) / spacing).powi(2);
+                200.0 + nodes * (60.0 + 30.0 * *order as f64)
+            }
+        };
         Estimate {
             particles: self.count,
-            steps: self.parts.repeats,
-            time_step: 1.0,
-            end_time: self.parts.repeats as f64,
+            steps: self.fixed.steps,
+            time_step: self.fixed.time_step,
+            end_time: self.fixed.clock(self.fixed.steps).time,
             memory_bytes: (a_point * self.count as f64) as u64,
         }
     }
 
     fn family(&self) -> String {
-        format!("surface_pde/3/intrinsic/{}", self.parts.support.degree)
+        let dimension = if let Shape::Circle { .. } = self.shape { 2 } else { 3 };
+        let problem = self.problem.name();
+        match &self.scheme {
+            Scheme::Dcpse(Method { support, form: Form::Intrinsic { .. } }) => {
+                format!("surface_pde/{dimension}/intrinsic/{}/{problem}", support.degree)
+            }
+            Scheme::Dcpse(Method { support, .. }) => {
+                format!("surface_pde/{dimension}/copies/{}/{problem}", support.degree)
+            }
+            Scheme::Embedding { order, .. } => format!("surface_pde/{dimension}/embedding/{order}"),
+        }
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
         let points = particles as f64;
-        let terms = ((self.parts.support.degree + 1) * (self.parts.support.degree + 2) / 2 - 1) as f64;
-        let fit = self.neighbors() * (20.0 + 0.25 * terms * terms) + 0.02 * terms.powi(3);
-        let mut work = vec![
-            PhaseWork::at_moments("operators/construction", points * fit),
-            PhaseWork::every_step("operators/application", points * self.neighbors() * steps as f64),
-        ];
+        let mut work = match &self.scheme {
+            Scheme::Dcpse(method) => {
+                let (nodes, terms) = (self.nodes(method), self.terms(method));
+                let fit = nodes * (20.0 + 0.25 * terms * terms) + 0.02 * terms.powi(3);
+                let entries = method.support.radius / self.shape.spacing(self.count);
+                let application = points * std::f64::consts::PI * entries * entries;
+                let mut work = vec![PhaseWork::at_moments("operators/construction", points * fit)];
+                work.extend(self.problem.work(application, points, steps as f64, self.fixed.time_step));
+                work
+            }
+            Scheme::Embedding { order, spacing } => {
+                let band = 2.0 * EmbeddingParts::half_band(*order) * (self.shape.spacing(self.count) / spacing).powi(2);
+                let stencil = (*order as f64 + 2.0).powi(3);
+                vec![
+                    PhaseWork::at_moments("operators/construction", points * band * (200.0 + stencil)),
+                    PhaseWork::every_step("operators/application", points * band * stencil * steps as f64),
+                ]
+            }
+        };
         work.extend(work_estimate::around(points, steps, end_time, plan));
         work
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let points = surfaces::points(&self.surface, self.count as usize);
-        Ok(Box::new(PointwiseOperator::new(points, self.parts, context.interrupt, context.cpu_clock)))
+        let BuildContext { interrupt, cpu_clock, .. } = context;
+        match (&self.scheme, &self.shape) {
+            (Scheme::Dcpse(method), Shape::Circle { radius }) => {
+                let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.seed);
+                let cloud = self.cloud(cloud, method.support.radius)?;
+                let problem = self.problem.build(&self.shape, &cloud, self.seed, self.fixed.time_step);
+                Ok(Box::new(SurfaceEquation::<2, 1>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
+            }
+            (Scheme::Dcpse(method), shape) => {
+                let reach = method.support.radius;
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, reach);
+                let cloud = self.cloud(cloud, reach)?;
+                let problem = self.problem.build(shape, &cloud, self.seed, self.fixed.time_step);
+                Ok(Box::new(SurfaceEquation::<3, 2>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
+            }
+            (Scheme::Embedding { order, spacing }, shape) => {
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, 0.0);
+                let Some((field, values, operated)) = self.problem.known(shape, &cloud) else { return Err(Vec::new()) };
+                let surface: Box<dyn crate::geometry::Surface<3>> = match shape {
+                    Shape::Torus(torus) => Box::new(torus.clone()),
+                    Shape::Ellipsoid(ellipsoid) => Box::new(ellipsoid.clone()),
+                    Shape::Circle { .. } | Shape::Bump(_) => return Err(Vec::new()),
+                };
+                let parts = EmbeddingParts { order: *order, spacing: *spacing, repeats: self.fixed.steps };
+                let SurfaceCloud { points, normals, curvatures, .. } = cloud;
+                let data = SurfaceData { points, normals, curvatures, field: values, reference: operated };
+                let field = Box::new(move |x: &Vector<3>| field.value(x));
+                Ok(Box::new(EmbeddingClosestPoint::new(surface, field, data, parts, interrupt, cpu_clock)))
+            }
+        }
     }
 }

@@ -1,51 +1,259 @@
-//! Surfaces as points with exact normals and curvatures.
+//! Surfaces as points with exact normals and curvatures, by how they are spread.
 
-use crate::geometry::fibonacci;
-use crate::geometry::surfaces::Ellipsoid;
-use crate::schemes::surface_equation::SurfacePoints;
-use std::f64::consts::PI;
+use crate::geometry::random::CounterRandom;
+use crate::geometry::surfaces::{Ellipsoid, Torus};
+use crate::geometry::{Surface, Vector, fibonacci};
+use crate::point_clouds::{Bump, bump, relaxation};
+use crate::schemes::surface_equation::SurfaceCloud;
+use std::f64::consts::{PI, TAU};
 
-/// The area, of an ellipsoid by Knud Thomsen's formula to about one per cent: it sets a length alone.
-fn area(surface: &Ellipsoid<3>) -> f64 {
-    let [a, b, c] = surface.semi_axes.into();
-    let p = 1.6075;
-    let mean = ((a * b).powf(p) + (a * c).powf(p) + (b * c).powf(p)) / 3.0;
-    4.0 * PI * mean.powf(1.0 / p)
+/// A surface about the origin.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Shape {
+    Circle { radius: f64 },
+    Ellipsoid(Ellipsoid<3>),
+    Torus(Torus),
+    Bump(Bump),
 }
 
-/// δn, the side of the square that a point has for itself.
-pub(super) fn spacing(surface: &Ellipsoid<3>, count: u64) -> f64 {
-    (area(surface) / count as f64).sqrt()
+/// How points are spread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sampling {
+    /// At equal angles, or on a lattice.
+    Regular,
+    /// Equal areas, turned by the golden angle.
+    Fibonacci,
+    /// At random, relaxed or not.
+    Random { is_relaxed: bool },
 }
 
-/// Fibonacci points of the unit sphere, stretched.
-pub(super) fn points(surface: &Ellipsoid<3>, count: usize) -> SurfacePoints {
-    let from_centre = fibonacci::sphere(count).into_iter().map(|u| u.component_mul(&surface.semi_axes));
-    let mut found = SurfacePoints::default();
-    for x in from_centre {
-        let (normal, curvature) = surface.normal_and_curvature(&x);
-        found.points.push(surface.center + x);
-        found.normals.push(normal);
-        found.curvatures.push(curvature);
+/// Places of a bump whose values go into the series (Surface DC-PSE paper, section 4.4).
+const BUMP_PROBES: [[f64; 2]; 2] = [[-0.5, 0.0], [-0.25 * std::f64::consts::SQRT_2, 0.25 * std::f64::consts::SQRT_2]];
+
+impl Shape {
+    /// The length, or the area: of an ellipsoid by Knud Thomsen's formula to about one per cent (it sets a length alone), of
+    /// a bump that of its square.
+    fn measure(&self) -> f64 {
+        match self {
+            Self::Circle { radius } => TAU * radius,
+            Self::Ellipsoid(Ellipsoid { semi_axes, .. }) => {
+                let [a, b, c] = (*semi_axes).into();
+                let p = 1.6075;
+                let mean = ((a * b).powf(p) + (a * c).powf(p) + (b * c).powf(p)) / 3.0;
+                4.0 * PI * mean.powf(1.0 / p)
+            }
+            Self::Torus(torus) => 4.0 * PI * PI * torus.major_radius * torus.minor_radius,
+            Self::Bump(_) => (2.0 * bump::HALF_SIDE).powi(2),
+        }
     }
-    found
+
+    /// δn: the arc, or the side of the square, that a point has for itself.
+    pub fn spacing(&self, count: u64) -> f64 {
+        match self {
+            Self::Circle { .. } => self.measure() / count as f64,
+            Self::Bump(bump) => 2.0 * bump::HALF_SIDE / bump.cells(count) as f64,
+            _ => (self.measure() / count as f64).sqrt(),
+        }
+    }
+
+    /// The least eigenvalue of Δ_S that is not zero, about: of a sphere of the same area, or of a circle.
+    pub fn least_eigenvalue(&self) -> f64 {
+        match self {
+            Self::Circle { radius } => -1.0 / (radius * radius),
+            _ => -8.0 * PI / self.measure(),
+        }
+    }
+
+    /// A length that all of the surface is within.
+    pub fn reach(&self) -> f64 {
+        match self {
+            Self::Circle { radius } => *radius,
+            Self::Ellipsoid(ellipsoid) => ellipsoid.semi_axes.max(),
+            Self::Torus(torus) => torus.major_radius + torus.minor_radius,
+            Self::Bump(_) => bump::HALF_SIDE,
+        }
+    }
+
+    /// The exact unit normal at a point of it, z = 0 of a circle.
+    pub fn normal(&self, x: &Vector<3>) -> Vector<3> {
+        match self {
+            Self::Circle { .. } => x.normalize(),
+            Self::Ellipsoid(ellipsoid) => ellipsoid.normal_and_curvature(x).0,
+            Self::Torus(torus) => torus.nearest(x).normal.unwrap_or_default(),
+            Self::Bump(bump) => bump.above(x[0], x[1]).normal,
+        }
+    }
+
+    /// Its largest coordinate along z, of a circle along x.
+    pub fn top(&self) -> f64 {
+        match self {
+            Self::Circle { radius } => *radius,
+            Self::Ellipsoid(ellipsoid) => ellipsoid.semi_axes[2],
+            Self::Torus(torus) => torus.minor_radius,
+            Self::Bump(bump) => bump.above(bump::CENTER[0], bump::CENTER[1]).point[2],
+        }
+    }
+
+    /// The surface in space with its closest points, where it has them exactly.
+    pub fn in_space(&self) -> Option<&dyn Surface<3>> {
+        match self {
+            Self::Ellipsoid(ellipsoid) => Some(ellipsoid),
+            Self::Torus(torus) => Some(torus),
+            Self::Circle { .. } | Self::Bump(_) => None,
+        }
+    }
+}
+
+/// Points of a circle.
+pub(super) fn circle(radius: f64, count: usize, sampling: Sampling, seed: u64) -> SurfaceCloud<2> {
+    let random = CounterRandom::new(seed);
+    let mut angles: Vec<f64> = (0..count)
+        .map(|i| match sampling {
+            Sampling::Random { .. } => PI * random.symmetric(&[i as i64]),
+            _ => TAU * i as f64 / count as f64,
+        })
+        .collect();
+    angles.sort_by(f64::total_cmp);
+    if let Sampling::Random { is_relaxed: true } = sampling {
+        // Neighbours' middles, a few times over: gaps become more alike.
+        for _ in 0..3 {
+            let before = angles.clone();
+            for (i, angle) in angles.iter_mut().enumerate() {
+                let low = if i == 0 { before[count - 1] - TAU } else { before[i - 1] };
+                let high = if i + 1 == count { before[0] + TAU } else { before[i + 1] };
+                *angle = 0.5 * before[i] + 0.25 * (low + high);
+            }
+        }
+    }
+    let normals: Vec<_> = angles.iter().map(|a| Vector::<2>::new(a.cos(), a.sin())).collect();
+    SurfaceCloud {
+        points: normals.iter().map(|n| n * radius).collect(),
+        normals,
+        rows: count,
+        curvatures: vec![1.0 / radius; count],
+        gauss: vec![0.0; count],
+        areas: (sampling == Sampling::Regular).then(|| vec![TAU * radius / count as f64; count]),
+        ..SurfaceCloud::default()
+    }
+}
+
+/// Points of a surface in space; `reach` is the support's, for the images of a surface with edges.
+pub(super) fn in_space(shape: &Shape, count: u64, sampling: Sampling, seed: u64, reach: f64) -> SurfaceCloud<3> {
+    if let Shape::Bump(bump) = shape {
+        return with_edges(*bump, count, reach);
+    }
+    let Some(surface) = shape.in_space() else { return SurfaceCloud::default() };
+    let number = count as usize;
+    let spacing = shape.spacing(count);
+    let points = match (sampling, shape) {
+        (Sampling::Random { is_relaxed }, _) => {
+            let (low, high) = surface.bounding_box();
+            // A shell as thin as the drawing of points allows.
+            let mut points = relaxation::random(surface, number, 0.02 * (high - low).min(), seed);
+            if is_relaxed {
+                relaxation::relax(&mut points, spacing, |x| surface.nearest(x).point);
+            }
+            points
+        }
+        (_, Shape::Torus(torus)) => {
+            let (major, minor) = (torus.major_radius, torus.minor_radius);
+            let share = |s: f64| s + minor / major * (TAU * s).sin() / TAU;
+            let profile = |s: f64| (major + minor * (TAU * s).cos(), minor * (TAU * s).sin());
+            fibonacci::of_revolution(number, share, profile)
+        }
+        (_, Shape::Ellipsoid(ellipsoid)) => {
+            fibonacci::sphere(number).into_iter().map(|u| u.component_mul(&ellipsoid.semi_axes)).collect()
+        }
+        _ => Vec::new(),
+    };
+    let mut cloud = SurfaceCloud { rows: points.len(), ..SurfaceCloud::default() };
+    for x in &points {
+        let (normal, curvature, gauss) = match shape {
+            Shape::Ellipsoid(ellipsoid) => {
+                let (normal, curvature) = ellipsoid.normal_and_curvature(x);
+                (normal, curvature, ellipsoid.gauss_curvature(x))
+            }
+            Shape::Torus(torus) => {
+                let nearest = torus.nearest(x);
+                (nearest.normal.unwrap_or_default(), nearest.curvature.unwrap_or(f64::NAN), torus.gauss_curvature(x))
+            }
+            _ => (Vector::<3>::zeros(), f64::NAN, f64::NAN),
+        };
+        cloud.normals.push(normal);
+        cloud.curvatures.push(curvature);
+        cloud.gauss.push(gauss);
+    }
+    let is_even = sampling == Sampling::Fibonacci
+        && match shape {
+            Shape::Ellipsoid(ellipsoid) => ellipsoid.semi_axes.max() == ellipsoid.semi_axes.min(),
+            _ => true,
+        };
+    cloud.areas = is_even.then(|| vec![shape.measure() / count as f64; number]);
+    cloud.points = points;
+    cloud
+}
+
+/// A bump with the images of what lies within reach of its edges.
+fn with_edges(bump: Bump, count: u64, reach: f64) -> SurfaceCloud<3> {
+    let found = bump.points(bump.cells(count), &BUMP_PROBES);
+    let at = |place: &[f64; 2]| found.points.iter().position(|p| p.point[0] == place[0] && p.point[1] == place[1]);
+    let mut cloud = SurfaceCloud {
+        points: found.points.iter().map(|p| p.point).collect(),
+        normals: found.points.iter().map(|p| p.normal).collect(),
+        rows: found.points.len(),
+        curvatures: found.points.iter().map(|p| p.curvature).collect(),
+        gauss: found.points.iter().map(|p| p.gauss).collect(),
+        probes: BUMP_PROBES.iter().filter_map(at).collect(),
+        source: (0..found.points.len() as u32).collect(),
+        scales: found.ratios,
+        areas: Some(found.areas),
+    };
+    // Supports may grow two and a half times.
+    for (image, source) in bump::images(&cloud.points, 2.5 * reach) {
+        cloud.points.push(image);
+        cloud.normals.push(Vector::<3>::z());
+        cloud.source.push(source);
+    }
+    cloud
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Ellipsoid, PI, area, points};
+    use super::{Bump, Ellipsoid, PI, Sampling, Shape, circle, in_space};
     use crate::geometry::{Surface, Vector};
 
     #[test]
     fn points_lie_on_the_surface_and_know_it() {
         let surface = Ellipsoid { center: Vector::<3>::zeros(), semi_axes: Vector::<3>::new(1.0, 0.8, 0.75) };
-        let found = points(&surface, 200);
-        for ((x, n), curvature) in found.points.iter().zip(&found.normals).zip(&found.curvatures) {
-            let nearest = surface.nearest(x);
-            assert!(nearest.distance.abs() < 1e-12 && (nearest.normal.unwrap() - n).norm() < 1e-9);
-            assert!((nearest.curvature.unwrap() - curvature).abs() < 1e-8);
+        for sampling in [Sampling::Fibonacci, Sampling::Random { is_relaxed: true }] {
+            let found = in_space(&Shape::Ellipsoid(surface.clone()), 200, sampling, 1, 0.1);
+            for ((x, n), curvature) in found.points.iter().zip(&found.normals).zip(&found.curvatures) {
+                let nearest = surface.nearest(x);
+                assert!(nearest.distance.abs() < 1e-12 && (nearest.normal.unwrap() - n).norm() < 1e-9);
+                assert!((nearest.curvature.unwrap() - curvature).abs() < 1e-8);
+            }
         }
-        let sphere = Ellipsoid { center: Vector::<3>::zeros(), semi_axes: Vector::<3>::repeat(2.0) };
-        assert!((area(&sphere) - 16.0 * PI).abs() < 1e-12);
+        let sphere = Shape::Ellipsoid(Ellipsoid { center: Vector::<3>::zeros(), semi_axes: Vector::<3>::repeat(2.0) });
+        assert!((sphere.measure() - 16.0 * PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_bump_has_about_the_points_asked_for_and_both_probes() {
+        for height in [0.0, 1.0, 2.0] {
+            let cloud = in_space(&Shape::Bump(Bump { height }), 18_400, Sampling::Regular, 1, 0.09);
+            assert!((18_000..18_800).contains(&cloud.rows), "α = {height}: {}", cloud.rows);
+            assert_eq!(cloud.probes.len(), 2);
+            assert!(cloud.points.len() > cloud.rows && cloud.source.len() == cloud.points.len());
+        }
+    }
+
+    #[test]
+    fn circles_are_spread_by_angle() {
+        for sampling in [Sampling::Regular, Sampling::Random { is_relaxed: true }] {
+            let cloud = circle(2.0, 50, sampling, 3);
+            assert!(cloud.points.iter().all(|x| (x.norm() - 2.0).abs() < 1e-14));
+            let angles: Vec<f64> = cloud.points.iter().map(|x| x[1].atan2(x[0])).collect();
+            assert_eq!(angles.len(), 50);
+        }
     }
 }

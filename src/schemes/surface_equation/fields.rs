@@ -12,11 +12,25 @@ pub enum ExactField {
         l: u32,
         /// Order, |m| ≤ l.
         m: i32,
+        /// The axis that takes the place of z, the two behind it those of x and y.
+        axis: usize,
     },
     /// sin(k·x), on any surface.
     PlaneWave {
         /// k.
         k: Vector<3>,
+    },
+    /// sin mθ + cos mθ on a circle about the origin.
+    SinPlusCos {
+        /// m.
+        m: u32,
+    },
+    /// ζ(|x − c|/σ)/σ² with ζ(d) = exp(−1/(1 − d²)) below d = .975: no eigenfunction, and no operator of it is known here.
+    TruncatedGaussian {
+        /// c.
+        center: Vector<3>,
+        /// σ.
+        sigma: f64,
     },
 }
 
@@ -25,8 +39,16 @@ impl ExactField {
     #[must_use]
     pub fn value(&self, x: &Vector<3>) -> f64 {
         match self {
-            Self::SphericalHarmonic { l, m } => spherical_harmonic(*l, *m, x),
+            Self::SphericalHarmonic { l, m, axis } => spherical_harmonic(*l, *m, &turned(x, *axis)),
             Self::PlaneWave { k } => k.dot(x).sin(),
+            Self::SinPlusCos { m } => {
+                let angle = f64::from(*m) * x[1].atan2(x[0]);
+                angle.sin() + angle.cos()
+            }
+            Self::TruncatedGaussian { center, sigma } => {
+                let d = (x - center).norm() / sigma;
+                if d < 0.975 { (-1.0 / (1.0 - d * d)).exp() / (sigma * sigma) } else { 0.0 }
+            }
         }
     }
 
@@ -34,15 +56,31 @@ impl ExactField {
     #[must_use]
     pub fn laplace_beltrami(&self, x: &Vector<3>, n: &Vector<3>, curvature: f64) -> f64 {
         match self {
-            Self::SphericalHarmonic { l, m } => {
-                -f64::from(l * (l + 1)) / x.norm_squared() * spherical_harmonic(*l, *m, x)
-            }
+            Self::SphericalHarmonic { l, .. } => -f64::from(l * (l + 1)) / x.norm_squared() * self.value(x),
             Self::PlaneWave { k } => {
                 let (phase, along) = (k.dot(x), k.dot(n));
                 -(k.norm_squared() - along * along) * phase.sin() - curvature * along * phase.cos()
             }
+            Self::SinPlusCos { .. } | Self::TruncatedGaussian { .. } => {
+                self.decay(x.norm()).map_or(f64::NAN, |rate| -rate * self.value(x))
+            }
         }
     }
+
+    /// λ with Δ_S f = −λ f on a sphere or a circle of a radius, for eigenfunctions.
+    #[must_use]
+    pub fn decay(&self, radius: f64) -> Option<f64> {
+        match self {
+            Self::SphericalHarmonic { l, .. } => Some(f64::from(l * (l + 1)) / (radius * radius)),
+            Self::SinPlusCos { m } => Some(f64::from(m * m) / (radius * radius)),
+            Self::PlaneWave { .. } | Self::TruncatedGaussian { .. } => None,
+        }
+    }
+}
+
+/// Coordinates with `axis` as the third.
+fn turned(x: &Vector<3>, axis: usize) -> Vector<3> {
+    Vector::<3>::new(x[(axis + 1) % 3], x[(axis + 2) % 3], x[axis % 3])
 }
 
 /// Y_lm at the direction of x, by the recurrence in l of normalised associated Legendre functions.

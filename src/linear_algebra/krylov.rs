@@ -1,0 +1,158 @@
+//! Iterative solution of large sparse systems, with incomplete factors as preconditioner. One file a method.
+
+pub mod bicgstab;
+pub mod gmres;
+pub mod incomplete_factors;
+
+pub use incomplete_factors::IncompleteFactors;
+
+use super::SparseRows;
+use super::least_squares::dot;
+
+/// A linear map of a space onto itself.
+pub trait LinearMap: Sync {
+    /// Unknowns.
+    fn size(&self) -> usize;
+    /// out = A x.
+    fn apply(&self, x: &[f64], out: &mut [f64]);
+}
+
+impl LinearMap for SparseRows {
+    fn size(&self) -> usize {
+        self.rows()
+    }
+
+    fn apply(&self, x: &[f64], out: &mut [f64]) {
+        Self::apply(self, x, out);
+    }
+}
+
+/// A + α 1 1ᵀ/n: what an operator that constants are lost to becomes when solutions without mean are wanted.
+#[derive(Debug)]
+pub struct WithMean<'a> {
+    /// A.
+    pub rows: &'a SparseRows,
+    /// α.
+    pub alpha: f64,
+}
+
+impl LinearMap for WithMean<'_> {
+    fn size(&self) -> usize {
+        self.rows.rows()
+    }
+
+    fn apply(&self, x: &[f64], out: &mut [f64]) {
+        self.rows.apply(x, out);
+        let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+        out.iter_mut().for_each(|value| *value += self.alpha * mean);
+    }
+}
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stopping {
+    /// ‖b − A x‖ by ‖b‖.
+    pub tolerance: f64,
+    /// Applications of the preconditioned map at most, about.
+    pub most_iterations: u64,
+}
+
+/// What a solution came to.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Convergence {
+    /// Iterations: steps of GMRES, double steps of BiCGSTAB.
+    pub iterations: u64,
+    /// ‖b − A x‖ by ‖b‖ at the end, computed anew.
+    pub residual: f64,
+}
+
+impl Convergence {
+    /// Whether the goal was reached, up to the rounding between the residual of the recurrence and the true one.
+    #[must_use]
+    pub fn is_within(&self, stopping: Stopping) -> bool {
+        self.residual <= 10.0 * stopping.tolerance
+    }
+
+    fn of(map: &dyn LinearMap, b: &[f64], x: &[f64], iterations: u64, room: &mut Vec<f64>) -> Self {
+        room.resize(b.len(), 0.0);
+        map.apply(x, room);
+        room.iter_mut().zip(b).for_each(|(a, b)| *a = b - *a);
+        let size = norm(b);
+        Self { iterations, residual: if size > 0.0 { norm(room) / size } else { norm(room) } }
+    }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    dot(v, v).sqrt()
+}
+
+/// y += a x.
+fn add(y: &mut [f64], a: f64, x: &[f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y += a * x);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{IncompleteFactors, LinearMap, SparseRows, Stopping, WithMean, bicgstab, gmres};
+
+    /// Advection and diffusion on a ring or a line: not symmetric.
+    fn operator(n: usize, is_ring: bool) -> SparseRows {
+        let mut rows = SparseRows::default();
+        for i in 0..n {
+            let mut columns = Vec::new();
+            let mut weights = Vec::new();
+            for (j, w) in [((i + n - 1) % n, 1.3), (i, -2.1 + if is_ring { 0.1 } else { 0.0 }), ((i + 1) % n, 0.7)] {
+                if is_ring || j.abs_diff(i) <= 1 {
+                    columns.push(j as u32);
+                    weights.push(w);
+                }
+            }
+            rows.push_row(&columns, &weights);
+        }
+        rows.sorted()
+    }
+
+    const STOPPING: Stopping = Stopping { tolerance: 1e-11, most_iterations: 2000 };
+
+    #[test]
+    fn both_methods_solve_what_is_not_symmetric() {
+        let a = operator(300, false);
+        let exact: Vec<f64> = (0..300).map(|i| f64::from(i).sin()).collect();
+        let mut b = vec![0.0; 300];
+        a.apply(&exact, &mut b);
+        // An incomplete factorization of three diagonals is a complete one; half of A's neighbours make it one that is not.
+        let factors = IncompleteFactors::of(&operator(300, true).sorted()).unwrap();
+        let mut x = vec![0.0; 300];
+        let found = bicgstab::solve(&a, &factors, &b, &mut x, STOPPING, &mut bicgstab::Storage::default());
+        assert!(found.residual < 1e-10, "{found:?}");
+        assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-6));
+        let mut x = vec![0.0; 300];
+        let found = gmres::solve(&a, &factors, &b, &mut x, 40, STOPPING, &mut gmres::Storage::default());
+        assert!(found.residual < 1e-10 && found.iterations > 0, "{found:?}");
+        assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-6));
+    }
+
+    #[test]
+    fn a_singular_operator_is_solved_for_what_has_no_mean() {
+        let a = operator(200, true);
+        let exact: Vec<f64> = (0..200).map(|i| (std::f64::consts::TAU * f64::from(i) / 200.0).sin()).collect();
+        let mut b = vec![0.0; 200];
+        a.apply(&exact, &mut b);
+        let map = WithMean { rows: &a, alpha: 1.0 };
+        let factors = IncompleteFactors::of(&a).unwrap();
+        let mut x = vec![0.0; 200];
+        let found = bicgstab::solve(&map, &factors, &b, &mut x, STOPPING, &mut bicgstab::Storage::default());
+        assert!(found.residual < 1e-10, "{found:?}");
+        assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-7));
+        assert_eq!(map.size(), 200);
+    }
+
+    #[test]
+    fn nothing_is_solved_by_nothing() {
+        let a = operator(10, false);
+        let factors = IncompleteFactors::of(&a).unwrap();
+        let (b, mut x) = (vec![0.0; 10], vec![0.0; 10]);
+        let found = bicgstab::solve(&a, &factors, &b, &mut x, STOPPING, &mut bicgstab::Storage::default());
+        assert_eq!((found.residual, x), (0.0, vec![0.0; 10]));
+    }
+}

@@ -1,0 +1,94 @@
+//! GMRES, begun anew every m steps, with right preconditioning (Saad, Schultz, SIAM J. Sci. Stat. Comput. 7, 1986).
+
+use super::{Convergence, IncompleteFactors, LinearMap, Stopping, add, dot, norm};
+
+/// Vectors of a solution, to be used again.
+#[derive(Debug, Default)]
+pub struct Storage {
+    basis: Vec<Vec<f64>>,
+    /// Columns of the triangle that rotations make of the Hessenberg matrix.
+    triangle: Vec<Vec<f64>>,
+    rotations: Vec<(f64, f64)>,
+    right: Vec<f64>,
+    hat: Vec<f64>,
+    room: Vec<f64>,
+}
+
+/// Goes on from `x` to the solution of A x = b, `restart` vectors at a time.
+pub fn solve(
+    map: &dyn LinearMap,
+    factors: &IncompleteFactors,
+    b: &[f64],
+    x: &mut [f64],
+    restart: usize,
+    stopping: Stopping,
+    storage: &mut Storage,
+) -> Convergence {
+    let n = b.len();
+    let Storage { basis, triangle, rotations, right, hat, room } = storage;
+    basis.resize_with(restart + 1, Vec::new);
+    basis.iter_mut().for_each(|vector| vector.resize(n, 0.0));
+    hat.resize(n, 0.0);
+    room.resize(n, 0.0);
+    let goal = stopping.tolerance * norm(b);
+    let mut iterations = 0;
+    loop {
+        let first = &mut basis[0];
+        map.apply(x, first);
+        first.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
+        let beta = norm(first);
+        if beta <= goal || !beta.is_finite() || iterations >= stopping.most_iterations {
+            break;
+        }
+        first.iter_mut().for_each(|r| *r /= beta);
+        triangle.clear();
+        rotations.clear();
+        right.clear();
+        right.push(beta);
+        for k in 0..restart {
+            iterations += 1;
+            factors.solve(&basis[k], hat);
+            let (known, next) = basis.split_at_mut(k + 1);
+            let w = &mut next[0];
+            map.apply(hat, w);
+            let mut column = Vec::with_capacity(k + 2);
+            for v in known.iter() {
+                let h = dot(v, w);
+                add(w, -h, v);
+                column.push(h);
+            }
+            let below = norm(w);
+            if below > 0.0 {
+                w.iter_mut().for_each(|w| *w /= below);
+            }
+            for (j, (c, s)) in rotations.iter().enumerate() {
+                (column[j], column[j + 1]) = (c * column[j] + s * column[j + 1], c * column[j + 1] - s * column[j]);
+            }
+            let length = column[k].hypot(below);
+            let (c, s) = if length > 0.0 { (column[k] / length, below / length) } else { (1.0, 0.0) };
+            column[k] = length;
+            rotations.push((c, s));
+            triangle.push(column);
+            let rest = right[k];
+            right[k] = c * rest;
+            right.push(-s * rest);
+            if right[k + 1].abs() <= goal || below == 0.0 || iterations >= stopping.most_iterations {
+                break;
+            }
+        }
+        // The combination of the basis, from the last to the first.
+        let steps = triangle.len();
+        for k in (0..steps).rev() {
+            let known: f64 = (k + 1..steps).map(|j| triangle[j][k] * right[j]).sum();
+            let pivot = triangle[k][k];
+            right[k] = if pivot.abs() > 0.0 { (right[k] - known) / pivot } else { 0.0 };
+        }
+        room.fill(0.0);
+        for (v, y) in basis.iter().zip(&right[..steps]) {
+            add(room, *y, v);
+        }
+        factors.solve(room, hat);
+        add(x, 1.0, hat);
+    }
+    Convergence::of(map, b, x, iterations, room)
+}

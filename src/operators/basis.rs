@@ -1,0 +1,121 @@
+//! Polynomials of M coordinates up to a total degree, without the constant: products of Chebyshev
+//! polynomials, which keep the moment matrix well conditioned up to degree 7, less their value at the origin, so that a fit
+//! takes the value of its point exactly.
+
+use crate::linear_algebra::number::{Lanes, Number};
+use crate::polynomials::multi_index::MultiIndexSet;
+
+/// Highest degree.
+pub(super) const MOST_DEGREE: usize = 7;
+
+/// T_n^(k)(0) for n and k up to the highest degree, from T_{n+1} = 2 x T_n − T_{n−1}.
+fn derivatives_at_origin() -> [[f64; MOST_DEGREE + 1]; MOST_DEGREE + 1] {
+    let mut t = [[0.0; MOST_DEGREE + 1]; MOST_DEGREE + 1];
+    t[0][0] = 1.0;
+    t[1][1] = 1.0;
+    for n in 2..=MOST_DEGREE {
+        for k in 0..=MOST_DEGREE {
+            let rise = if k > 0 { 2.0 * k as f64 * t[n - 1][k - 1] } else { 0.0 };
+            t[n][k] = rise - t[n - 2][k];
+        }
+    }
+    t
+}
+
+/// The functions ∏ T_{a_d}(x_d) − ∏ T_{a_d}(0) with 1 ≤ Σ a_d ≤ degree, by total degree.
+#[derive(Debug, Clone)]
+pub(super) struct Basis<const M: usize> {
+    degree: usize,
+    /// Degrees of the factors, and the value at the origin.
+    functions: Vec<([u8; M], f64)>,
+    /// ∂^α of every function at the origin, for the α of every function in their order.
+    derivatives: Vec<f64>,
+}
+
+impl<const M: usize> Basis<M> {
+    pub fn new(degree: usize) -> Self {
+        let degree = degree.min(MOST_DEGREE);
+        let at_origin = derivatives_at_origin();
+        let set = MultiIndexSet::<M>::total_degree(degree);
+        let indices = &set.indices()[1..];
+        let derivative = |of: &[u8; M], alpha: &[u8; M]| -> f64 {
+            of.iter().zip(alpha).map(|(n, k)| at_origin[usize::from(*n)][usize::from(*k)]).product()
+        };
+        let functions = indices.iter().map(|a| (*a, derivative(a, &[0; M]))).collect();
+        let derivatives = indices.iter().flat_map(|alpha| indices.iter().map(|a| derivative(a, alpha))).collect();
+        Self { degree, functions, derivatives }
+    }
+
+    /// How many functions there are.
+    pub fn size(&self) -> usize {
+        self.functions.len()
+    }
+
+    /// The values of all functions at a place, scaled coordinates.
+    #[inline(always)]
+    pub fn values(&self, x: [Lanes; M], out: &mut [Lanes]) {
+        let one = Lanes::splat(1.0);
+        let mut t = [[one; MOST_DEGREE + 1]; M];
+        for (t, x) in t.iter_mut().zip(x) {
+            t[1] = x;
+            for n in 2..=self.degree {
+                t[n] = Number::mul_add(x + x, t[n - 1], -t[n - 2]);
+            }
+        }
+        for (out, (a, origin)) in out.iter_mut().zip(&self.functions) {
+            let mut product = t[0][usize::from(a[0]) & MOST_DEGREE];
+            for d in 1..M - 1 {
+                product *= t[d][usize::from(a[d]) & MOST_DEGREE];
+            }
+            let last = if M > 1 { t[M - 1][usize::from(a[M - 1]) & MOST_DEGREE] } else { one };
+            *out = Number::mul_add(product, last, Lanes::splat(-origin));
+        }
+    }
+
+    /// ∂^α of every function at the origin, in scaled coordinates; none for α = 0 or beyond the degree.
+    pub fn derivative(&self, alpha: &[u8; M]) -> Option<&[f64]> {
+        let place = self.functions.iter().position(|(a, _)| a == alpha)?;
+        Some(&self.derivatives[place * self.size()..(place + 1) * self.size()])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Basis, Lanes};
+
+    fn at<const M: usize>(basis: &Basis<M>, x: [f64; M]) -> Vec<f64> {
+        let mut out = vec![Lanes::splat(0.0); basis.size()];
+        basis.values(x.map(Lanes::splat), &mut out);
+        out.iter().map(|v| v.to_array()[0]).collect()
+    }
+
+    fn check<const M: usize>(degree: usize) {
+        let basis = Basis::<M>::new(degree);
+        let step = 1e-3;
+        assert!(at(&basis, [0.0; M]).iter().all(|value| *value == 0.0));
+        for d in 0..M {
+            let moved = |by: f64| at(&basis, std::array::from_fn(|k| if k == d { by } else { 0.0 }));
+            let (up, down) = (moved(step), moved(-step));
+            let unit = |order: u8| std::array::from_fn::<u8, M, _>(|k| if k == d { order } else { 0 });
+            let (first, second) = (basis.derivative(&unit(1)).unwrap(), basis.derivative(&unit(2)).unwrap());
+            for k in 0..basis.size() {
+                assert!(((up[k] - down[k]) / (2.0 * step) - first[k]).abs() < 1e-3);
+                assert!(((up[k] + down[k]) / (step * step) - second[k]).abs() < 1e-2);
+            }
+        }
+        assert!(basis.derivative(&[0; M]).is_none());
+    }
+
+    #[test]
+    fn functions_vanish_at_the_origin_and_their_derivatives_are_those_of_differences() {
+        for degree in [3, 5, 7] {
+            check::<1>(degree);
+            check::<2>(degree);
+            check::<3>(degree);
+        }
+        let basis = Basis::<2>::new(3);
+        // x y has ∂_xy = 1.
+        let mixed = basis.derivative(&[1, 1]).unwrap();
+        assert_eq!(mixed.iter().filter(|v| **v != 0.0).count(), 1);
+    }
+}

@@ -1,0 +1,55 @@
+//! Points of the plane or of space as they are: DC-PSE in flat space (Surface DC-PSE paper, section 2).
+
+use super::{Chart, Functional, Heights, Node, first, second};
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+
+/// Points of a domain.
+#[derive(Debug)]
+pub struct FlatChart<'a, const D: usize> {
+    points: &'a [Vector<D>],
+    cells: CellList<D>,
+}
+
+impl<'a, const D: usize> FlatChart<'a, D> {
+    /// Of points in a domain, which may be periodic; `radius` is the support's.
+    #[must_use]
+    pub fn new(points: &'a [Vector<D>], domain: Domain<D>, radius: f64) -> Self {
+        let mut cells = CellList::new(domain);
+        cells.rebuild(points.iter().copied(), radius);
+        Self { points, cells }
+    }
+}
+
+impl<const D: usize> Chart<D> for FlatChart<'_, D> {
+    fn count(&self) -> usize {
+        self.points.len()
+    }
+
+    fn gather(&self, i: usize, reach: f64, near: &mut Vec<Node<D>>) {
+        near.clear();
+        let inverse = 1.0 / reach;
+        // `dx` is x_j − x_i, over the edge of a periodic domain where that is nearer.
+        self.cells.for_each_within(&self.points[i], reach, |j, dx, square| {
+            if j != i {
+                let rest = (1.0 - square * inverse * inverse).max(0.0);
+                let window = rest * rest;
+                near.push(Node { index: j as u32, at: (dx * inverse).into(), window: window * window, height: 0.0 });
+            }
+        });
+    }
+
+    fn terms(
+        &self,
+        functional: Functional<D>,
+        _i: usize,
+        _heights: Option<&Heights<D>>,
+        terms: &mut Vec<([u8; D], f64)>,
+    ) {
+        match functional {
+            Functional::Partial(alpha) => terms.push((alpha, 1.0)),
+            Functional::LaplaceBeltrami => terms.extend((0..D).map(|d| (second(d, d), 1.0))),
+            Functional::Gradient(axis) => terms.push((first(axis), 1.0)),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Copies of the points of a surface along their normals, fitted in space: the paper's form of Surface DC-PSE (section 3,
+//! algorithms 1 and 2). The kernel values of the copies of a point are added up to the weight of that point.
+
+use super::{Chart, Functional, Heights, Node, first, second};
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+
+/// Points of a surface with normals.
+#[derive(Debug)]
+pub struct NormalCopies<'a, const D: usize> {
+    points: &'a [Vector<D>],
+    normals: &'a [Vector<D>],
+    layers: i32,
+    spacing: f64,
+    cells: CellList<D>,
+}
+
+/// The mean L1 distance of the nodes from the centre by the width ε of the window (Surface DC-PSE paper, eq. 8; the value of
+/// the paper's programme).
+const SPACING_BY_WIDTH: f64 = 0.9;
+
+impl<'a, const D: usize> NormalCopies<'a, D> {
+    /// `layers` N_n of copies to either side, `spacing` δn apart; `radius` is the support's.
+    #[must_use]
+    pub fn new(points: &'a [Vector<D>], normals: &'a [Vector<D>], layers: u32, spacing: f64, radius: f64) -> Self {
+        let mut cells = CellList::new(Domain::unbounded());
+        cells.rebuild(points.iter().copied(), radius);
+        Self { points, normals, layers: layers as i32, spacing, cells }
+    }
+}
+
+impl<const D: usize> Chart<D> for NormalCopies<'_, D> {
+    fn count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Its supports are what was asked for: the rank of a narrow one is met by a rank-revealing solution.
+    fn may_grow(&self) -> bool {
+        false
+    }
+
+    fn gather(&self, i: usize, reach: f64, near: &mut Vec<Node<D>>) {
+        near.clear();
+        let x = self.points[i];
+        let inverse = 1.0 / reach;
+        let mut spread = 0.0;
+        let mut add = |j: usize, layer: i32| {
+            let d = self.points[j] + self.normals[j] * (f64::from(layer) * self.spacing) - x;
+            if d.norm_squared() <= reach * reach {
+                spread += d.abs().sum() * inverse;
+                near.push(Node { index: j as u32, at: (d * inverse).into(), window: 0.0, height: 0.0 });
+            }
+        };
+        self.cells.for_each_within(&x, reach, |j, _, _| {
+            if j != i {
+                (-self.layers..=self.layers).for_each(|layer| add(j, layer));
+            }
+        });
+        (-self.layers..=self.layers).filter(|layer| *layer != 0).for_each(|layer| add(i, layer));
+        let width = spread / near.len().max(1) as f64 / SPACING_BY_WIDTH;
+        for node in near.iter_mut() {
+            let square: f64 = node.at.iter().map(|c| c * c).sum();
+            node.window = (-square / (width * width)).exp();
+        }
+    }
+
+    fn terms(
+        &self,
+        functional: Functional<D>,
+        _i: usize,
+        _heights: Option<&Heights<D>>,
+        terms: &mut Vec<([u8; D], f64)>,
+    ) {
+        match functional {
+            Functional::Partial(alpha) => terms.push((alpha, 1.0)),
+            Functional::LaplaceBeltrami => terms.extend((0..D).map(|d| (second(d, d), 1.0))),
+            Functional::Gradient(axis) => terms.push((first(axis), 1.0)),
+        }
+    }
+}

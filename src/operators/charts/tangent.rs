@@ -1,0 +1,145 @@
+//! The tangent plane at a point of a surface: Surface DC-PSE in its intrinsic form (Surface DC-PSE paper, section 3, with the
+//! copies along normals eliminated).
+//!
+//! Extension along normals makes a field constant there, so that with coordinates (X, Y) of the neighbours on the tangent plane
+//! Δ_S f = f_XX + f_YY exactly: the plane touches the surface to second order, and the metric of the projection is
+//! the identity up to it. Where normals are not exact, the heights Z(X, Y) of the surface over the plane are fitted
+//! with the same weights, and g_ab = δ_ab + Z_a Z_b with its Christoffel symbols Γ^c_ab = Z_c Z_ab/(1 + |∇Z|²) takes the place
+//! of the identity.
+
+use super::{Chart, Functional, Heights, Node, first, second, tangents};
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+
+/// Where the metric comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Metric {
+    /// Normals are exact.
+    OfNormals,
+    /// Heights over the plane are fitted.
+    OfHeights,
+}
+
+/// Points of a surface with normals, M = D − 1.
+#[derive(Debug)]
+pub struct TangentChart<'a, const D: usize> {
+    points: &'a [Vector<D>],
+    normals: &'a [Vector<D>],
+    /// Points that get a row: the first so many; whose value each takes.
+    rows: usize,
+    source: Option<&'a [u32]>,
+    scales: Option<&'a [f64]>,
+    metric: Metric,
+    cells: CellList<D>,
+}
+
+/// Cosine of normals beyond which a point belongs to another sheet.
+pub const SAME_SHEET: f64 = 0.5;
+
+impl<'a, const D: usize> TangentChart<'a, D> {
+    /// Of points and unit normals; `radius` is the support's.
+    #[must_use]
+    pub fn new(points: &'a [Vector<D>], normals: &'a [Vector<D>], metric: Metric, radius: f64) -> Self {
+        let mut cells = CellList::new(Domain::unbounded());
+        cells.rebuild(points.iter().copied(), radius);
+        Self { points, normals, rows: points.len(), source: None, scales: None, metric, cells }
+    }
+
+    /// Points from `rows` on are images of others: they take the value of `source` and have no row.
+    #[must_use]
+    pub fn with_images(mut self, rows: usize, source: &'a [u32]) -> Self {
+        (self.rows, self.source) = (rows, Some(source));
+        self
+    }
+
+    /// Supports of the points by the radius.
+    #[must_use]
+    pub fn with_scales(mut self, scales: &'a [f64]) -> Self {
+        self.scales = Some(scales);
+        self
+    }
+}
+
+impl<const D: usize> TangentChart<'_, D> {
+    /// Whose image a point is, or itself.
+    fn owner(&self, j: usize) -> usize {
+        self.source.map_or(j, |source| source[j] as usize)
+    }
+}
+
+impl<const D: usize, const M: usize> Chart<M> for TangentChart<'_, D> {
+    fn count(&self) -> usize {
+        self.rows
+    }
+
+    fn scale(&self, i: usize) -> f64 {
+        self.scales.map_or(1.0, |scales| scales[i])
+    }
+
+    fn needs_heights(&self) -> bool {
+        self.metric == Metric::OfHeights
+    }
+
+    fn gather(&self, i: usize, reach: f64, near: &mut Vec<Node<M>>) {
+        near.clear();
+        let (x, n) = (self.points[i], self.normals[i]);
+        let t = tangents::<D, M>(&n);
+        let inverse = 1.0 / reach;
+        self.cells.for_each_within(&x, reach, |j, _, square| {
+            if j != i && self.normals[j].dot(&n) > SAME_SHEET {
+                let d = self.points[j] - x;
+                let rest = (1.0 - square * inverse * inverse).max(0.0);
+                let window = rest * rest;
+                // Points count by the area that they stand for: else the denser side of a support would decide.
+                let share = self.scales.map_or(1.0, |scales| scales[self.owner(j)].powi(2));
+                near.push(Node {
+                    index: self.owner(j) as u32,
+                    at: t.map(|t| d.dot(&t) * inverse),
+                    window: window * window * share,
+                    height: d.dot(&n) * inverse,
+                });
+            }
+        });
+    }
+
+    fn terms(
+        &self,
+        functional: Functional<M>,
+        i: usize,
+        heights: Option<&Heights<M>>,
+        terms: &mut Vec<([u8; M], f64)>,
+    ) {
+        // Without heights the plane touches: the metric is the identity.
+        let flat = Heights { first: [0.0; M], second: [[0.0; M]; M] };
+        let h = heights.unwrap_or(&flat);
+        let det = 1.0 + h.first.iter().map(|slope| slope * slope).sum::<f64>();
+        let inverse = |a: usize, b: usize| f64::from(u8::from(a == b)) - h.first[a] * h.first[b] / det;
+        match functional {
+            Functional::Partial(alpha) => terms.push((alpha, 1.0)),
+            Functional::LaplaceBeltrami => {
+                // g^ab (f_ab − Γ^c_ab f_c)
+                let mut bend = 0.0;
+                for a in 0..M {
+                    for b in 0..M {
+                        if heights.is_some() || a == b {
+                            terms.push((second(a, b), inverse(a, b)));
+                        }
+                        bend += inverse(a, b) * h.second[a][b];
+                    }
+                }
+                if heights.is_some() {
+                    terms.extend((0..M).map(|c| (first(c), -bend * h.first[c] / det)));
+                }
+            }
+            Functional::Gradient(axis) => {
+                // g^ab f_b e_a with e_a = t_a + Z_a n
+                let n = self.normals[i];
+                let t = tangents::<D, M>(&n);
+                for b in 0..M {
+                    let part = (0..M).map(|a| inverse(a, b) * (t[a][axis] + h.first[a] * n[axis])).sum();
+                    terms.push((first(b), part));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Surfaces made of points: how they are spread, their normals, and what is wrong with them.
+
+pub mod bump;
+pub mod normals;
+pub mod relaxation;
+
+pub use bump::Bump;

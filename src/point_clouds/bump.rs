@@ -1,0 +1,314 @@
+//! A plane with a bump (Surface DC-PSE paper, section 4.4): the graph u(x) = α ζ(|x − p|/r) over [−2, 2]² with
+//! p = (−.5, 0), r = .25 and ζ(d) = exp(−1/(1 − d²)), cut off at d = .975.
+
+use crate::geometry::{Vector, fibonacci};
+
+/// The surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bump {
+    /// α.
+    pub height: f64,
+}
+
+/// Half the side of the square.
+pub const HALF_SIDE: f64 = 2.0;
+/// p.
+pub const CENTER: [f64; 2] = [-0.5, 0.0];
+/// r.
+pub const RADIUS: f64 = 0.25;
+/// Spacing by the least radius of curvature.
+const BEND: f64 = 0.45;
+/// The spacing for which that holds: the paper's. Finer clouds are as much finer everywhere.
+const REFERENCE_SPACING: f64 = 1.0 / 32.0;
+/// Least spacing on the bump by that of the lattice.
+const LEAST_RATIO: f64 = 0.1;
+/// Change of the spacing along the surface, by the way.
+const GRADE: f64 = 0.1;
+/// How far graded points reach: spacings are those of the lattice again there, and no initial field about the origin is cut.
+const OUTER: f64 = 0.7;
+/// Annuli by which the area of a bump is added up.
+const RINGS: usize = 4000;
+/// Parts of a cell along an axis by which areas next to the graded points are added up.
+const PARTS: usize = 16;
+/// Where ζ is cut off: it is exp(−20) there.
+const CUT: f64 = 0.975;
+
+/// ζ and its first two derivatives.
+fn zeta(d: f64) -> [f64; 3] {
+    if d >= CUT {
+        return [0.0; 3];
+    }
+    let rest = 1.0 - d * d;
+    let value = (-1.0 / rest).exp();
+    // ln ζ = −1/(1 − d²)
+    let first = -2.0 * d / (rest * rest);
+    let second = -2.0 / (rest * rest) - 8.0 * d * d / rest.powi(3);
+    [value, value * first, value * (first * first + second)]
+}
+
+/// A point of the graph with what is known there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BumpPoint {
+    /// Point.
+    pub point: Vector<3>,
+    /// Upward unit normal.
+    pub normal: Vector<3>,
+    /// ∇·n.
+    pub curvature: f64,
+    /// Gauss curvature.
+    pub gauss: f64,
+}
+
+impl Bump {
+    /// Slope of the profile at a distance from p.
+    fn slope(&self, rho: f64) -> f64 {
+        self.height * zeta(rho / RADIUS)[1] / RADIUS
+    }
+
+    /// The point above (x, y).
+    #[must_use]
+    pub fn above(&self, x: f64, y: f64) -> BumpPoint {
+        let (dx, dy) = (x - CENTER[0], y - CENTER[1]);
+        let rho = dx.hypot(dy);
+        let [value, first, second] = zeta(rho / RADIUS);
+        let (value, first) = (self.height * value, self.height * first / RADIUS);
+        let second = self.height * second / (RADIUS * RADIUS);
+        let (ex, ey) = if rho > 0.0 { (dx / rho, dy / rho) } else { (1.0, 0.0) };
+        // A surface of revolution: principal curvatures along the profile and across it.
+        let stretch = (1.0 + first * first).sqrt();
+        let along = second / stretch.powi(3);
+        let across = if rho > 0.0 { first / (rho * stretch) } else { second };
+        BumpPoint {
+            point: Vector::<3>::new(x, y, value),
+            normal: Vector::<3>::new(-first * ex, -first * ey, 1.0) / stretch,
+            curvature: -(along + across),
+            gauss: along * across,
+        }
+    }
+
+    /// How dense points are on the bump.
+    fn grading(&self) -> Grading {
+        let ring = OUTER / RINGS as f64;
+        let at = |k: usize| self.above(CENTER[0] + k as f64 * ring, CENTER[1]);
+        let mut spacing: Vec<f64> = (0..=RINGS)
+            .map(|k| {
+                // Principal curvatures from their sum and product.
+                let (half, gauss) = (0.5 * at(k).curvature, at(k).gauss);
+                let largest = half.abs() + (half * half - gauss).max(0.0).sqrt();
+                (BEND / (largest * REFERENCE_SPACING)).clamp(LEAST_RATIO, 1.0)
+            })
+            .collect();
+        // From the rim inwards and back: spacings change slowly along the surface.
+        let stretch = |k: usize| (1.0 + self.slope(k as f64 * ring).powi(2)).sqrt();
+        let change = |k: usize| GRADE * ring * stretch(k) / REFERENCE_SPACING;
+        for k in (0..RINGS).rev() {
+            spacing[k] = spacing[k].min(spacing[k + 1] + change(k));
+        }
+        for k in 1..=RINGS {
+            spacing[k] = spacing[k].min(spacing[k - 1] + change(k));
+        }
+        let density = |k: usize| std::f64::consts::TAU * k as f64 * ring * stretch(k);
+        let (mut cumulated, mut area) = (vec![0.0], 0.0);
+        for k in 0..RINGS {
+            let points = |k: usize| density(k) / spacing[k].powi(2);
+            cumulated.push(cumulated[k] + 0.5 * ring * (points(k) + points(k + 1)));
+            area += 0.5 * ring * (density(k) + density(k + 1));
+        }
+        Grading { spacing, cumulated, area }
+    }
+
+    /// Cells a side for which there are about so many points.
+    #[must_use]
+    pub fn cells(&self, count: u64) -> usize {
+        let grading = self.grading();
+        let squares = (2.0 * HALF_SIDE).powi(2) - std::f64::consts::PI * OUTER.powi(2) + grading.squares();
+        // Nodes on the edges are half outside.
+        let cells = 2.0 * HALF_SIDE * (count as f64 / squares).sqrt();
+        ((cells - 1.0).round() as usize).max(4)
+    }
+
+    /// Points with the area and the share of the lattice's spacing of each: nodes of a lattice of `cells` a side where it is flat,
+    /// graded Fibonacci points on the bump, and the `probes`, which are points themselves.
+    #[must_use]
+    pub fn points(&self, cells: usize, probes: &[[f64; 2]]) -> BumpPoints {
+        let spacing = 2.0 * HALF_SIDE / cells as f64;
+        let grading = self.grading();
+        let mut found = BumpPoints::default();
+        let count = (grading.squares() / (spacing * spacing)).ceil() as usize;
+        for x in fibonacci::of_revolution(count, |s| grading.share(s), |s| (s * OUTER, 0.0)) {
+            let ratio = grading.ratio(x[0].hypot(x[1]) / OUTER);
+            found.points.push(self.above(CENTER[0] + x[0], CENTER[1] + x[1]));
+            found.areas.push((ratio * spacing).powi(2));
+            found.ratios.push(ratio);
+        }
+        let scale = grading.area / found.areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        found.areas.iter_mut().for_each(|area| *area *= scale);
+        let gap = 0.35 * spacing * grading.ratio(1.0);
+        let is_clear = |x: f64, y: f64| (x - CENTER[0]).hypot(y - CENTER[1]) >= OUTER + gap;
+        let edge = |k: usize| if k == 0 || k == cells { 0.5 } else { 1.0 };
+        let mut nodes = Vec::with_capacity((cells + 1) * (cells + 1));
+        for i in 0..=cells {
+            for j in 0..=cells {
+                let at = |k: usize| -HALF_SIDE + k as f64 * spacing;
+                let is_there = is_clear(at(i), at(j));
+                nodes.push(is_there.then_some(found.points.len()));
+                if is_there {
+                    found.points.push(self.above(at(i), at(j)));
+                    found.areas.push(edge(i) * edge(j) * spacing * spacing);
+                    found.ratios.push(1.0);
+                }
+            }
+        }
+        share_out_the_rim(&mut found, &nodes, cells);
+        for probe in probes {
+            let probe = self.above(probe[0], probe[1]);
+            let nearest = found.points.iter().enumerate().map(|(k, p)| (k, (p.point - probe.point).norm()));
+            let (nearest, _) = nearest.fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
+            // The nearest point gives its place up.
+            found.points[nearest] = probe;
+        }
+        found
+    }
+}
+
+/// Points of a bump.
+#[derive(Debug, Clone, Default)]
+pub struct BumpPoints {
+    /// Points.
+    pub points: Vec<BumpPoint>,
+    /// The area that each stands for.
+    pub areas: Vec<f64>,
+    /// Spacing about each by that of the lattice.
+    pub ratios: Vec<f64>,
+}
+
+/// Spacing on the bump by that of the lattice, over equal rings of the plane below it, and the cumulated number of points in
+/// squares of the lattice.
+struct Grading {
+    spacing: Vec<f64>,
+    cumulated: Vec<f64>,
+    area: f64,
+}
+
+impl Grading {
+    fn squares(&self) -> f64 {
+        self.cumulated.last().copied().unwrap_or(0.0)
+    }
+
+    fn between(of: &[f64], s: f64) -> f64 {
+        let rings = of.len() - 1;
+        let place = s.clamp(0.0, 1.0) * rings as f64;
+        let k = (place as usize).min(rings - 1);
+        of[k] + (place - k as f64) * (of[k + 1] - of[k])
+    }
+
+    fn ratio(&self, s: f64) -> f64 {
+        Self::between(&self.spacing, s)
+    }
+
+    fn share(&self, s: f64) -> f64 {
+        Self::between(&self.cumulated, s) / self.squares()
+    }
+}
+
+/// Gives the plane next to the graded points, which cut through cells, to the nearest nodes that are there. `nodes` tells
+/// which point a node of the lattice is.
+fn share_out_the_rim(found: &mut BumpPoints, nodes: &[Option<usize>], cells: usize) {
+    let spacing = 2.0 * HALF_SIDE / cells as f64;
+    let at = |k: usize| -HALF_SIDE + k as f64 * spacing;
+    let from_center = |x: f64, y: f64| (x - CENTER[0]).hypot(y - CENTER[1]);
+    let is_near = |i: usize, j: usize| (from_center(at(i), at(j)) - OUTER).abs() < 1.5 * spacing;
+    let rim: Vec<(usize, usize)> =
+        (0..=cells).flat_map(|i| (0..=cells).map(move |j| (i, j))).filter(|(i, j)| is_near(*i, *j)).collect();
+    for (i, j) in &rim {
+        if let Some(k) = nodes[i * (cells + 1) + j] {
+            found.areas[k] = 0.0;
+        }
+    }
+    let part = spacing / PARTS as f64;
+    for (i, j) in &rim {
+        for (a, b) in (0..PARTS).flat_map(|a| (0..PARTS).map(move |b| (a, b))) {
+            let x = at(*i) - 0.5 * spacing + (a as f64 + 0.5) * part;
+            let y = at(*j) - 0.5 * spacing + (b as f64 + 0.5) * part;
+            if from_center(x, y) < OUTER {
+                continue;
+            }
+            let mut nearest = (None, f64::INFINITY);
+            for (m, n) in (i.saturating_sub(2)..=(i + 2).min(cells))
+                .flat_map(|m| (j.saturating_sub(2)..=(j + 2).min(cells)).map(move |n| (m, n)))
+            {
+                let distance = (x - at(m)).hypot(y - at(n));
+                if let Some(k) = nodes[m * (cells + 1) + n]
+                    && distance < nearest.1
+                {
+                    nearest = (Some(k), distance);
+                }
+            }
+            if let (Some(k), _) = nearest {
+                found.areas[k] += part * part;
+            }
+        }
+    }
+}
+
+/// Images of points across the edges of the square, within `reach` of them: position, and whose image.
+#[must_use]
+pub fn images(points: &[Vector<3>], reach: f64) -> Vec<(Vector<3>, u32)> {
+    let mut found = Vec::new();
+    for (k, x) in points.iter().enumerate() {
+        // Along each axis: itself, and its image where an edge is near and it does not lie on it.
+        let mirrored = |c: f64| {
+            let edge = HALF_SIDE.copysign(c);
+            let gap = (edge - c).abs();
+            (gap > 1e-12 && gap < reach).then_some(2.0 * edge - c)
+        };
+        let across = [mirrored(x[0]), mirrored(x[1])];
+        for (mx, my) in [(true, false), (false, true), (true, true)] {
+            if let (Some(a), Some(b)) =
+                (if mx { across[0] } else { Some(x[0]) }, if my { across[1] } else { Some(x[1]) })
+            {
+                found.push((Vector::<3>::new(a, b, x[2]), k as u32));
+            }
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Bump, HALF_SIDE, images};
+    use crate::geometry::Vector;
+
+    #[test]
+    fn normals_and_curvatures_are_those_of_differences() {
+        let (bump, step) = (Bump { height: 1.0 }, 1e-4);
+        for (x, y) in [(-0.45, 0.03), (-0.62, -0.1), (-0.5, 0.0), (1.0, 1.0)] {
+            let at = |dx: f64, dy: f64| bump.above(x + dx, y + dy);
+            let here = at(0.0, 0.0);
+            let z = |dx: f64, dy: f64| at(dx * step, dy * step).point[2];
+            let slope = [(z(1.0, 0.0) - z(-1.0, 0.0)) / (2.0 * step), (z(0.0, 1.0) - z(0.0, -1.0)) / (2.0 * step)];
+            let normal = Vector::<3>::new(-slope[0], -slope[1], 1.0).normalize();
+            assert!((normal - here.normal).norm() < 1e-5);
+            // ∇·n over the plane: n does not depend on z.
+            let n = |dx: f64, dy: f64| at(dx * step, dy * step).normal;
+            let [dx, dy] = [(n(1.0, 0.0) - n(-1.0, 0.0)) / (2.0 * step), (n(0.0, 1.0) - n(0.0, -1.0)) / (2.0 * step)];
+            assert!((dx[0] + dy[1] - here.curvature).abs() < 1e-3, "{} {}", dx[0] + dy[1], here.curvature);
+        }
+    }
+
+    #[test]
+    fn areas_add_up_and_images_mirror() {
+        let bump = Bump { height: 0.0 };
+        let found = bump.points(64, &[[-0.5, 0.0]]);
+        // The rim is cut into parts of a sixteenth of a cell.
+        assert!((found.areas.iter().sum::<f64>() - 16.0).abs() < 1e-3);
+        let positions: Vec<_> = found.points.iter().map(|p| p.point).collect();
+        let mirrored = images(&positions, 0.2);
+        // Three rows beyond each edge, corners included: 65² nodes become 71².
+        assert_eq!(mirrored.len(), 71 * 71 - 65 * 65);
+        for (x, k) in mirrored {
+            assert!(x[0].abs().max(x[1].abs()) > HALF_SIDE);
+            assert!((x - positions[k as usize]).norm() < 0.4 * 2.0_f64.sqrt() + 1e-12);
+        }
+    }
+}

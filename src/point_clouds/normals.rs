@@ -1,0 +1,166 @@
+//! Unit normals of a surface that is known by its points alone: the plane of least spread through the neighbours of a
+//! point, and signs carried along the tree that turns least.
+
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// A point has too few neighbours to tell a plane.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("point {point} at {at:?} has {neighbors} neighbours within {radius:.4e}: too few for a plane")]
+pub struct NoPlane {
+    /// Which.
+    pub point: usize,
+    /// Where.
+    pub at: Vec<f64>,
+    /// Neighbours.
+    pub neighbors: usize,
+    /// Of the search.
+    pub radius: f64,
+}
+
+/// Normals by planes of least spread within `radius`, oriented alike on each connected part: outward where a part is farthest
+/// along its last axis.
+///
+/// # Errors
+/// [`NoPlane`].
+pub fn estimate<const D: usize>(points: &[Vector<D>], radius: f64) -> Result<Vec<Vector<D>>, NoPlane> {
+    let mut cells = CellList::new(Domain::unbounded());
+    cells.rebuild(points.iter().copied(), radius);
+    let found: Result<Vec<Vector<D>>, NoPlane> =
+        points.par_iter().with_min_len(64).enumerate().map(|(i, x)| plane(&cells, i, x, radius)).collect();
+    let mut normals = found?;
+    orient(points, &cells, radius, &mut normals);
+    Ok(normals)
+}
+
+/// The direction of least spread of the neighbours about their mean, weighted by (1 − r²/R²)².
+fn plane<const D: usize>(cells: &CellList<D>, i: usize, x: &Vector<D>, radius: f64) -> Result<Vector<D>, NoPlane> {
+    let (mut weight, mut count) = (0.0, 0);
+    let mut mean = Vector::<D>::zeros();
+    let mut spread = [[0.0; 3]; 3];
+    cells.for_each_within(x, radius, |_, dx, square| {
+        let w = (1.0 - square / (radius * radius)).powi(2);
+        weight += w;
+        count += 1;
+        mean += dx * w;
+        for a in 0..D {
+            for b in 0..D {
+                spread[a][b] += w * dx[a] * dx[b];
+            }
+        }
+    });
+    if count < D + 1 || weight.is_nan() {
+        return Err(NoPlane { point: i, at: x.iter().copied().collect(), neighbors: count - 1, radius });
+    }
+    for a in 0..D {
+        for b in 0..D {
+            spread[a][b] -= mean[a] * mean[b] / weight;
+        }
+    }
+    // In the plane the third axis must not be the one of least spread.
+    let whole: f64 = (0..D).map(|a| spread[a][a]).sum();
+    for (a, row) in spread.iter_mut().enumerate().skip(D) {
+        row[a] = 2.0 * whole;
+    }
+    let matrix = nalgebra::Matrix3::from_fn(|a, b| spread[a][b]);
+    let eigen = matrix.symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    Ok(Vector::<D>::from_fn(|d, _| eigen.eigenvectors[(d, least)]).normalize())
+}
+
+/// An edge to a point not yet oriented; the heap gives the one that turns least.
+struct Edge {
+    turn: f64,
+    from: usize,
+    to: usize,
+}
+
+impl Ord for Edge {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.turn.total_cmp(&self.turn).then_with(|| (other.to, other.from).cmp(&(self.to, self.from)))
+    }
+}
+
+impl PartialOrd for Edge {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Edge {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Edge {}
+
+/// Gives neighbours the same sign, along the edges that turn least first.
+fn orient<const D: usize>(points: &[Vector<D>], cells: &CellList<D>, radius: f64, normals: &mut [Vector<D>]) {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    // Parts begin at their highest point, where outward is up.
+    order.sort_by(|a, b| points[*b][D - 1].total_cmp(&points[*a][D - 1]).then(a.cmp(b)));
+    let mut is_done = vec![false; points.len()];
+    let mut heap = BinaryHeap::new();
+    for start in order {
+        if is_done[start] {
+            continue;
+        }
+        if normals[start][D - 1] < 0.0 {
+            normals[start] = -normals[start];
+        }
+        is_done[start] = true;
+        let mut at = Some(start);
+        while let Some(from) = at {
+            cells.for_each_within(&points[from], radius, |to, _, _| {
+                if !is_done[to] {
+                    heap.push(Edge { turn: 1.0 - normals[from].dot(&normals[to]).abs(), from, to });
+                }
+            });
+            at = None;
+            while let Some(Edge { from, to, .. }) = heap.pop() {
+                if !is_done[to] {
+                    if normals[from].dot(&normals[to]) < 0.0 {
+                        normals[to] = -normals[to];
+                    }
+                    is_done[to] = true;
+                    at = Some(to);
+                    break;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Vector, estimate};
+    use crate::geometry::fibonacci;
+
+    #[test]
+    fn normals_of_a_sphere_point_outward() {
+        let points = fibonacci::sphere(2000);
+        let radius = 2.5 * (4.0 * std::f64::consts::PI / 2000.0_f64).sqrt();
+        let normals = estimate(&points, radius).unwrap();
+        assert!(points.iter().zip(&normals).all(|(x, n)| x.dot(n) > 0.999));
+    }
+
+    #[test]
+    fn normals_of_a_circle_point_outward() {
+        let points: Vec<_> =
+            (0..100).map(|i| f64::from(i) * 0.0628).map(|a| Vector::<2>::new(a.cos(), a.sin())).collect();
+        let normals = estimate(&points, 0.2).unwrap();
+        assert!(points.iter().zip(&normals).all(|(x, n)| x.dot(n) > 0.99));
+    }
+
+    #[test]
+    fn a_lone_point_is_named() {
+        let mut points = fibonacci::sphere(200);
+        points.push(Vector::<3>::new(9.0, 0.0, 0.0));
+        let failed = estimate(&points, 0.5).unwrap_err();
+        assert_eq!((failed.point, failed.neighbors), (200, 0));
+    }
+}

@@ -1,0 +1,82 @@
+//! Points spread at random over a surface, and relaxed: each is pushed away from its neighbours until they are about equally far.
+
+use crate::geometry::random::CounterRandom;
+use crate::geometry::{Domain, Surface, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
+
+/// Points of a surface in space that are uniform by its area, to a good approximation: uniform points of a thin shell about it,
+/// moved to their closest points; `layer` is the half width of the shell, well below the radii of curvature.
+#[must_use]
+pub fn random(surface: &dyn Surface<3>, count: usize, layer: f64, seed: u64) -> Vec<Vector<3>> {
+    let random = CounterRandom::new(seed);
+    let (low, high) = surface.bounding_box();
+    let (low, high) = (low.add_scalar(-layer), high.add_scalar(layer));
+    let mut found = Vec::with_capacity(count);
+    let mut draw = 0_i64;
+    while found.len() < count {
+        let x = Vector::<3>::from_fn(|d, _| {
+            let unit = 0.5 + 0.5 * random.symmetric(&[draw, d as i64]);
+            low[d] + unit * (high[d] - low[d])
+        });
+        draw += 1;
+        let nearest = surface.nearest(&x);
+        if nearest.distance.abs() <= layer {
+            found.push(nearest.point);
+        }
+    }
+    found
+}
+
+/// Rounds of pushing.
+const ROUNDS: usize = 80;
+/// Reach of the push, by the mean spacing.
+const REACH: f64 = 1.8;
+/// Length of a move, by the mean spacing, for a neighbour at no distance.
+const PUSH: f64 = 0.25;
+
+/// Pushes points along their surface, ρ = 1.8 δn, by PUSH δn Σ (1 − r/ρ)² (x_i − x_j)/r a round, and back onto it.
+pub fn relax(points: &mut Vec<Vector<3>>, spacing: f64, onto: impl Fn(&Vector<3>) -> Vector<3> + Sync) {
+    let mut cells = CellList::new(Domain::unbounded());
+    let reach = REACH * spacing;
+    let mut moved = points.clone();
+    for round in 0..ROUNDS {
+        cells.rebuild(points.iter().copied(), reach);
+        // Moves become smaller towards the end, so that points come to rest.
+        let push = PUSH * spacing * (1.0 - 0.8 * round as f64 / ROUNDS as f64);
+        moved.par_iter_mut().with_min_len(64).enumerate().for_each(|(i, moved)| {
+            let x = points[i];
+            let mut shift = Vector::<3>::zeros();
+            cells.for_each_within(&x, reach, |j, dx, square| {
+                if j != i && square > 0.0 {
+                    let r = square.sqrt();
+                    shift -= dx * ((1.0 - r / reach).powi(2) / r);
+                }
+            });
+            *moved = onto(&(x + shift * push));
+        });
+        std::mem::swap(points, &mut moved);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Surface, Vector, random, relax};
+    use crate::geometry::surfaces::Torus;
+
+    #[test]
+    fn relaxed_points_keep_their_distance_and_their_surface() {
+        let torus = Torus { center: Vector::<3>::zeros(), major_radius: 1.0, minor_radius: 0.4 };
+        let count = 1500;
+        let mut points = random(&torus, count, 0.02, 7);
+        let area = 4.0 * std::f64::consts::PI.powi(2) * 0.4;
+        let spacing = (area / count as f64).sqrt();
+        relax(&mut points, spacing, |x| torus.nearest(x).point);
+        let mut least = f64::INFINITY;
+        for (i, x) in points.iter().enumerate() {
+            assert!(torus.signed_distance(x).abs() < 1e-12);
+            least = points[..i].iter().map(|y| (x - y).norm()).fold(least, f64::min);
+        }
+        assert!(least > 0.6 * spacing, "{}", least / spacing);
+    }
+}

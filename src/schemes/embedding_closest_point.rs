@@ -1,0 +1,8 @@
+//! The embedding closest-point method (Ruuth and Merriman): the baseline that the Surface DC-PSE paper compares with (section
+//! 4.1). A field is extended to a band of grid nodes by interpolation at their closest points, differentiated there, and
+//! interpolated back to the points of the surface.
+
+mod band;
+mod simulation;
+
+pub use simulation::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};

@@ -1,0 +1,354 @@
+//! du/dt = d Δ_S u, with reactions of two substances or without: explicit by Dormand and Prince's pair in fixed or
+//! controlled steps, or implicit by the second backward differentiation formula.
+
+use super::cloud::SurfaceCloud;
+use super::method::Wanted;
+use super::problem::{Problem, Tools, against_exact};
+use super::reactions::Reaction;
+use crate::linear_algebra::SparseRows;
+use crate::linear_algebra::krylov::{IncompleteFactors, Stopping, bicgstab};
+use crate::schemes::measured_errors::entry;
+use crate::simulation::state::check_length;
+use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
+use crate::time::Clock;
+use crate::time::embedded_pair::EmbeddedPair;
+use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
+use std::collections::BTreeMap;
+
+/// How time is integrated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum EvolutionIntegrator {
+    /// Dormand and Prince's pair, one step of it a step.
+    FixedSteps,
+    /// The same, as many steps as keep the error of each below a tolerance.
+    Controlled {
+        /// Root mean square of the error by 1 + |u|.
+        tolerance: f64,
+    },
+    /// (3 u⁺ − 4 u + u⁻)/2Δt = Δ_S u⁺, begun with a backward Euler step.
+    Bdf2(Stopping),
+}
+
+/// What is known exactly of a course.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ExactCourse {
+    /// Nothing.
+    Unknown,
+    /// The initial field times exp(−λ t): it is an eigenfunction.
+    Decay(f64),
+    /// The manufactured solution of the reaction.
+    Manufactured,
+}
+
+/// What evolves.
+#[derive(Debug, Clone)]
+pub struct EvolutionParts {
+    /// u, or u and then v.
+    pub initial: Vec<f64>,
+    /// Reaction of u and v; without one it is pure diffusion.
+    pub reaction: Option<Reaction>,
+    /// Δt of the implicit formula.
+    pub time_step: f64,
+    /// Integrator.
+    pub integrator: EvolutionIntegrator,
+    /// What is known.
+    pub exact: ExactCourse,
+}
+
+/// A field, or two, in time.
+#[derive(Debug)]
+pub struct Evolution {
+    parts: EvolutionParts,
+    values: Vec<f64>,
+    /// Before the last step, for the formula of two steps.
+    previous: Vec<f64>,
+    /// Step of the controlled integrator.
+    inner_step: f64,
+    pair: EmbeddedPair,
+    implicit: Option<(f64, SparseRows, IncompleteFactors)>,
+    storage: bicgstab::Storage,
+    right: Vec<f64>,
+    /// Steps of the pair that were tried.
+    attempts: u64,
+    iterations: u64,
+    /// Largest value at each probe so far.
+    peaks: Vec<f64>,
+    initial_integral: f64,
+    /// Root mean square of du/dt at the end of the last step, of reactions.
+    rate: f64,
+}
+
+impl Evolution {
+    /// At the start, on a cloud.
+    #[must_use]
+    pub fn new<const D: usize>(parts: EvolutionParts, cloud: &SurfaceCloud<D>) -> Self {
+        let values = parts.initial.clone();
+        Self {
+            previous: values.clone(),
+            inner_step: 0.0,
+            pair: EmbeddedPair::default(),
+            implicit: None,
+            storage: bicgstab::Storage::default(),
+            right: Vec::new(),
+            attempts: 0,
+            iterations: 0,
+            peaks: cloud.probes.iter().map(|probe| values[*probe]).collect(),
+            initial_integral: cloud.integral(&values[..cloud.rows]),
+            rate: f64::MAX,
+            values,
+            parts,
+        }
+    }
+
+    /// One step of the pair, or as many as the tolerance asks for.
+    fn explicit(&mut self, operator: &SparseRows, from: Clock, to: Clock) -> Result<(), StepError> {
+        let Self { parts, values, pair, inner_step, attempts, .. } = self;
+        let reaction = parts.reaction.as_ref();
+        let mut slope = |u: &[f64], time: f64, out: &mut [f64]| slopes(operator, reaction, u, time, out);
+        let EvolutionIntegrator::Controlled { tolerance } = parts.integrator else {
+            pair.attempt(values, from.time, to.time, &mut slope);
+            pair.accept(values);
+            *attempts += 1;
+            return Ok(());
+        };
+        let whole = to.time - from.time;
+        if *inner_step <= 0.0 {
+            *inner_step = FIRST_STEP * whole;
+        }
+        let mut time = from.time;
+        loop {
+            let rest = to.time - time;
+            let is_last = *inner_step >= rest * (1.0 - 1e-9);
+            // Two equal steps rather than a whole one and a sliver.
+            let end = if is_last { to.time } else { time + inner_step.min(0.5 * rest) };
+            let length = end - time;
+            let error = pair.attempt(values, time, end, &mut slope);
+            *attempts += 1;
+            let factor = SAFETY * (tolerance / error.max(1e-300)).powf(0.2);
+            if error <= tolerance {
+                pair.accept(values);
+                time = end;
+                // A step that was cut short says nothing against longer ones.
+                let next = length * factor.clamp(0.2, 5.0);
+                *inner_step = if length < *inner_step { next.max(*inner_step) } else { next };
+                if is_last {
+                    return Ok(());
+                }
+            } else {
+                // Also of what is no number.
+                *inner_step = length * if factor > 0.2 { factor.min(0.9) } else { 0.2 };
+                if *inner_step < LEAST_STEP * whole {
+                    let Clock { step, time } = to;
+                    let reason = format!("the tolerance {tolerance:.1e} cannot be kept: the error is {error:.1e}");
+                    return Err(StepError::Unsolved { reason, step, time });
+                }
+            }
+        }
+    }
+
+    /// A step of the implicit formula.
+    fn implicit(&mut self, operator: &SparseRows, stopping: Stopping, from: Clock, to: Clock) -> Result<(), StepError> {
+        let whole = self.parts.time_step;
+        // The first step has nothing before it.
+        let is_first = from.step == 0;
+        let share = if is_first { 1.0 } else { 2.0 / 3.0 };
+        let unsolved = |reason: String| StepError::Unsolved { reason, step: to.step, time: to.time };
+        if self.implicit.as_ref().is_none_or(|(known, ..)| *known != share) {
+            let mut system = operator.sorted();
+            system.change_rows(|i, columns, weights| {
+                for (j, w) in columns.iter().zip(weights.iter_mut()) {
+                    *w = f64::from(u8::from(*j as usize == i)) - share * whole * *w;
+                }
+            });
+            let factors = IncompleteFactors::of(&system).map_err(|failed| unsolved(failed.to_string()))?;
+            self.implicit = Some((share, system, factors));
+        }
+        let Self { implicit: Some((_, system, factors)), values, previous, right, storage, .. } = self else {
+            return Err(unsolved("there is no system".to_owned()));
+        };
+        right.resize(values.len(), 0.0);
+        for ((right, now), before) in right.iter_mut().zip(values.iter()).zip(previous.iter()) {
+            *right = if is_first { *now } else { (4.0 * now - before) / 3.0 };
+        }
+        previous.copy_from_slice(values);
+        let found = bicgstab::solve(system, factors, right, values, stopping, storage);
+        self.iterations += found.iterations;
+        if !found.is_within(stopping) {
+            let reason = format!("{} iterations leave a residual of {:.3e}", found.iterations, found.residual);
+            return Err(unsolved(reason));
+        }
+        Ok(())
+    }
+
+    fn reference(&self, time: f64) -> Option<Vec<f64>> {
+        match (self.parts.exact, &self.parts.reaction) {
+            (ExactCourse::Decay(rate), _) => {
+                Some(self.parts.initial.iter().map(|value| value * (-rate * time).exp()).collect())
+            }
+            (ExactCourse::Manufactured, Some(reaction)) => {
+                let (field, _) = reaction.manufactured.as_ref()?;
+                let of = |k: usize| field.iter().map(move |f| reaction.exact(*f, time)[k]);
+                Some(of(0).chain(of(1)).collect())
+            }
+            _ => None,
+        }
+    }
+
+    /// Unknown fields.
+    fn fields(&self) -> usize {
+        if self.parts.reaction.is_some() { 2 } else { 1 }
+    }
+}
+
+/// First inner step, by the step.
+const FIRST_STEP: f64 = 1e-3;
+/// Inner steps below this share of a step end the run.
+const LEAST_STEP: f64 = 1e-9;
+const SAFETY: f64 = 0.9;
+/// Points that a task works on at least.
+const POINTS: usize = 1024;
+
+/// d Δ_S u and the terms of a reaction.
+fn slopes(operator: &SparseRows, reaction: Option<&Reaction>, u: &[f64], time: f64, out: &mut [f64]) {
+    let Some(reaction) = reaction else {
+        operator.apply(u, out);
+        return;
+    };
+    let rows = operator.rows();
+    let ((u, v), (u_out, v_out)) = (u.split_at(rows), out.split_at_mut(rows));
+    operator.apply(u, u_out);
+    operator.apply(v, v_out);
+    let both = u_out.par_iter_mut().zip(v_out.par_iter_mut()).with_min_len(POINTS).enumerate();
+    both.for_each(|(i, (u_out, v_out))| {
+        let rates = reaction.model.rates(u[i], v[i]);
+        let forcing = match &reaction.manufactured {
+            Some((field, laplacian)) => reaction.forcing(field[i], laplacian[i], time),
+            None => [0.0; 2],
+        };
+        *u_out = reaction.diffusivity[0] * *u_out + rates[0] + forcing[0];
+        *v_out = reaction.diffusivity[1] * *v_out + rates[1] + forcing[1];
+    });
+}
+
+impl<const D: usize> Problem<D> for Evolution {
+    fn wanted(&self) -> Vec<Wanted> {
+        vec![Wanted::LaplaceBeltrami]
+    }
+
+    fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
+        let Tools { cloud, operators, phases, from, to } = tools;
+        let operator = &operators.rows[0];
+        match self.parts.integrator {
+            EvolutionIntegrator::Bdf2(stopping) => {
+                phases.measure("solver/solution", || self.implicit(operator, stopping, from, to))?;
+            }
+            _ => phases.measure("evolution", || self.explicit(operator, from, to))?,
+        }
+        if self.parts.reaction.is_some() {
+            let slope = self.pair.slope();
+            self.rate = (slope.iter().map(|s| s * s).sum::<f64>() / slope.len().max(1) as f64).sqrt();
+        }
+        for (peak, probe) in self.peaks.iter_mut().zip(&cloud.probes) {
+            *peak = peak.max(self.values[*probe]);
+        }
+        Ok(())
+    }
+
+    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
+        let rows = self.values.len() / self.fields();
+        let mut columns = vec![("value", self.values[..rows].to_vec())];
+        if self.fields() == 2 {
+            columns.push(("second_value", self.values[rows..].to_vec()));
+        }
+        if let Some(mut reference) = self.reference(clock.time) {
+            reference.truncate(rows);
+            columns.push(("reference", reference));
+        }
+        columns
+    }
+
+    fn watched(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
+        let mut errors = Vec::new();
+        if let Some(reference) = self.reference(clock.time) {
+            errors = against_exact("value", &self.values, &reference, clock.time, "exact solution at the points");
+        }
+        for (name, peak) in ["probe_0", "probe_1", "probe_2"].into_iter().zip(&self.peaks) {
+            errors.push(entry(name, "peak", *peak, clock.time, "none: the largest value so far"));
+        }
+        let sizes: Vec<f64> = self.parts.initial.iter().map(|value| value.abs()).collect();
+        // A field whose parts cancel has no mass to be lost.
+        let has_mass = self.initial_integral.abs() > 1e-3 * cloud.integral(&sizes[..cloud.rows]);
+        if cloud.areas.is_some() && self.parts.reaction.is_none() && has_mass {
+            let drift = cloud.integral(&self.values) / self.initial_integral - 1.0;
+            errors.push(entry("mass", "relative", drift.abs(), clock.time, "the integral at the start"));
+        }
+        if self.parts.reaction.is_some() {
+            let rows = self.values.len() / 2;
+            let mean = self.values[..rows].iter().sum::<f64>() / rows as f64;
+            let spread = self.values[..rows].iter().map(|u| (u - mean).powi(2)).sum::<f64>() / rows as f64;
+            errors.push(entry("pattern", "std", spread.sqrt(), clock.time, "a state without a pattern"));
+            errors.push(entry("pattern", "rate", self.rate, clock.time, "a steady state"));
+        }
+        errors
+    }
+
+    fn observables(&self, cloud: &SurfaceCloud<D>, _clock: Clock) -> Observables {
+        let rows = self.values.len() / self.fields();
+        let first = &self.values[..rows];
+        let mut row = vec![
+            ("integral", cloud.integral(first)),
+            ("least", first.iter().copied().fold(f64::INFINITY, f64::min)),
+            ("largest", first.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+        ];
+        if self.parts.reaction.is_some() {
+            row.push(("rate", self.rate));
+        }
+        let probes = ["probe_0", "probe_1", "probe_2"].into_iter().zip(&cloud.probes);
+        row.extend(probes.map(|(name, probe)| (name, self.values[*probe])));
+        row
+    }
+
+    fn save(&self, state: &mut State) {
+        state.push_reals("value", &self.values);
+        state.push_reals("previous", &self.previous);
+        state.push_reals("inner_step", &[self.inner_step]);
+        state.push_reals("peaks", &self.peaks);
+        state.push_reals("rate", &[self.rate]);
+        state.push_counts("work", vec![self.attempts, self.iterations]);
+    }
+
+    fn load(&mut self, state: &State) -> Result<(), RestoreError> {
+        let (value, previous) = (state.reals("value")?, state.reals("previous")?);
+        let (inner, peaks, work) = (state.reals("inner_step")?, state.reals("peaks")?, state.counts("work")?);
+        check_length("value", value.len(), self.values.len())?;
+        check_length("previous", previous.len(), self.previous.len())?;
+        check_length("inner_step", inner.len(), 1)?;
+        check_length("peaks", peaks.len(), self.peaks.len())?;
+        check_length("work", work.len(), 2)?;
+        let rate = state.reals("rate")?;
+        check_length("rate", rate.len(), 1)?;
+        self.values.copy_from_slice(value);
+        self.previous.copy_from_slice(previous);
+        self.peaks.copy_from_slice(peaks);
+        (self.inner_step, self.rate) = (inner[0], rate[0]);
+        (self.attempts, self.iterations) = (work[0], work[1]);
+        self.pair.forget();
+        self.implicit = None;
+        Ok(())
+    }
+
+    fn describe(&self, method: &mut BTreeMap<&'static str, String>) {
+        let integrator = match self.parts.integrator {
+            EvolutionIntegrator::FixedSteps => format!("Dormand–Prince, fixed steps, {} of them", self.attempts),
+            EvolutionIntegrator::Controlled { tolerance } => {
+                format!("Dormand–Prince, tolerance {tolerance:.1e}, {} steps tried", self.attempts)
+            }
+            EvolutionIntegrator::Bdf2(_) => format!("BDF2, BiCGSTAB with ILU(0), {} iterations", self.iterations),
+        };
+        method.insert("integrator", integrator);
+    }
+}

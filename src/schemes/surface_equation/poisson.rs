@@ -1,0 +1,213 @@
+//! Δ_S u = f: some points hold their value, or the solution has no mean.
+
+use super::cloud::SurfaceCloud;
+use super::method::Wanted;
+use super::problem::{Problem, Tools, against_exact};
+use crate::linear_algebra::SparseRows;
+use crate::linear_algebra::krylov::{Convergence, IncompleteFactors, LinearMap, Stopping, WithMean, bicgstab, gmres};
+use crate::linear_algebra::sparse_lu::SparseLu;
+use crate::schemes::measured_errors::entry;
+use crate::simulation::state::check_length;
+use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
+use crate::time::Clock;
+use std::collections::BTreeMap;
+
+/// How sparse systems are solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Solver {
+    /// BiCGSTAB with ILU(0).
+    BiCgStab(Stopping),
+    /// GMRES, begun anew so often, with ILU(0).
+    Gmres {
+        /// Vectors.
+        restart: usize,
+        /// When to stop.
+        stopping: Stopping,
+    },
+    /// Sparse LU decomposition.
+    SparseLu,
+}
+
+/// What makes the solution one.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Condition {
+    /// These points hold their exact value.
+    Dirichlet(Vec<usize>),
+    /// Neither the solution nor the exact one has a mean; α of A + α 1 1ᵀ/n.
+    ZeroMean {
+        /// α, of the size of the least eigenvalue that is not zero, with its sign.
+        alpha: f64,
+    },
+}
+
+/// The problem, and its solution once it is there.
+#[derive(Debug)]
+pub struct Poisson {
+    right: Vec<f64>,
+    exact: Vec<f64>,
+    value: Vec<f64>,
+    condition: Condition,
+    solver: Solver,
+    convergence: Convergence,
+}
+
+impl Poisson {
+    /// Δ_S u = `right` with the solution `exact`.
+    #[must_use]
+    pub fn new(right: Vec<f64>, mut exact: Vec<f64>, condition: Condition, solver: Solver) -> Self {
+        if let Condition::ZeroMean { .. } = condition {
+            subtract_mean(&mut exact);
+        }
+        let value = vec![0.0; right.len()];
+        Self { right, exact, value, condition, solver, convergence: Convergence::default() }
+    }
+
+    /// The system: rows of held points become the identity, as large as their diagonal was.
+    fn system(&self, operator: &SparseRows) -> (SparseRows, Vec<f64>) {
+        let (mut rows, mut right) = (operator.sorted(), self.right.clone());
+        if let Condition::Dirichlet(held) = &self.condition {
+            let mut is_held = vec![false; right.len()];
+            held.iter().for_each(|i| is_held[*i] = true);
+            rows.change_rows(|i, columns, weights| {
+                if is_held[i] {
+                    let diagonal = columns.iter().zip(weights.iter()).find(|(j, _)| **j as usize == i);
+                    let size = diagonal.map_or(1.0, |(_, w)| *w);
+                    for (j, w) in columns.iter().zip(weights.iter_mut()) {
+                        *w = if *j as usize == i { size } else { 0.0 };
+                    }
+                    right[i] = size * self.exact[i];
+                }
+            });
+        }
+        (rows, right)
+    }
+}
+
+/// Takes the mean away.
+fn subtract_mean(values: &mut [f64]) {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    values.iter_mut().for_each(|value| *value -= mean);
+}
+
+impl<const D: usize> Problem<D> for Poisson {
+    fn wanted(&self) -> Vec<Wanted> {
+        vec![Wanted::LaplaceBeltrami]
+    }
+
+    fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
+        let Tools { operators, phases, to, .. } = tools;
+        let (rows, right) = phases.measure("solver/assembly", || self.system(&operators.rows[0]));
+        let unsolved = |reason: String| StepError::Unsolved { reason, step: to.step, time: to.time };
+        let with_mean;
+        let map: &dyn LinearMap = match self.condition {
+            Condition::Dirichlet(_) => &rows,
+            Condition::ZeroMean { alpha } => {
+                with_mean = WithMean { rows: &rows, alpha };
+                &with_mean
+            }
+        };
+        let value = &mut self.value;
+        self.convergence = match self.solver {
+            Solver::SparseLu => {
+                let is_bordered = matches!(self.condition, Condition::ZeroMean { .. });
+                let factors = phases.measure("solver/factors", || SparseLu::of(&rows, is_bordered));
+                let factors = factors.map_err(|failed| unsolved(failed.to_string()))?;
+                phases.measure("solver/solution", || {
+                    factors.solve(&right, value);
+                    residual(&rows, &right, value, is_bordered)
+                })
+            }
+            Solver::BiCgStab(stopping) => {
+                let factors = phases.measure("solver/factors", || IncompleteFactors::of(&rows));
+                let factors = factors.map_err(|failed| unsolved(failed.to_string()))?;
+                phases.measure("solver/solution", || {
+                    bicgstab::solve(map, &factors, &right, value, stopping, &mut bicgstab::Storage::default())
+                })
+            }
+            Solver::Gmres { restart, stopping } => {
+                let factors = phases.measure("solver/factors", || IncompleteFactors::of(&rows));
+                let factors = factors.map_err(|failed| unsolved(failed.to_string()))?;
+                phases.measure("solver/solution", || {
+                    gmres::solve(map, &factors, &right, value, restart, stopping, &mut gmres::Storage::default())
+                })
+            }
+        };
+        if let Solver::BiCgStab(stopping) | Solver::Gmres { stopping, .. } = self.solver
+            && !self.convergence.is_within(stopping)
+        {
+            let Convergence { iterations, residual } = self.convergence;
+            return Err(unsolved(format!("{iterations} iterations leave a residual of {residual:.3e}")));
+        }
+        if let Condition::ZeroMean { .. } = self.condition {
+            subtract_mean(value);
+        }
+        Ok(())
+    }
+
+    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
+        let value = if clock.step == 0 { vec![f64::NAN; self.value.len()] } else { self.value.clone() };
+        vec![("value", value), ("field", self.right.clone()), ("reference", self.exact.clone())]
+    }
+
+    fn watched(&self) -> &[f64] {
+        &self.value
+    }
+
+    fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
+        if clock.step == 0 {
+            return Vec::new();
+        }
+        let mut errors = against_exact("value", &self.value, &self.exact, clock.time, "exact solution at the points");
+        let Convergence { iterations, residual } = self.convergence;
+        errors.push(entry("solver", "iterations", iterations as f64, clock.time, "none"));
+        errors.push(entry("solver", "residual", residual, clock.time, "‖b − A x‖ by ‖b‖"));
+        errors
+    }
+
+    fn observables(&self, _cloud: &SurfaceCloud<D>, _clock: Clock) -> Observables {
+        vec![("iterations", self.convergence.iterations as f64), ("residual", self.convergence.residual)]
+    }
+
+    fn save(&self, state: &mut State) {
+        state.push_reals("value", &self.value);
+        state.push_counts("iterations", vec![self.convergence.iterations]);
+        state.push_reals("residual", &[self.convergence.residual]);
+    }
+
+    fn load(&mut self, state: &State) -> Result<(), RestoreError> {
+        let (value, iterations) = (state.reals("value")?, state.counts("iterations")?);
+        let residual = state.reals("residual")?;
+        check_length("value", value.len(), self.value.len())?;
+        check_length("iterations", iterations.len(), 1)?;
+        check_length("residual", residual.len(), 1)?;
+        self.value.copy_from_slice(value);
+        self.convergence = Convergence { iterations: iterations[0], residual: residual[0] };
+        Ok(())
+    }
+
+    fn describe(&self, method: &mut BTreeMap<&'static str, String>) {
+        let solver = match self.solver {
+            Solver::BiCgStab(_) => "BiCGSTAB with ILU(0)".to_owned(),
+            Solver::Gmres { restart, .. } => format!("GMRES({restart}) with ILU(0)"),
+            Solver::SparseLu => "sparse LU".to_owned(),
+        };
+        let condition = match &self.condition {
+            Condition::Dirichlet(held) => format!("{} points hold their value", held.len()),
+            Condition::ZeroMean { alpha } => format!("no mean, A + {alpha:.4} 1 1ᵀ/n"),
+        };
+        method.insert("solver", solver);
+        method.insert("condition", condition);
+    }
+}
+
+/// ‖b − A x‖ by ‖b‖ of a direct solution; with a border, of what is left when the multiplier has taken the mean.
+fn residual(rows: &SparseRows, right: &[f64], x: &[f64], is_bordered: bool) -> Convergence {
+    let mut rest = vec![0.0; right.len()];
+    rows.apply(x, &mut rest);
+    rest.iter_mut().zip(right).for_each(|(rest, b)| *rest = b - *rest);
+    if is_bordered {
+        subtract_mean(&mut rest);
+    }
+    let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    Convergence { iterations: 1, residual: size(&rest) / size(right).max(f64::MIN_POSITIVE) }
+}

@@ -1,0 +1,76 @@
+//! What a problem on a surface is to the simulation that runs it.
+
+use super::cloud::SurfaceCloud;
+use super::method::{Operators, Wanted};
+use crate::schemes::measured_errors::{ErrorNorms, entry};
+use crate::simulation::{ErrorEntry, Observables, Phases, RestoreError, State, StepError};
+use crate::time::Clock;
+use std::collections::BTreeMap;
+
+/// What a step works with.
+pub struct Tools<'a, const D: usize> {
+    /// The surface.
+    pub cloud: &'a SurfaceCloud<D>,
+    /// The operators that the problem wanted.
+    pub operators: &'a Operators,
+    /// Costs.
+    pub phases: &'a mut Phases,
+    /// Before the step.
+    pub from: Clock,
+    /// After it.
+    pub to: Clock,
+}
+
+/// A problem: its unknowns, and how a step changes them.
+pub trait Problem<const D: usize>: Send {
+    /// Operators that it needs.
+    fn wanted(&self) -> Vec<Wanted>;
+
+    /// One step.
+    ///
+    /// # Errors
+    /// [`StepError`].
+    fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError>;
+
+    /// What frames show beside the surface. The first is the unknown whose finiteness is watched.
+    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)>;
+
+    /// The unknown whose finiteness is watched.
+    fn watched(&self) -> &[f64];
+
+    /// Errors against what is known exactly.
+    fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry>;
+
+    /// Scalars of the series, `time` excepted.
+    fn observables(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Observables;
+
+    /// Everything that the future depends on.
+    fn save(&self, state: &mut State);
+
+    /// Takes it back.
+    ///
+    /// # Errors
+    /// [`RestoreError`]; nothing is changed then.
+    fn load(&mut self, state: &State) -> Result<(), RestoreError>;
+
+    /// What choices came to.
+    fn describe(&self, method: &mut BTreeMap<&'static str, String>);
+}
+
+/// ‖e‖₂/‖exact‖₂, max |e|, and max |e| by the largest of the exact values.
+pub(super) fn against_exact(
+    quantity: &str,
+    found: &[f64],
+    exact: &[f64],
+    time: f64,
+    reference: &str,
+) -> Vec<ErrorEntry> {
+    let (mut errors, mut sizes) = (ErrorNorms::default(), ErrorNorms::default());
+    for (found, exact) in found.iter().zip(exact) {
+        errors.add(found - exact);
+        sizes.add(*exact);
+    }
+    [("relative", errors.rms() / sizes.rms()), ("max", errors.max()), ("max_relative", errors.max() / sizes.max())]
+        .map(|(norm, value)| entry(quantity, norm, value, time, reference))
+        .to_vec()
+}

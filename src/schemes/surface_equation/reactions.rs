@@ -1,0 +1,119 @@
+//! Reactions of two substances u and v at every point of a surface, and the forcing that makes a known solution exact.
+
+/// The reaction terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Model {
+    /// −u v² + F (1 − u) and u v² − (F + k) v (Gray and Scott).
+    GrayScott {
+        /// F.
+        feed: f64,
+        /// k.
+        kill: f64,
+    },
+    /// a − (b + 1) u + u² v and b u − u² v (Prigogine and Lefever).
+    Brusselator {
+        /// a.
+        a: f64,
+        /// b.
+        b: f64,
+    },
+}
+
+impl Model {
+    /// The terms at (u, v).
+    #[inline]
+    #[must_use]
+    pub fn rates(self, u: f64, v: f64) -> [f64; 2] {
+        match self {
+            Self::GrayScott { feed, kill } => {
+                let eaten = u * v * v;
+                [feed * (1.0 - u) - eaten, eaten - (feed + kill) * v]
+            }
+            Self::Brusselator { a, b } => {
+                let made = u * u * v;
+                [a - (b + 1.0) * u + made, b * u - made]
+            }
+        }
+    }
+
+    /// The state without a pattern.
+    #[must_use]
+    pub fn rest(self) -> [f64; 2] {
+        match self {
+            Self::GrayScott { .. } => [1.0, 0.0],
+            Self::Brusselator { a, b } => [a, b / a],
+        }
+    }
+}
+
+/// A reaction of two substances that diffuse.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reaction {
+    /// Terms.
+    pub model: Model,
+    /// Of u and v.
+    pub diffusivity: [f64; 2],
+    /// f and Δ_S f at the points, where the forcing makes [`Reaction::manufactured`] exact.
+    pub manufactured: Option<(Vec<f64>, Vec<f64>)>,
+}
+
+/// How far the manufactured solution swings.
+const SWING: f64 = 0.25;
+
+impl Reaction {
+    /// The manufactured solution at time t for a field value f: rest (1 + f cos t/4) for u, and with − for v; 1 stands
+    /// for what rests at nothing.
+    #[must_use]
+    pub fn exact(&self, f: f64, t: f64) -> [f64; 2] {
+        let [u, v] = self.base();
+        [u * (1.0 + SWING * f * t.cos()), v * (1.0 - SWING * f * t.cos())]
+    }
+
+    fn base(&self) -> [f64; 2] {
+        self.model.rest().map(|rest| if rest > 0.0 { rest } else { 1.0 })
+    }
+
+    /// What must be added to the terms at a point for that solution.
+    #[must_use]
+    pub fn forcing(&self, f: f64, laplacian: f64, t: f64) -> [f64; 2] {
+        let [u, v] = self.exact(f, t);
+        let (base, rates) = (self.base(), self.model.rates(u, v));
+        let (turn, bend) = (SWING * f * t.sin(), SWING * laplacian * t.cos());
+        [
+            -base[0] * turn - self.diffusivity[0] * base[0] * bend - rates[0],
+            base[1] * turn + self.diffusivity[1] * base[1] * bend - rates[1],
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Model, Reaction};
+
+    #[test]
+    fn rest_does_not_react() {
+        for model in [Model::GrayScott { feed: 0.04, kill: 0.06 }, Model::Brusselator { a: 3.0, b: 9.0 }] {
+            let [u, v] = model.rest();
+            assert!(model.rates(u, v).iter().all(|rate| rate.abs() < 1e-14), "{model:?}");
+        }
+    }
+
+    /// du/dt of the manufactured solution by differences equals diffusion, terms and forcing.
+    #[test]
+    fn forcing_makes_the_solution_exact() {
+        let model = Model::Brusselator { a: 1.0, b: 2.0 };
+        let reaction = Reaction { model, diffusivity: [0.01, 0.1], manufactured: None };
+        let (f, t, step) = (0.4, 0.7, 1e-5);
+        let laplacian = -6.0 * f;
+        let [u, v] = reaction.exact(f, t);
+        let (rates, forcing) = (model.rates(u, v), reaction.forcing(f, laplacian, t));
+        let (after, before) = (reaction.exact(f, t + step), reaction.exact(f, t - step));
+        // The field enters linearly, so Δ_S of the solution is that with f replaced by its Laplacian, less the constant.
+        let (bent, flat) = (reaction.exact(laplacian, t), reaction.exact(0.0, t));
+        for k in 0..2 {
+            let slope = (after[k] - before[k]) / (2.0 * step);
+            let right = reaction.diffusivity[k] * (bent[k] - flat[k]) + rates[k] + forcing[k];
+            assert!((slope - right).abs() < 1e-8, "{k}: {slope} {right}");
+        }
+    }
+}
