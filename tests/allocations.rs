@@ -54,6 +54,7 @@ fn steps_allocate_nothing_after_warm_up() {
         json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.02}),
         json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.02, "geometry": "colorfield", "integrator": "predictor_corrector"}),
         json!({"kind": "droplet", "case": "dividing", "spacing": 0.05, "end_time": 0.002}),
+        json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.02, "discretization": "dcpse"}),
         json!({"kind": "surface_pde", "count": 500, "repeat": 12}),
         json!({"kind": "surface_pde", "count": 500, "repeat": 12, "method": "closest_point"}),
         json!({"kind": "surface_pde", "count": 500, "problem": {"type": "diffusion", "end_time": 0.012, "time_step": 1e-3}}),

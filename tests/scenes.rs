@@ -66,6 +66,11 @@ fn bodies() -> Vec<Value> {
         "kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 0.6, 0.8]}, "count": 700, "repeat": 5,
         "problem": {"type": "laplace_beltrami", "field": "plane_wave"}, "method": {"type": "surface_dcpse", "order": 6, "cutoff_dn": 3.8}
     }));
+    bodies.push(json!({"kind": "droplet", "spacing": 0.08, "end_time": 0.01, "discretization": "dcpse"}));
+    bodies.push(json!({
+        "kind": "droplet", "dimension": 3, "case": "static", "spacing": 0.16, "steps": 3, "end_time": 2e-3,
+        "shape": {"type": "sphere", "radius": 0.7}, "discretization": {"type": "dcpse", "order": 4, "cutoff_h": 4}
+    }));
     bodies.extend(surface_bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
@@ -310,6 +315,9 @@ fn nonsense_is_refused_at_its_place() {
             "/geometry/neighborhood/type",
         ),
         (json!({"kind": "droplet", "time_step": 1e-3, "steps": 7}), "/time_step"),
+        (json!({"kind": "droplet", "discretization": "dcpse", "geometry": "colorfield"}), "/geometry"),
+        (json!({"kind": "droplet", "discretization": "dcpse", "fluids": {"inside": {"viscosity": 1}}}), "/fluids"),
+        (json!({"kind": "droplet", "discretization": {"type": "dcpse", "order": 3}}), "/discretization/order"),
         (json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "order": 3}}), "/method/order"),
         (json!({"kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 2]}}), "/surface/semi_axes"),
         (

@@ -37,8 +37,8 @@ pub trait Chart<const M: usize>: Sync {
     fn count(&self) -> usize;
 
     /// What lies about point i within `reach`: nodes of one index follow one another; those of index i itself are copies of the
-    /// centre, which take part in the fit and have no weight in the row.
-    fn gather(&self, i: usize, reach: f64, near: &mut Vec<Node<M>>);
+    /// centre, which take part in the fit and have no weight in the row. As a last resort also what would not belong to it.
+    fn gather(&self, i: usize, reach: f64, is_last_resort: bool, near: &mut Vec<Node<M>>);
 
     /// The support of point i by that of the others.
     fn scale(&self, _i: usize) -> f64 {

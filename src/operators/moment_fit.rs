@@ -47,11 +47,16 @@ impl<const M: usize> MomentFit<M> {
         self.values.resize(most * number, Lanes::splat(0.0));
         self.windows.clear();
         for k in 0..most {
-            let of = |part: &dyn Fn(&Node<M>) -> f64| {
-                Lanes::new(std::array::from_fn(|lane| self.near[lane].get(k).map_or(0.0, part)))
-            };
-            let x = std::array::from_fn(|d| of(&|node| node.at[d]));
-            let window = of(&|node| node.window);
+            let (mut x, mut window) = ([[0.0; LANES]; M], [0.0; LANES]);
+            for (lane, near) in self.near.iter().enumerate() {
+                if let Some(node) = near.get(k) {
+                    window[lane] = node.window;
+                    for (x, at) in x.iter_mut().zip(node.at) {
+                        x[lane] = at;
+                    }
+                }
+            }
+            let (x, window) = (x.map(Lanes::new), Lanes::new(window));
             let values = &mut self.values[k * number..(k + 1) * number];
             basis.values(x, values);
             self.windows.push(window);

@@ -1,6 +1,7 @@
 //! `droplet`: two fluids with surface tension (PCP paper, sections 4.3 and 4.4, appendix B).
 
 mod cases;
+mod flow;
 mod parameters;
 mod rows;
 mod setup;

@@ -7,6 +7,7 @@ mod color_field;
 mod column;
 mod components;
 mod continuity;
+mod dcpse;
 mod density;
 pub mod fluids;
 mod hydrodynamics;
@@ -27,7 +28,7 @@ pub mod time_step;
 pub use body_force::BodyForce;
 pub use fluids::Fluid;
 pub use kernel_choice::KernelChoice;
-pub use parts::{DensityMethod, Geometry, Integrator, SphParts, TensionForce};
+pub use parts::{DensityMethod, Discretization, Geometry, Integrator, SphParts, TensionForce};
 pub use simulation::{WeaklyCompressibleSph, measurement_interval};
 pub use system::{Drop, SphSystem};
 

@@ -1,22 +1,23 @@
 //! Points of the plane or of space as they are: DC-PSE in flat space (Surface DC-PSE paper, section 2).
+//!
+//! Windows are 1 − r²/r_c²: wide, as the paper's are. Narrow ones, which are more exact on surfaces at rest, make fits of moving
+//! particles follow few neighbours and flows unstable.
 
 use super::{Chart, Functional, Heights, Node, first, second};
-use crate::geometry::{Domain, Vector};
+use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
 
 /// Points of a domain.
 #[derive(Debug)]
 pub struct FlatChart<'a, const D: usize> {
     points: &'a [Vector<D>],
-    cells: CellList<D>,
+    cells: &'a CellList<D>,
 }
 
 impl<'a, const D: usize> FlatChart<'a, D> {
-    /// Of points in a domain, which may be periodic; `radius` is the support's.
+    /// Of points and the cells that they were sorted into.
     #[must_use]
-    pub fn new(points: &'a [Vector<D>], domain: Domain<D>, radius: f64) -> Self {
-        let mut cells = CellList::new(domain);
-        cells.rebuild(points.iter().copied(), radius);
+    pub fn new(points: &'a [Vector<D>], cells: &'a CellList<D>) -> Self {
         Self { points, cells }
     }
 }
@@ -26,15 +27,14 @@ impl<const D: usize> Chart<D> for FlatChart<'_, D> {
         self.points.len()
     }
 
-    fn gather(&self, i: usize, reach: f64, near: &mut Vec<Node<D>>) {
+    fn gather(&self, i: usize, reach: f64, _is_last_resort: bool, near: &mut Vec<Node<D>>) {
         near.clear();
         let inverse = 1.0 / reach;
         // `dx` is x_j − x_i, over the edge of a periodic domain where that is nearer.
         self.cells.for_each_within(&self.points[i], reach, |j, dx, square| {
             if j != i {
                 let rest = (1.0 - square * inverse * inverse).max(0.0);
-                let window = rest * rest;
-                near.push(Node { index: j as u32, at: (dx * inverse).into(), window: window * window, height: 0.0 });
+                near.push(Node { index: j as u32, at: (dx * inverse).into(), window: rest, height: 0.0 });
             }
         });
     }

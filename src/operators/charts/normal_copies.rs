@@ -39,7 +39,7 @@ impl<const D: usize> Chart<D> for NormalCopies<'_, D> {
         false
     }
 
-    fn gather(&self, i: usize, reach: f64, near: &mut Vec<Node<D>>) {
+    fn gather(&self, i: usize, reach: f64, _is_last_resort: bool, near: &mut Vec<Node<D>>) {
         near.clear();
         let x = self.points[i];
         let inverse = 1.0 / reach;

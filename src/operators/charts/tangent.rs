@@ -33,6 +33,8 @@ pub struct TangentChart<'a, const D: usize> {
     cells: CellList<D>,
 }
 
+/// The same where a surface is so coarse that nothing else is left.
+pub const SAME_SIDE: f64 = 0.05;
 /// Cosine of normals beyond which a point belongs to another sheet.
 pub const SAME_SHEET: f64 = 0.5;
 
@@ -80,13 +82,14 @@ impl<const D: usize, const M: usize> Chart<M> for TangentChart<'_, D> {
         self.metric == Metric::OfHeights
     }
 
-    fn gather(&self, i: usize, reach: f64, near: &mut Vec<Node<M>>) {
+    fn gather(&self, i: usize, reach: f64, is_last_resort: bool, near: &mut Vec<Node<M>>) {
         near.clear();
+        let least_cosine = if is_last_resort { SAME_SIDE } else { SAME_SHEET };
         let (x, n) = (self.points[i], self.normals[i]);
         let t = tangents::<D, M>(&n);
         let inverse = 1.0 / reach;
         self.cells.for_each_within(&x, reach, |j, _, square| {
-            if j != i && self.normals[j].dot(&n) > SAME_SHEET {
+            if j != i && self.normals[j].dot(&n) > least_cosine {
                 let d = self.points[j] - x;
                 let rest = (1.0 - square * inverse * inverse).max(0.0);
                 let window = rest * rest;

@@ -137,24 +137,47 @@ static GEOMETRIES: &[Variant] = &[
     Variant { name: "colorfield", doc: "the smoothed colour of the phases (eqs. B.5 to B.10)", parameters: &[] },
 ];
 
-static DISCRETIZATIONS: &[Variant] = &[Variant {
-    name: "sph",
-    doc: "smoothed particle hydrodynamics",
-    parameters: &[
-        Parameter::new(
-            "kernel",
-            "W",
-            Kind::Word(&["wendland_c2", "wendland_c4", "cubic_spline", "quintic_spline"]),
-            DefaultValue::Json("\"wendland_c2\""),
-        ),
-        Parameter::new(
-            "smoothing_h",
-            "ε/h; by case when not given",
-            Kind::Number { above: None, least: Some(1.0), below: None, most: Some(8.0) },
-            DefaultValue::Absent,
-        ),
-    ],
-}];
+const SMOOTHING: Parameter = Parameter::new(
+    "smoothing_h",
+    "ε/h; by case when not given",
+    Kind::Number { above: None, least: Some(1.0), below: None, most: Some(8.0) },
+    DefaultValue::Absent,
+);
+
+static DISCRETIZATIONS: &[Variant] = &[
+    Variant {
+        name: "sph",
+        doc: "smoothed particle hydrodynamics",
+        parameters: &[
+            Parameter::new(
+                "kernel",
+                "W",
+                Kind::Word(&["wendland_c2", "wendland_c4", "cubic_spline", "quintic_spline"]),
+                DefaultValue::Json("\"wendland_c2\""),
+            ),
+            SMOOTHING,
+        ],
+    },
+    Variant {
+        name: "dcpse",
+        doc: "DC-PSE: fits of polynomials about every particle for pressure gradient and viscosity, densities by continuity",
+        parameters: &[
+            Parameter::new(
+                "order",
+                "2 or 4: polynomials of degree 3 or 5",
+                Kind::Integer { least: 2, most: 4 },
+                DefaultValue::Json("2"),
+            ),
+            Parameter::new(
+                "cutoff_h",
+                "r_c/h of the fits; 3 is the paper's, with which particles crowd here",
+                Kind::Number { above: None, least: Some(2.0), below: None, most: Some(8.0) },
+                DefaultValue::Json("3.5"),
+            ),
+            SMOOTHING,
+        ],
+    },
+];
 
 static DENSITIES: &[Variant] = &[
     Variant { name: "summation", doc: "summation, with pressures in the volume form (eqs. B.1, B.2)", parameters: &[] },
@@ -266,6 +289,7 @@ pub(super) struct WrittenFluid {
 #[serde(tag = "type", rename_all = "snake_case")]
 pub(super) enum Discretization {
     Sph { kernel: String, smoothing_h: Option<f64> },
+    Dcpse { order: u64, cutoff_h: f64, smoothing_h: Option<f64> },
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]

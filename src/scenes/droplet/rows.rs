@@ -103,6 +103,13 @@ pub fn rows() -> Rows {
         false,
     );
     row("colour field, 1/32: Δp".into(), "2e-2", vec![colors], end("pressure_jump", "relative"), Reach::Shown, false);
+    for (cells, paper, text, is_long) in [(32, 0.0120, "0.0120", false), (64, 0.0069, "0.0069", true)] {
+        let run = vec![oscillating(cells, &json!({"discretization": "dcpse"}))];
+        let case = |what: &str| format!("dcpse, 1/{cells}: {what}");
+        let reach = Reach::AtMost(paper);
+        row(case("mean κ − κ₀ over the last fifth"), text, run.clone(), end("curvature", "mean_error"), reach, is_long);
+        row(case("CPU seconds"), "–", run, Measure::Seconds(""), Reach::AtMost(1200.0), is_long);
+    }
     for radius in RADII {
         let case = format!("Young–Laplace, R = {radius}, 16 h to a radius: Δp");
         row(case, "3e-3", vec![resting(radius)], end("pressure_jump", "relative"), Reach::AtMost(1e-3), true);
@@ -228,5 +235,6 @@ pub(super) fn calibration() -> Vec<Value> {
         json!({"kind": "droplet", "case": "dividing", "spacing": 0.04, "end_time": 0.01}),
         json!({"kind": "droplet", "spacing": 0.04, "geometry": "colorfield", "end_time": 0.01}),
         json!({"kind": "droplet", "dimension": 3, "spacing": 0.08, "end_time": 0.003}),
+        json!({"kind": "droplet", "spacing": 0.04, "discretization": "dcpse", "end_time": 0.01}),
     ]
 }

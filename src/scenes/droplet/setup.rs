@@ -1,19 +1,21 @@
 //! From parameters to two fluids in a box.
 
 use super::cases::{Case, case};
-use super::parameters::{Corners, Density, Discretization, Force, Stop, Written, WrittenFluid};
+use super::flow::Flow;
+use super::parameters::{Corners, Force, Stop, Written, WrittenFluid};
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::Pencils;
 use crate::parallel::Interrupt;
+use crate::polynomials::multi_index::term_count;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::{pcp_parameters, shapes, work_estimate};
 use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    BodyForce, DensityMethod, Drop, Fluid, Geometry, Integrator, KernelChoice, SphParts, SphSystem, TensionForce,
+    BodyForce, DensityMethod, Discretization, Drop, Fluid, Geometry, Integrator, SphParts, SphSystem, TensionForce,
     WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Simulation};
@@ -85,15 +87,6 @@ fn body_force<const D: usize>(force: &Force, violations: &mut Vec<Violation>) ->
     }
 }
 
-fn kernel(name: &str) -> KernelChoice {
-    match name {
-        "wendland_c4" => KernelChoice::WendlandC4,
-        "cubic_spline" => KernelChoice::CubicSpline,
-        "quintic_spline" => KernelChoice::QuinticSpline,
-        _ => KernelChoice::WendlandC2,
-    }
-}
-
 /// The geometry, and its parameters with what was left open.
 fn geometry(
     written: &Value,
@@ -155,8 +148,8 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
             Err(found) => violations.extend(found),
         }
     }
-    let Discretization::Sph { kernel: kernel_name, smoothing_h } = &written.discretization;
-    let smoothing_h = smoothing_h.unwrap_or(case.smoothing_h);
+    let flow = Flow::understand(written, &case, h, &mut violations);
+    let smoothing_h = flow.smoothing_h;
     let geometry = match geometry(&written.geometry, &case, D, h, smoothing_h) {
         Ok((geometry, full)) => {
             resolved["geometry"] = full;
@@ -172,12 +165,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         violations.push(Violation::new("/body_force", "type", error.to_string(), &force_json, Value::Null));
         Force::None
     });
-    let density = written.density_method.unwrap_or(if case.density_method == "continuity" {
-        Density::Continuity { diffusion: 0.05 }
-    } else {
-        Density::Summation
-    });
-    let shifting = written.shifting.as_deref().unwrap_or(case.shifting);
+    let shifting = written.shifting.as_deref().unwrap_or(flow.shifting(&case));
     let given_step = written.time_step.or(if written.steps.is_none() { case.time_step } else { None });
     if let (Some(step), Some(_)) = (written.time_step, written.steps) {
         let detail = "steps are given instead of a time step; give one of them";
@@ -186,16 +174,14 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     let parts = SphParts {
         spacing: h,
         smoothing_length: smoothing_h * h,
-        kernel: kernel(kernel_name),
+        kernel: flow.kernel,
         inside: fluid(&written.fluids.inside),
         outside: fluid(&written.fluids.outside),
         tension: written.surface_tension.unwrap_or(case.tension),
         tension_force: if written.tension_force == "csf" { TensionForce::Csf } else { TensionForce::Balanced },
         geometry: geometry.unwrap_or(Geometry::ColorField),
-        density: match density {
-            Density::Summation => DensityMethod::Summation,
-            Density::Continuity { diffusion } => DensityMethod::Continuity { diffusion },
-        },
+        discretization: flow.discretization,
+        density: flow.density,
         is_shifted: shifting == "pst",
         body_force: body_force(&force, &mut violations),
         integrator: match written.integrator.as_str() {
@@ -232,17 +218,13 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {REFERENCE_SPEED}");
         chosen.insert("time_step", why);
     }
-    let density_json = match density {
-        Density::Summation => json!({"type": "summation"}),
-        Density::Continuity { diffusion } => json!({"type": "continuity", "diffusion": diffusion}),
-    };
     for (name, value) in [
         ("dimension", json!(D)),
         ("shape", shape.clone()),
         ("domain", json!({"low": corners.low, "high": corners.high})),
         ("surface_tension", json!(parts.tension)),
-        ("discretization", json!({"type": "sph", "kernel": kernel_name, "smoothing_h": smoothing_h})),
-        ("density_method", density_json),
+        ("discretization", flow.full),
+        ("density_method", flow.full_density),
         ("shifting", json!(shifting)),
         ("body_force", force_json),
     ] {
@@ -279,6 +261,15 @@ fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Domain<D> 
 }
 
 impl<const D: usize> DropletScene<D> {
+    /// Work of the forces: sums over pairs, or fits.
+    fn momentum_work(&self, pairs: f64, particles: f64) -> f64 {
+        let Discretization::Dcpse(support) = self.parts.discretization else { return pairs };
+        let cutoff = support.radius / self.parts.spacing;
+        let nodes = if D == 2 { 3.1 } else { 4.2 } * cutoff.powi(D as i32);
+        let terms = term_count::<D>(support.degree) as f64;
+        particles * nodes * (40.0 + 0.25 * terms * terms)
+    }
+
     fn lengths(&self) -> Vector<D> {
         self.high - self.low
     }
@@ -400,7 +391,8 @@ impl<const D: usize> Scene for DropletScene<D> {
             Geometry::Pcp { method, .. } => work_estimate::method_name(method),
             Geometry::ColorField => "colorfield".to_owned(),
         };
-        format!("droplet/{D}/{geometry}")
+        let flow = if let Discretization::Dcpse(_) = self.parts.discretization { "/dcpse" } else { "" };
+        format!("droplet/{D}/{geometry}{flow}")
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
@@ -411,7 +403,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
         let pairs = particles * ball * support.powi(D as i32) * evaluations;
         let mut work = vec![
-            PhaseWork::every_step("sph/momentum", 2.0 * pairs),
+            PhaseWork::every_step("sph/momentum", self.momentum_work(2.0 * pairs, particles * evaluations)),
             PhaseWork::every_step("sph/gather", particles * evaluations),
             PhaseWork::every_step("sph/advance", particles * evaluations),
             PhaseWork::every_step("sph/tension", particles * evaluations),

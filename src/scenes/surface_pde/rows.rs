@@ -66,6 +66,11 @@ fn bump(height: f64, count: u64, integrator: &Value) -> Value {
     })
 }
 
+fn with_step(mut scene: Value, time_step: f64) -> Value {
+    scene["problem"]["time_step"] = json!(time_step);
+    scene
+}
+
 /// The paper's number of points, and that of half its spacing.
 const BUMP_COUNTS: [u64; 2] = [18_439, 73_756];
 
@@ -82,7 +87,7 @@ fn manufactured(count: u64, order: u64, surface: &Value) -> Value {
 fn pattern(surface: &Value) -> Value {
     json!({
         "kind": "surface_pde", "surface": surface, "count": 8000,
-        "problem": {"type": "reaction_diffusion", "end_time": 60, "tolerance": 1e-5}
+        "problem": {"type": "reaction_diffusion", "end_time": 100, "tolerance": 1e-5}
     })
 }
 
@@ -211,7 +216,8 @@ fn hard_cases(table: &mut Table) {
         (json!({"type": "torus", "minor_radius": 0.25}), 144, "torus r/R = .25, six points around the tube"),
         (torus(), 16_000, "torus r/R = .4, N = 16,000"),
     ] {
-        for order in [2, 4] {
+        // So few points are not enough for fits of degree 5.
+        for order in [2, 4].into_iter().filter(|order| count > 200 || *order == 2) {
             let run = with(wave(count, order), &json!({"surface": surface}));
             table.row(&format!("{text}, order {order}: error"), "–", vec![run], Measure::Error(ERROR), Reach::Shown);
         }
@@ -277,8 +283,8 @@ fn evolutions(table: &mut Table) {
         let drift = Measure::Error(Quantity::at_end("mass", "relative"));
         table.row(&case, "–", vec![bump(height, BUMP_COUNTS[0], &implicit)], drift, Reach::AtMost(1e-3));
         let both = vec![
-            bump(height, BUMP_COUNTS[0], &implicit),
             bump(height, BUMP_COUNTS[0], &json!({"type": "dopri5", "tolerance": 1e-7})),
+            with_step(bump(height, BUMP_COUNTS[0], &implicit), 0.001),
         ];
         let case = format!("bump, α = {height}: peak at probe_0, explicit against implicit");
         table.long(&case, "–", both, Measure::Difference(Quantity::at_end("probe_0", "peak")), Reach::AtMost(1e-4));
@@ -289,7 +295,7 @@ fn evolutions(table: &mut Table) {
             let runs = [1000, 2000, 4000, 8000].map(|count| manufactured(count, order, &surface)).to_vec();
             table.row(&case, "–", runs, Measure::Order { of: ERROR, floor: 1e-10 }, Reach::AtLeast(least));
         }
-        let case = format!("pattern of the Brusselator, {text}: root mean square of du/dt at t = 60");
+        let case = format!("pattern of the Brusselator, {text}: root mean square of du/dt at t = 100");
         let rate = Measure::Error(Quantity::at_end("pattern", "rate"));
         table.long(&case, "–", vec![pattern(&surface)], rate, Reach::AtMost(1e-2));
         let case = format!("pattern of the Brusselator, {text}: deviation of u");
@@ -386,8 +392,8 @@ fn figures() -> Vec<Figure> {
             0.1,
             &[0, 1, 3, 10],
         ),
-        frames("surface-sphere", "Brusselator on the sphere", pattern(&json!("sphere")), 10.0, &[0, 1, 3, 6]),
-        frames("surface-torus", "Brusselator on the torus", pattern(&torus()), 10.0, &[0, 1, 3, 6]),
+        frames("surface-sphere", "Brusselator on the sphere", pattern(&json!("sphere")), 10.0, &[0, 1, 3, 10]),
+        frames("surface-torus", "Brusselator on the torus", pattern(&torus()), 10.0, &[0, 1, 3, 10]),
     ]
 }
 

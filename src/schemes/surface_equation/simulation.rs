@@ -38,7 +38,7 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
         interrupt: Interrupt,
         cpu_clock: CpuClock,
     ) -> Self {
-        let soundness = Soundness { least_pivot: 1.0, ..Soundness::default() };
+        let soundness = Soundness::none();
         let phases = Phases::new(cpu_clock);
         Self { cloud, method, problem, operators: None, soundness, fixed, step: 0, interrupt, phases }
     }
@@ -100,7 +100,10 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         let Clock { step, time } = self.clock();
         let mut state = State { step, time, ..State::default() };
         self.problem.save(&mut state);
-        state.push_counts("soundness", vec![self.soundness.enlarged, self.soundness.low_rank]);
+        state.push_counts(
+            "soundness",
+            vec![self.soundness.enlarged, self.soundness.low_rank, self.soundness.unresolved],
+        );
         state.push_reals("least_pivot", &[self.soundness.least_pivot]);
         state
     }
@@ -110,10 +113,11 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
             return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
         }
         let (counts, pivot) = (state.counts("soundness")?, state.reals("least_pivot")?);
-        check_length("soundness", counts.len(), 2)?;
+        check_length("soundness", counts.len(), 3)?;
         check_length("least_pivot", pivot.len(), 1)?;
         self.problem.load(state)?;
-        self.soundness = Soundness { enlarged: counts[0], low_rank: counts[1], failed: 0, least_pivot: pivot[0] };
+        let (enlarged, low_rank, unresolved) = (counts[0], counts[1], counts[2]);
+        self.soundness = Soundness { enlarged, low_rank, unresolved, failed: 0, least_pivot: pivot[0] };
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
         self.step = state.step;
@@ -126,8 +130,13 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
             Form::Intrinsic { .. } => "tangent planes".to_owned(),
             Form::Copies { layers, spacing } => format!("{layers} copies to either side, {spacing:.6} apart"),
         };
-        let Soundness { enlarged, low_rank, failed, least_pivot } = self.soundness;
-        let rescued = [("supports.larger_radius", enlarged), ("supports.low_rank", low_rank), ("rows.failed", failed)];
+        let Soundness { enlarged, low_rank, unresolved, failed, least_pivot } = self.soundness;
+        let rescued = [
+            ("supports.larger_radius", enlarged),
+            ("supports.low_rank", low_rank),
+            ("supports.unresolved", unresolved),
+            ("rows.failed", failed),
+        ];
         let entries = self.operators.iter().flat_map(|o| &o.rows).map(SparseRows::entries).sum::<usize>();
         let mut method = BTreeMap::from([("operator", format!("degree {degree}, support {radius:.6}, {form}"))]);
         if entries > 0 {
@@ -150,7 +159,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
 
     fn health(&self) -> Health {
         let finite = self.problem.watched().iter().all(|value| value.is_finite());
-        let rescued_fits = self.soundness.enlarged + self.soundness.low_rank;
+        let rescued_fits = self.soundness.enlarged + self.soundness.low_rank + self.soundness.unresolved;
         Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits }
     }
 

@@ -4,6 +4,7 @@ use super::body_force::BodyForce;
 use super::fluids::Fluid;
 use super::kernel_choice::KernelChoice;
 use crate::closest_point::PcpMethod;
+use crate::operators::Support;
 
 /// The skin in h.
 const SKIN_H: f64 = 0.3;
@@ -43,6 +44,15 @@ pub enum DensityMethod {
     },
 }
 
+/// How the flow is discretized.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Discretization {
+    /// Sums over kernels.
+    Kernels,
+    /// Fits about every particle; densities by continuity.
+    Dcpse(Support),
+}
+
 /// How steps are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Integrator {
@@ -71,6 +81,8 @@ pub struct SphParts<const D: usize> {
     pub tension_force: TensionForce,
     /// Normals and curvatures.
     pub geometry: Geometry,
+    /// The flow.
+    pub discretization: Discretization,
     /// Densities.
     pub density: DensityMethod,
     /// Whether particles are shifted towards evenness (B.15, B.16).

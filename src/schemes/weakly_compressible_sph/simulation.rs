@@ -425,6 +425,16 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         if let Some(interface) = self.system.interface.as_ref().filter(|interface| interface.bounded > 0) {
             report.newton.rescued.insert("curvature.bounded", interface.bounded);
         }
+        if let Some(flow) = &self.system.dcpse {
+            let found = &flow.soundness;
+            let counts = [
+                ("flow.larger_radius", found.enlarged),
+                ("flow.low_rank", found.low_rank),
+                ("flow.unresolved", found.unresolved),
+                ("flow.failed", found.failed),
+            ];
+            report.rescued_fits.extend(counts.into_iter().filter(|(_, count)| *count > 0));
+        }
         if self.system.strays.absorbed > 0 {
             report.newton.rescued.insert("strays.absorbed", self.system.strays.absorbed);
         }

@@ -1,9 +1,10 @@
 //! The particles of two fluids and everything that is found at a moment: one evaluation from positions to accelerations.
 
 use super::components::{Components, FRAGMENT, ball_curvature};
+use super::dcpse::DcpseFlow;
 use super::hydrodynamics::Hydrodynamics;
 use super::interface::Interface;
-use super::parts::{DensityMethod, Geometry, Integrator, SphParts, TensionForce};
+use super::parts::{DensityMethod, Discretization, Geometry, Integrator, SphParts, TensionForce};
 use super::shifting::{displacement, part_along};
 use super::stepping::Start;
 use super::strays::Strays;
@@ -55,6 +56,7 @@ pub struct SphSystem<const D: usize> {
     pub(super) initial_measure: f64,
     pub(super) hydrodynamics: Hydrodynamics<D>,
     pub(super) interface: Option<Interface<D>>,
+    pub(super) dcpse: Option<DcpseFlow<D>>,
     components: Components<D>,
     pub(super) strays: Strays<D>,
     volume: Vec<f64>,
@@ -126,6 +128,10 @@ impl<const D: usize> SphSystem<D> {
             strays: Strays::new(domain.clone()),
             hydrodynamics,
             interface,
+            dcpse: match parts.discretization {
+                Discretization::Kernels => None,
+                Discretization::Dcpse(support) => Some(DcpseFlow::new(support, domain.clone(), count)),
+            },
             volume: vec![cell; count],
             pressure: vec![0.0; count],
             gradient: vec![Vector::<D>::zeros(); colors],
@@ -289,7 +295,27 @@ impl<const D: usize> SphSystem<D> {
         Ok(())
     }
 
+    /// −∇p/ρ + (η/ρ) Δu, and −ρ ∇·u + ξ̂ ε c Δρ with Δp = c² Δρ, which damps what the gradient does not see (as B.12 does).
+    fn fit_accelerations(&mut self) -> Result<(), Interrupted> {
+        let Self { dcpse: Some(flow), particles, predicted, pressure, density, phase, parts, .. } = self else {
+            return Ok(());
+        };
+        let diffusion = if let DensityMethod::Continuity { diffusion } = parts.density { diffusion } else { 0.0 };
+        flow.find(particles.positions(), predicted, pressure, &self.interrupt)?;
+        for (i, acceleration) in self.acceleration.iter_mut().enumerate() {
+            let found = flow.at(i);
+            let fluid = parts.fluid(phase[i] == 1);
+            *acceleration = (found.velocity_laplacian * fluid.viscosity - found.pressure_gradient) / density[i];
+            let spread = diffusion * parts.smoothing_length / fluid.sound_speed * found.pressure_laplacian;
+            self.density_rate[i] = spread - density[i] * found.divergence;
+        }
+        Ok(())
+    }
+
     fn sum_accelerations(&mut self) -> Result<(), Interrupted> {
+        if self.dcpse.is_some() {
+            return self.fit_accelerations();
+        }
         let Self { hydrodynamics, parts, volume, pressure, density, predicted, acceleration, interrupt, .. } = self;
         let (parts, phase, cell) = (&*parts, &self.phase, self.cell);
         let mass = |i: usize| parts.fluid(phase[i] == 1).density * cell;

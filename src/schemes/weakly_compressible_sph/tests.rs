@@ -2,7 +2,7 @@
 
 use super::hydrodynamics::Hydrodynamics;
 use super::kernel_choice::KernelChoice;
-use super::parts::{DensityMethod, Geometry, Integrator, SphParts, TensionForce};
+use super::parts::{DensityMethod, Discretization, Geometry, Integrator, SphParts, TensionForce};
 use super::{Fluid, time_step::longest_step};
 use crate::geometry::domain::Axis;
 use crate::geometry::random::CounterRandom;
@@ -33,6 +33,7 @@ fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setting<D> {
         tension: 1.0,
         tension_force: TensionForce::Csf,
         geometry: Geometry::ColorField,
+        discretization: Discretization::Kernels,
         density: DensityMethod::Summation,
         is_shifted: false,
         body_force: None,

@@ -1,0 +1,134 @@
+//! Functionals of fields at once, without rows: for points that move, whose weights are used a single time.
+
+use super::basis::Basis;
+use super::charts::{Chart, Functional, Node};
+use super::fits::{BLOCK, Fits, Outcome, RowSink, Soundness, Support, Work};
+use crate::linear_algebra::number::Lanes;
+use crate::parallel::{Interrupt, Interrupted, PerThread};
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
+use std::sync::{Mutex, PoisonError};
+
+/// Fits of one degree with the storage of all threads.
+pub struct Evaluation<const M: usize> {
+    basis: Basis<M>,
+    support: Support,
+    functionals: Vec<Functional<M>>,
+    work: PerThread<(Work<M>, Outcome<M>)>,
+}
+
+/// Fields that are evaluated at a time, at most.
+pub const MOST_FIELDS: usize = 4;
+
+impl<const M: usize> Evaluation<M> {
+    /// Of functionals.
+    #[must_use]
+    pub fn new(support: Support, functionals: Vec<Functional<M>>) -> Self {
+        Self { basis: Basis::new(support.degree), support, functionals, work: PerThread::new() }
+    }
+
+    /// Numbers of a point for so many fields.
+    #[must_use]
+    pub fn numbers(&self, fields: usize) -> usize {
+        self.functionals.len() * fields
+    }
+
+    /// Q_k f at every point of the chart: functional by functional, and in it field by field. Fields beyond
+    /// [`MOST_FIELDS`] are left out.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn evaluate(
+        &self,
+        chart: &dyn Chart<M>,
+        fields: &[&[f64]],
+        out: &mut [f64],
+        interrupt: &Interrupt,
+    ) -> Result<Soundness, Interrupted> {
+        let fields = &fields[..fields.len().min(MOST_FIELDS)];
+        let numbers = self.numbers(fields.len());
+        let fits = Fits { chart, basis: &self.basis, radius: self.support.radius, functionals: &self.functionals };
+        let soundness = Mutex::new(Soundness::none());
+        out.par_chunks_mut(BLOCK * numbers).enumerate().with_min_len(1).for_each(|(block, out)| {
+            self.work.with(|(work, outcome)| {
+                outcome.soundness = Soundness::none();
+                outcome.heights.clear();
+                let first = block * BLOCK;
+                let mut sums = Sums { first, fields, numbers, out };
+                let points = first..first + sums.out.len() / numbers;
+                fits.run(points, interrupt, work, &mut sums, outcome);
+                // Counts and a minimum: the order of adding does not matter.
+                soundness.lock().unwrap_or_else(PoisonError::into_inner).add(&outcome.soundness);
+            });
+        });
+        interrupt.check()?;
+        Ok(soundness.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Σ w_j (f_j − f_i) as weights come.
+struct Sums<'a> {
+    first: usize,
+    fields: &'a [&'a [f64]],
+    numbers: usize,
+    out: &'a mut [f64],
+}
+
+impl<const M: usize> RowSink<M> for Sums<'_> {
+    fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>) {
+        let count = self.fields.len();
+        // What is not known must not look like a number.
+        let mut sums = [f64::NAN; MOST_FIELDS];
+        if let Some((weights, lane)) = weights {
+            let mut own = [0.0; MOST_FIELDS];
+            own.iter_mut().zip(self.fields).for_each(|(own, field)| *own = field[i]);
+            sums = [0.0; MOST_FIELDS];
+            for (node, weights) in nodes.iter().zip(weights) {
+                let weight = weights.as_array()[lane];
+                for ((sum, field), own) in sums.iter_mut().zip(self.fields).zip(own) {
+                    *sum += weight * (field[node.index as usize] - own);
+                }
+            }
+        }
+        let from = (i - self.first) * self.numbers + functional * count;
+        self.out[from..from + count].copy_from_slice(&sums[..count]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Evaluation, Functional, Support};
+    use crate::geometry::domain::Axis;
+    use crate::geometry::random::CounterRandom;
+    use crate::geometry::{Domain, Vector};
+    use crate::neighbors::CellList;
+    use crate::operators::{FlatChart, construct};
+    use crate::parallel::Interrupt;
+
+    #[test]
+    fn values_are_those_of_the_rows() {
+        let random = CounterRandom::new(2);
+        let points: Vec<_> =
+            (0..300_i64).map(|i| Vector::<2>::from_fn(|d, _| 0.5 + 0.5 * random.symmetric(&[i, d as i64]))).collect();
+        let mut cells = CellList::new(Domain::new([Axis::Periodic { start: 0.0, length: 1.0 }; 2]));
+        cells.rebuild(points.iter().copied(), 0.2);
+        let chart = FlatChart::new(&points, &cells);
+        let support = Support { degree: 3, radius: 0.2 };
+        let functionals = vec![Functional::Gradient(0), Functional::LaplaceBeltrami];
+        let fields: [Vec<f64>; 2] =
+            [0, 1].map(|f| (0..300).map(|i| random.symmetric(&[i, 7 + f])).collect::<Vec<f64>>());
+        let built = construct::<2>(&chart, support, &functionals, &Interrupt::default()).unwrap();
+        let mut out = vec![0.0; 4 * 300];
+        let evaluation = Evaluation::<2>::new(support, functionals);
+        let interrupt = Interrupt::default();
+        let soundness = evaluation.evaluate(&chart, &[&fields[0], &fields[1]], &mut out, &interrupt).unwrap();
+        assert_eq!(soundness, built.soundness);
+        for (f, field) in fields.iter().enumerate() {
+            for (k, rows) in built.operators.iter().enumerate() {
+                let mut expected = vec![0.0; 300];
+                rows.apply(field, &mut expected);
+                let size = expected.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+                assert!((0..300).all(|i| (out[4 * i + 2 * k + f] - expected[i]).abs() < 1e-10 * size));
+            }
+        }
+    }
+}

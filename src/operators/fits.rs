@@ -1,0 +1,250 @@
+//! The fits of a chart, four points side by side: what supports grow to, which solutions stand, and where their weights go.
+//!
+//! Supports that do not hold enough grow; where that does not do, what lies on the same side is taken, and the moment
+//! conditions are solved by a rank-revealing decomposition: the weights stand if they hold. Everything is counted.
+
+use super::basis::Basis;
+use super::charts::{Chart, Functional, Heights, Node};
+use super::moment_fit::MomentFit;
+use crate::linear_algebra::number::{LANES, Lanes};
+use crate::parallel::Interrupt;
+use std::ops::Range;
+
+/// Degree of the polynomials and the support of a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Support {
+    /// Total degree: at most 7.
+    pub degree: usize,
+    /// Radius of the support, r_c.
+    pub radius: f64,
+}
+
+/// What became of points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Soundness {
+    /// How often a support was enlarged.
+    pub enlarged: u64,
+    /// Points whose moment conditions were solved by the rank-revealing decomposition.
+    pub low_rank: u64,
+    /// Points that had to take what lies beyond a turn of 60° of the normal: the surface is too coarse there.
+    pub unresolved: u64,
+    /// Points whose moment conditions cannot be met: their rows give no number.
+    pub failed: u64,
+    /// The least share of a pivot in its diagonal, of all points that were solved directly.
+    pub least_pivot: f64,
+}
+
+impl Soundness {
+    /// Of no points.
+    #[must_use]
+    pub fn none() -> Self {
+        Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, least_pivot: 1.0 }
+    }
+
+    /// With others.
+    pub fn add(&mut self, other: &Self) {
+        self.enlarged += other.enlarged;
+        self.low_rank += other.low_rank;
+        self.unresolved += other.unresolved;
+        self.failed += other.failed;
+        self.least_pivot = self.least_pivot.min(other.least_pivot);
+    }
+}
+
+/// Neighbours for a function at least: fewer make the fit an interpolation of noise.
+const NEIGHBORS_A_FUNCTION: f64 = 1.4;
+/// How a support grows that is not enough, and how far.
+const GROWTH: f64 = 1.2;
+/// The largest support by r_c.
+pub const MOST_GROWTH: f64 = 2.5;
+/// Below this share of a pivot in its diagonal the moment conditions do not hold to the digits that are wanted.
+const LEAST_PIVOT: f64 = 1e-9;
+/// Moment conditions that a rank-revealing solution may leave open, by the largest.
+const OPEN_MOMENTS: f64 = 1e-6;
+/// Points of a parallel task; a multiple of the lanes.
+pub(super) const BLOCK: usize = 64;
+
+/// Where the weights of points go.
+pub(super) trait RowSink<const M: usize> {
+    /// The nodes of point i and, in a lane, their weights for a functional; none where the moment conditions are not met.
+    fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>);
+}
+
+/// What comes of a range of points beside the weights.
+pub(super) struct Outcome<const M: usize> {
+    pub heights: Vec<Heights<M>>,
+    pub soundness: Soundness,
+}
+
+impl<const M: usize> Default for Outcome<M> {
+    fn default() -> Self {
+        Self { heights: Vec::new(), soundness: Soundness::none() }
+    }
+}
+
+/// Storage of a thread.
+#[derive(Default)]
+pub(super) struct Work<const M: usize> {
+    fit: MomentFit<M>,
+    terms: Vec<([u8; M], f64)>,
+    functional: Vec<f64>,
+    /// Values of the functional in hand on the functions, lane by lane.
+    values: Vec<[f64; LANES]>,
+}
+
+/// What is fitted.
+pub(super) struct Fits<'a, const M: usize> {
+    pub chart: &'a dyn Chart<M>,
+    pub basis: &'a Basis<M>,
+    pub radius: f64,
+    pub functionals: &'a [Functional<M>],
+}
+
+impl<const M: usize> Fits<'_, M> {
+    /// A range of points, in their order; ends early when interrupted.
+    pub fn run(
+        &self,
+        points: Range<usize>,
+        interrupt: &Interrupt,
+        work: &mut Work<M>,
+        sink: &mut dyn RowSink<M>,
+        outcome: &mut Outcome<M>,
+    ) {
+        let end = points.end;
+        for first in points.step_by(LANES) {
+            if interrupt.is_raised() {
+                return;
+            }
+            self.rows_of(first..(first + LANES).min(end), work, sink, outcome);
+        }
+    }
+
+    /// The rows of up to four points, one a lane.
+    fn rows_of(&self, points: Range<usize>, work: &mut Work<M>, sink: &mut dyn RowSink<M>, outcome: &mut Outcome<M>) {
+        let number = self.basis.size();
+        let wanted = (NEIGHBORS_A_FUNCTION * number as f64).ceil() as usize;
+        let last = points.end - 1;
+        let nominal: [f64; LANES] =
+            std::array::from_fn(|lane| self.radius * self.chart.scale((points.start + lane).min(last)));
+        let mut reach = nominal;
+        let can_grow = |lane: usize, reach: f64| self.chart.may_grow() && reach * GROWTH <= MOST_GROWTH * nominal[lane];
+        for (lane, i) in points.clone().enumerate() {
+            loop {
+                self.chart.gather(i, reach[lane], false, &mut work.fit.near[lane]);
+                if work.fit.near[lane].len() >= wanted || !can_grow(lane, reach[lane]) {
+                    break;
+                }
+                reach[lane] *= GROWTH;
+                outcome.soundness.enlarged += 1;
+            }
+        }
+        for lane in points.len()..LANES {
+            // Spare lanes repeat the first.
+            let (first, rest) = work.fit.near.split_at_mut(1);
+            rest[lane - 1].clone_from(&first[0]);
+            reach[lane] = reach[0];
+        }
+        let mut is_last_resort = [!self.chart.may_grow(); LANES];
+        loop {
+            let pivots = work.fit.factorise(self.basis);
+            let sound: [bool; LANES] =
+                std::array::from_fn(|lane| pivots[lane] > LEAST_PIVOT && work.fit.near[lane].len() >= number);
+            let mut is_again = false;
+            for (lane, i) in points.clone().enumerate().filter(|(lane, _)| !sound[*lane]) {
+                if can_grow(lane, reach[lane]) && !is_last_resort[lane] {
+                    reach[lane] *= GROWTH;
+                    outcome.soundness.enlarged += 1;
+                } else if !is_last_resort[lane] {
+                    reach[lane] = nominal[lane] * GROWTH;
+                    is_last_resort[lane] = true;
+                    outcome.soundness.unresolved += 1;
+                } else {
+                    continue;
+                }
+                self.chart.gather(i, reach[lane], is_last_resort[lane], &mut work.fit.near[lane]);
+                is_again = true;
+            }
+            if !is_again {
+                for lane in (0..points.len()).filter(|lane| sound[*lane]) {
+                    outcome.soundness.least_pivot = outcome.soundness.least_pivot.min(pivots[lane]);
+                }
+                self.finish(&points, reach, sound, work, sink, outcome);
+                return;
+            }
+        }
+    }
+
+    /// Solutions for every functional, with the supports and the factorization as they stand.
+    fn finish(
+        &self,
+        points: &Range<usize>,
+        reach: [f64; LANES],
+        sound: [bool; LANES],
+        work: &mut Work<M>,
+        sink: &mut dyn RowSink<M>,
+        outcome: &mut Outcome<M>,
+    ) {
+        let heights = self.chart.needs_heights().then(|| self.heights(reach, work));
+        let mut holds = [true; LANES];
+        for (k, functional) in self.functionals.iter().enumerate() {
+            work.values.clear();
+            work.values.resize(self.basis.size(), [0.0; LANES]);
+            for lane in 0..LANES {
+                let i = points.start + lane.min(points.len().saturating_sub(1));
+                work.terms.clear();
+                let of_lane = heights.as_ref().map(|heights| &heights[lane]);
+                self.chart.terms(*functional, i, of_lane, &mut work.terms);
+                for (alpha, coefficient) in &work.terms {
+                    // Functions are of coordinates by the reach.
+                    let order: u8 = alpha.iter().sum();
+                    let scale = coefficient * reach[lane].powi(-i32::from(order));
+                    if let Some(values) = self.basis.derivative(alpha) {
+                        for (sum, value) in work.values.iter_mut().zip(values) {
+                            sum[lane] += scale * value;
+                        }
+                    }
+                }
+            }
+            work.fit.solution.clear();
+            work.fit.solution.extend(work.values.iter().map(|values| Lanes::new(*values)));
+            work.fit.solve();
+            for (lane, i) in points.clone().enumerate() {
+                if !sound[lane] {
+                    work.functional.clear();
+                    work.functional.extend(work.values.iter().map(|values| values[lane]));
+                    holds[lane] &= work.fit.solve_low_rank(lane, &work.functional) <= OPEN_MOMENTS;
+                }
+                let weights = holds[lane].then_some((work.fit.weights.as_slice(), lane));
+                sink.take(k, i, &work.fit.near[lane], weights);
+            }
+        }
+        for lane in (0..points.len()).filter(|lane| !sound[*lane]) {
+            if holds[lane] {
+                outcome.soundness.low_rank += 1;
+            } else {
+                outcome.soundness.failed += 1;
+            }
+        }
+        if let Some(heights) = heights {
+            outcome.heights.extend_from_slice(&heights[..points.len()]);
+        }
+    }
+
+    /// Slopes and second derivatives of the surface over the plane of each lane.
+    fn heights(&self, reach: [f64; LANES], work: &mut Work<M>) -> [Heights<M>; LANES] {
+        work.fit.solve_heights(self.basis.size());
+        let derivative = |alpha: [u8; M], lane: usize| -> f64 {
+            let values = self.basis.derivative(&alpha).unwrap_or(&[]);
+            values.iter().zip(&work.fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
+        };
+        std::array::from_fn(|lane| Heights {
+            first: std::array::from_fn(|a| derivative(std::array::from_fn(|d| u8::from(d == a)), lane)),
+            second: std::array::from_fn(|a| {
+                std::array::from_fn(|b| {
+                    let alpha = std::array::from_fn(|d| u8::from(d == a) + u8::from(d == b));
+                    derivative(alpha, lane) / reach[lane]
+                })
+            }),
+        })
+    }
+}
