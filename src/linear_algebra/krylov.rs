@@ -73,7 +73,9 @@ impl Convergence {
         self.residual <= 10.0 * stopping.tolerance
     }
 
-    fn of(map: &dyn LinearMap, b: &[f64], x: &[f64], iterations: u64, room: &mut Vec<f64>) -> Self {
+    /// Of a solution: its residual anew, with room for a vector.
+    #[must_use]
+    pub fn of(map: &dyn LinearMap, b: &[f64], x: &[f64], iterations: u64, room: &mut Vec<f64>) -> Self {
         room.resize(b.len(), 0.0);
         map.apply(x, room);
         room.iter_mut().zip(b).for_each(|(a, b)| *a = b - *a);

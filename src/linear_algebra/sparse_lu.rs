@@ -7,10 +7,19 @@ use faer::sparse::linalg::solvers::Lu;
 use faer::sparse::{SparseColMat, Triplet};
 
 /// A decomposition that solves for any right-hand side.
+///
+/// A + α 1 1ᵀ/n is dense: what is decomposed is A with β added to its first diagonal entry, which makes it regular, and both changes of
+/// rank one are made good by Woodbury's formula.
 pub struct SparseLu {
     factors: Lu<usize, f64>,
     size: usize,
-    is_bordered: bool,
+    correction: Option<Correction>,
+}
+
+/// B⁻¹ U and the small matrix S = C⁻¹ + Uᵀ B⁻¹ U for U = (e₀, 1) and C = diag(−β, α/n).
+struct Correction {
+    columns: [Vec<f64>; 2],
+    small: [[f64; 2]; 2],
 }
 
 /// The matrix is singular, or too large.
@@ -24,34 +33,59 @@ pub struct Undecomposed {
 }
 
 impl SparseLu {
-    /// Of A, or with a border of ones that takes the mean of a solution away and lets a right-hand side have one.
+    /// Of A, or of A + α 1 1ᵀ/n.
     ///
     /// # Errors
     /// [`Undecomposed`].
-    pub fn of(rows: &SparseRows, is_bordered: bool) -> Result<Self, Undecomposed> {
-        let n = rows.rows();
-        let size = n + usize::from(is_bordered);
+    pub fn of(rows: &SparseRows, alpha: Option<f64>) -> Result<Self, Undecomposed> {
+        let size = rows.rows();
         let failed = |reason: String| Undecomposed { size, reason };
-        let mut triplets = Vec::with_capacity(rows.entries() + 2 * n);
-        for i in 0..n {
+        let mut triplets = Vec::with_capacity(rows.entries() + 1);
+        let mut largest = 0.0_f64;
+        for i in 0..size {
             let (columns, weights) = rows.row(i);
             triplets.extend(columns.iter().zip(weights).map(|(j, w)| Triplet::new(i, *j as usize, *w)));
+            largest = weights.iter().fold(largest, |most, w| most.max(w.abs()));
         }
-        if is_bordered {
-            triplets.extend((0..n).flat_map(|i| [Triplet::new(i, n, 1.0), Triplet::new(n, i, 1.0)]));
-        }
+        // Of the size of the entries, with the sign of what is added.
+        let beta = alpha.map(|alpha| largest.copysign(alpha));
+        triplets.extend(beta.map(|beta| Triplet::new(0, 0, beta)));
         let matrix: SparseColMat<usize, f64> =
             SparseColMat::try_new_from_triplets(size, size, &triplets).map_err(|error| failed(format!("{error:?}")))?;
         let factors = matrix.sp_lu().map_err(|error| failed(format!("{error:?}")))?;
-        Ok(Self { factors, size: n, is_bordered })
+        let mut whole = Self { factors, size, correction: None };
+        if let (Some(alpha), Some(beta)) = (alpha, beta) {
+            let mut columns = [vec![0.0; size], vec![1.0; size]];
+            columns[0][0] = 1.0;
+            columns.iter_mut().for_each(|column| whole.solve_in_place(column));
+            let sum = |v: &[f64]| v.iter().sum::<f64>();
+            let small = [
+                [columns[0][0] - 1.0 / beta, columns[1][0]],
+                [sum(&columns[0]), sum(&columns[1]) + size as f64 / alpha],
+            ];
+            whole.correction = Some(Correction { columns, small });
+        }
+        Ok(whole)
+    }
+
+    fn solve_in_place(&self, x: &mut [f64]) {
+        let mut column = Col::from_fn(self.size, |i| x[i]);
+        self.factors.solve_in_place(column.as_mut());
+        x.iter_mut().enumerate().for_each(|(i, x)| *x = column[i]);
     }
 
     /// x with A x = b.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) {
-        let rows = self.size + usize::from(self.is_bordered);
-        let mut column = Col::from_fn(rows, |i| b.get(i).copied().unwrap_or(0.0));
-        self.factors.solve_in_place(column.as_mut());
-        x.iter_mut().enumerate().for_each(|(i, x)| *x = column[i]);
+        x.copy_from_slice(b);
+        self.solve_in_place(x);
+        if let Some(Correction { columns, small: [[a, b], [c, d]] }) = &self.correction {
+            let (first, second) = (x[0], x.iter().sum::<f64>());
+            let det = a * d - b * c;
+            let share = [(d * first - b * second) / det, (a * second - c * first) / det];
+            for (i, x) in x.iter_mut().enumerate() {
+                *x -= share[0] * columns[0][i] + share[1] * columns[1][i];
+            }
+        }
     }
 }
 
@@ -76,12 +110,12 @@ mod tests {
             rows
         };
         let exact: Vec<f64> = (0..n).map(|i| (std::f64::consts::TAU * i as f64 / n as f64).sin()).collect();
-        for (diagonal, is_bordered) in [(-2.5, false), (-2.0, true)] {
+        for (diagonal, alpha) in [(-2.5, None), (-2.0, Some(-0.3))] {
             let a = ring(diagonal);
             let (mut b, mut x) = (vec![0.0; n], vec![0.0; n]);
             a.apply(&exact, &mut b);
-            SparseLu::of(&a, is_bordered).unwrap().solve(&b, &mut x);
-            assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-11));
+            SparseLu::of(&a, alpha).unwrap().solve(&b, &mut x);
+            assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-10));
         }
     }
 }

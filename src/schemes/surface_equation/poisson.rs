@@ -109,12 +109,12 @@ impl<const D: usize> Problem<D> for Poisson {
         let value = &mut self.value;
         self.convergence = match self.solver {
             Solver::SparseLu => {
-                let is_bordered = matches!(self.condition, Condition::ZeroMean { .. });
-                let factors = phases.measure("solver/factors", || SparseLu::of(&rows, is_bordered));
+                let alpha = if let Condition::ZeroMean { alpha } = self.condition { Some(alpha) } else { None };
+                let factors = phases.measure("solver/factors", || SparseLu::of(&rows, alpha));
                 let factors = factors.map_err(|failed| unsolved(failed.to_string()))?;
                 phases.measure("solver/solution", || {
                     factors.solve(&right, value);
-                    residual(&rows, &right, value, is_bordered)
+                    Convergence::of(map, &right, value, 1, &mut Vec::new())
                 })
             }
             Solver::BiCgStab(stopping) => {
@@ -198,16 +198,4 @@ impl<const D: usize> Problem<D> for Poisson {
         method.insert("solver", solver);
         method.insert("condition", condition);
     }
-}
-
-/// ‖b − A x‖ by ‖b‖ of a direct solution; with a border, of what is left when the multiplier has taken the mean.
-fn residual(rows: &SparseRows, right: &[f64], x: &[f64], is_bordered: bool) -> Convergence {
-    let mut rest = vec![0.0; right.len()];
-    rows.apply(x, &mut rest);
-    rest.iter_mut().zip(right).for_each(|(rest, b)| *rest = b - *rest);
-    if is_bordered {
-        subtract_mean(&mut rest);
-    }
-    let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-    Convergence { iterations: 1, residual: size(&rest) / size(right).max(f64::MIN_POSITIVE) }
 }
