@@ -113,6 +113,8 @@ words! {
         DivergedDtFloor => "diverged.dt_floor",
         /// The interface vanished.
         DivergedInterface => "diverged.interface",
+        /// A system of equations was not solved, or a tolerance not kept.
+        DivergedUnsolved => "diverged.unsolved",
         /// The worker died.
         WorkerCrash => "worker.crash",
         /// The worker gave no sign of life.
@@ -204,6 +206,10 @@ impl Reason {
                 "the run asks for ever smaller steps; look at its last frames before anything else"
             }
             Self::DivergedInterface => "the interface vanished between the particles; try a smaller spacing",
+            Self::DivergedUnsolved => {
+                "equations were not solved as the scene asks; the message says what was left: points that lie more evenly, another solver, \
+                 more iterations or a looser tolerance may do"
+            }
             Self::WorkerCrash => "the worker died; its log may say why",
             Self::WorkerStalled => "the worker gave no sign of life and was ended",
             Self::ServerRestart => "the service stopped while the job ran; it goes on from the last checkpoint",

@@ -81,6 +81,7 @@ impl Failure {
                     StepError::InterfaceLost { .. } => Reason::DivergedInterface,
                     StepError::TooFast { .. } => Reason::DivergedCfl,
                     StepError::TimeStepFloor { .. } => Reason::DivergedDtFloor,
+                    StepError::Unsolved { .. } => Reason::DivergedUnsolved,
                     _ => Reason::DivergedNonfinite,
                 };
                 Verdict::Failed { reason, message: error.to_string() }
@@ -366,7 +367,7 @@ fn draw_picture(
             }
         }
     }
-    let spacing = order.body["scene"]["spacing"].as_f64().unwrap_or(0.01);
+    let spacing = picture::spacing(&order.body["scene"]);
     let path = directory.join("picture.svg");
     let drawn = picture::draw(&artifacts::unfinished(&path), &views, spacing)
         .and_then(|()| artifacts::finish(&path).map_err(|e| e.to_string()))

@@ -6,6 +6,7 @@ use plotters::coord::Shift;
 use plotters::prelude::{
     ChartBuilder, Circle, DrawingArea, IntoDrawingArea, PathElement, RGBColor, SVGBackend, ShapeStyle, WHITE,
 };
+use serde_json::Value;
 use std::path::Path;
 
 /// Width and height of one panel in pixels.
@@ -24,6 +25,13 @@ pub fn draw(path: &Path, frames: &[FrameView], spacing: f64) -> Result<(), Strin
         draw_panel(panel, frame, spacing)?;
     }
     root.present().map_err(|e| e.to_string())
+}
+
+/// How far points of a scene are apart in its pictures: h, or as far as so many points of a surface of unit size are.
+#[must_use]
+pub fn spacing(scene: &Value) -> f64 {
+    let of_count = || scene["count"].as_f64().map(|count| 3.5 / count.sqrt());
+    scene["spacing"].as_f64().or_else(of_count).unwrap_or(0.05)
 }
 
 fn draw_panel(panel: &DrawingArea<SVGBackend, Shift>, frame: &FrameView, spacing: f64) -> Result<(), String> {

@@ -94,11 +94,7 @@ impl Bench {
         for file in chosen.iter().filter_map(|k| files.get(*k)) {
             views.extend(vtkhdf::read_frame(file).map_err(|error| error.to_string())?);
         }
-        picture::draw(
-            path,
-            &views,
-            scene["spacing"].as_f64().or_else(|| measure::spacing(scene).map(|h| 3.0 * h)).unwrap_or(0.01),
-        )
+        picture::draw(path, &views, picture::spacing(scene))
     }
 }
 
