@@ -87,7 +87,7 @@ fn manufactured(count: u64, order: u64, surface: &Value) -> Value {
 fn pattern(surface: &Value) -> Value {
     json!({
         "kind": "surface_pde", "surface": surface, "count": 8000,
-        "problem": {"type": "reaction_diffusion", "end_time": 100, "tolerance": 1e-5}
+        "problem": {"type": "reaction_diffusion", "model": {"type": "brusselator", "b": 5}, "end_time": 100, "tolerance": 1e-5}
     })
 }
 
@@ -388,7 +388,7 @@ fn figures() -> Vec<Figure> {
         frames(
             "surface-bump",
             "Diffusion over the bump, α = 1",
-            bump(1.0, BUMP_COUNTS[0], &json!("bdf2")),
+            bump(1.0, BUMP_COUNTS[0] / 4, &json!("bdf2")),
             0.1,
             &[0, 1, 3, 10],
         ),
