@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
-.PHONY: help build demo test soak load estimates check check-deploy setup clean
+.PHONY: help build demo test soak load estimates check check-deploy check-portable setup clean
 
 # Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
 ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
@@ -21,6 +21,7 @@ help:
 	@echo "make soak   the promises by the hundred: COUNT=1000 is all, ONLY=name,name picks; counts add up over runs"
 	@echo "make load   how fast the service answers under load, beside what was promised"
 	@echo "make estimates  what runs were estimated to take beside what they took"
+	@echo "make check-portable  a build for any x86-64 agrees with that for this machine"
 	@echo "make check-deploy  the files in deploy/, as far as this machine can"
 
 # Installs what is missing, and nothing where nothing is missing.
@@ -61,6 +62,12 @@ load: build
 
 estimates: build
 	python3 tests/python/estimates.py "$(abspath $(TARGET)/release/meniscus)"
+
+# Where there is neither AVX2 nor fused multiplication, the same formulas run in two lanes.
+check-portable: setup
+	cargo build --profile test --locked -p meniscus-api
+	RUSTFLAGS="-C target-cpu=x86-64" cargo build --profile test --locked -p meniscus-api --target-dir "$(TARGET)/portable"
+	python3 tests/python/portable.py "$(abspath $(TARGET)/debug/meniscus)" "$(abspath $(TARGET)/portable/debug/meniscus)"
 
 check-deploy:
 	deploy/check.sh
