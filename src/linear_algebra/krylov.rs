@@ -8,6 +8,7 @@ pub use incomplete_factors::IncompleteFactors;
 
 use super::SparseRows;
 use super::least_squares::dot;
+use crate::parallel::Interrupt;
 
 /// A linear map of a space onto itself.
 pub trait LinearMap: Sync {
@@ -15,6 +16,32 @@ pub trait LinearMap: Sync {
     fn size(&self) -> usize;
     /// out = A x.
     fn apply(&self, x: &[f64], out: &mut [f64]);
+    /// Whether somebody asks to give the solution up.
+    fn is_given_up(&self) -> bool {
+        false
+    }
+}
+
+/// A map whose solution is given up when asked.
+pub struct Interruptible<'a> {
+    /// The map.
+    pub map: &'a dyn LinearMap,
+    /// Who asks.
+    pub interrupt: &'a Interrupt,
+}
+
+impl LinearMap for Interruptible<'_> {
+    fn size(&self) -> usize {
+        self.map.size()
+    }
+
+    fn apply(&self, x: &[f64], out: &mut [f64]) {
+        self.map.apply(x, out);
+    }
+
+    fn is_given_up(&self) -> bool {
+        self.interrupt.is_raised()
+    }
 }
 
 impl LinearMap for SparseRows {
@@ -95,7 +122,9 @@ fn add(y: &mut [f64], a: f64, x: &[f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::{IncompleteFactors, LinearMap, SparseRows, Stopping, WithMean, bicgstab, gmres};
+    use super::{
+        IncompleteFactors, Interrupt, Interruptible, LinearMap, SparseRows, Stopping, WithMean, bicgstab, gmres,
+    };
 
     /// Advection and diffusion on a ring or a line: not symmetric.
     fn operator(n: usize, is_ring: bool) -> SparseRows {
@@ -147,6 +176,22 @@ mod tests {
         assert!(found.residual < 1e-10, "{found:?}");
         assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-7));
         assert_eq!(map.size(), 200);
+    }
+
+    #[test]
+    fn a_solution_is_given_up_when_asked() {
+        let a = operator(300, true);
+        let factors = IncompleteFactors::of(&operator(300, false)).unwrap();
+        let interrupt = Interrupt::default();
+        interrupt.raise();
+        let map = Interruptible { map: &a, interrupt: &interrupt };
+        let b: Vec<f64> = (0..300).map(f64::from).collect();
+        let never = Stopping { tolerance: 0.0, most_iterations: u64::MAX };
+        let mut x = vec![0.0; 300];
+        let found = bicgstab::solve(&map, &factors, &b, &mut x, never, &mut bicgstab::Storage::default());
+        assert_eq!(found.iterations, 0);
+        let found = gmres::solve(&map, &factors, &b, &mut x, 40, never, &mut gmres::Storage::default());
+        assert_eq!(found.iterations, 0);
     }
 
     #[test]

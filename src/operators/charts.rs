@@ -69,6 +69,15 @@ fn second<const M: usize>(a: usize, b: usize) -> [u8; M] {
     std::array::from_fn(|d| u8::from(d == a) + u8::from(d == b))
 }
 
+/// A functional in the coordinates of space themselves.
+fn in_space<const D: usize>(functional: Functional<D>, terms: &mut Vec<([u8; D], f64)>) {
+    match functional {
+        Functional::Partial(alpha) => terms.push((alpha, 1.0)),
+        Functional::LaplaceBeltrami => terms.extend((0..D).map(|d| (second(d, d), 1.0))),
+        Functional::Gradient(axis) => terms.push((first(axis), 1.0)),
+    }
+}
+
 /// Unit vectors across a unit normal and each other, M = D − 1 of them.
 fn tangents<const D: usize, const M: usize>(n: &Vector<D>) -> [Vector<D>; M] {
     // Of the axes the one that is farthest from the normal, then what is across both.

@@ -3,6 +3,7 @@
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
+use crate::parallel::Interrupt;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
 /// Points of a surface in space that are uniform by its area, to a good approximation: uniform points of a thin shell about it,
@@ -35,12 +36,21 @@ const REACH: f64 = 1.8;
 /// Length of a move, by the mean spacing, for a neighbour at no distance.
 const PUSH: f64 = 0.25;
 
-/// Pushes points along their surface, ρ = 1.8 δn, by PUSH δn Σ (1 − r/ρ)² (x_i − x_j)/r a round, and back onto it.
-pub fn relax(points: &mut Vec<Vector<3>>, spacing: f64, onto: impl Fn(&Vector<3>) -> Vector<3> + Sync) {
+/// Pushes points along their surface, ρ = 1.8 δn, by PUSH δn Σ (1 − r/ρ)² (x_i − x_j)/r a round, and back onto it. Ends early when
+/// interrupted.
+pub fn relax(
+    points: &mut Vec<Vector<3>>,
+    spacing: f64,
+    onto: impl Fn(&Vector<3>) -> Vector<3> + Sync,
+    interrupt: &Interrupt,
+) {
     let mut cells = CellList::new(Domain::unbounded());
     let reach = REACH * spacing;
     let mut moved = points.clone();
     for round in 0..ROUNDS {
+        if interrupt.is_raised() {
+            return;
+        }
         cells.rebuild(points.iter().copied(), reach);
         // Moves become smaller towards the end, so that points come to rest.
         let push = PUSH * spacing * (1.0 - 0.8 * round as f64 / ROUNDS as f64);
@@ -61,7 +71,7 @@ pub fn relax(points: &mut Vec<Vector<3>>, spacing: f64, onto: impl Fn(&Vector<3>
 
 #[cfg(test)]
 mod tests {
-    use super::{Surface, Vector, random, relax};
+    use super::{Interrupt, Surface, Vector, random, relax};
     use crate::geometry::surfaces::Torus;
 
     #[test]
@@ -71,7 +81,7 @@ mod tests {
         let mut points = random(&torus, count, 0.02, 7);
         let area = 4.0 * std::f64::consts::PI.powi(2) * 0.4;
         let spacing = (area / count as f64).sqrt();
-        relax(&mut points, spacing, |x| torus.nearest(x).point);
+        relax(&mut points, spacing, |x| torus.nearest(x).point, &Interrupt::default());
         let mut least = f64::INFINITY;
         for (i, x) in points.iter().enumerate() {
             assert!(torus.signed_distance(x).abs() < 1e-12);

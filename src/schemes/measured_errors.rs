@@ -51,6 +51,19 @@ impl ErrorNorms {
     }
 }
 
+/// ‖e‖₂/‖exact‖₂, max |e|, and max |e| by the largest of the exact values, of a field that is known exactly.
+#[must_use]
+pub fn against_exact(quantity: &str, found: &[f64], exact: &[f64], time: f64, reference: &str) -> Vec<ErrorEntry> {
+    let (mut errors, mut sizes) = (ErrorNorms::default(), ErrorNorms::default());
+    for (found, exact) in found.iter().zip(exact) {
+        errors.add(found - exact);
+        sizes.add(*exact);
+    }
+    let norms =
+        [("relative", errors.rms() / sizes.rms()), ("max", errors.max()), ("max_relative", errors.max() / sizes.max())];
+    norms.map(|(norm, value)| entry(quantity, norm, value, time, reference)).to_vec()
+}
+
 /// One report entry.
 #[must_use]
 pub fn entry(quantity: &str, norm: &str, value: f64, time: f64, reference: &str) -> ErrorEntry {

@@ -3,6 +3,7 @@
 
 mod droplets;
 mod hard_cases;
+mod surfaces;
 #[path = "../support/mod.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;

@@ -22,7 +22,7 @@ pub fn solve(
     let [r, shadow, p, v, s, t, hat, room] = &mut storage.vectors;
     let goal = stopping.tolerance * norm(b);
     let mut iterations = 0;
-    'begin: while iterations < stopping.most_iterations {
+    'begin: while iterations < stopping.most_iterations && !map.is_given_up() {
         map.apply(x, r);
         r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
         // Also where b is nothing.
@@ -32,7 +32,7 @@ pub fn solve(
         shadow.copy_from_slice(r);
         p.copy_from_slice(r);
         let mut rho = dot(shadow, r);
-        while iterations < stopping.most_iterations {
+        while iterations < stopping.most_iterations && !map.is_given_up() {
             iterations += 1;
             factors.solve(p, hat);
             map.apply(hat, v);

@@ -37,7 +37,7 @@ pub fn solve(
         map.apply(x, first);
         first.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
         let beta = norm(first);
-        if beta <= goal || !beta.is_finite() || iterations >= stopping.most_iterations {
+        if beta <= goal || !beta.is_finite() || iterations >= stopping.most_iterations || map.is_given_up() {
             break;
         }
         first.iter_mut().for_each(|r| *r /= beta);
@@ -72,7 +72,8 @@ pub fn solve(
             let rest = right[k];
             right[k] = c * rest;
             right.push(-s * rest);
-            if right[k + 1].abs() <= goal || below == 0.0 || iterations >= stopping.most_iterations {
+            let is_over = iterations >= stopping.most_iterations || map.is_given_up();
+            if right[k + 1].abs() <= goal || below == 0.0 || is_over {
                 break;
             }
         }

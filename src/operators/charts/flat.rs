@@ -3,7 +3,7 @@
 //! Windows are 1 − r²/r_c²: wide, as the paper's are. Narrow ones, which are more exact on surfaces at rest, make fits of moving
 //! particles follow few neighbours and flows unstable.
 
-use super::{Chart, Functional, Heights, Node, first, second};
+use super::{Chart, Functional, Heights, Node, in_space};
 use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
 
@@ -46,10 +46,6 @@ impl<const D: usize> Chart<D> for FlatChart<'_, D> {
         _heights: Option<&Heights<D>>,
         terms: &mut Vec<([u8; D], f64)>,
     ) {
-        match functional {
-            Functional::Partial(alpha) => terms.push((alpha, 1.0)),
-            Functional::LaplaceBeltrami => terms.extend((0..D).map(|d| (second(d, d), 1.0))),
-            Functional::Gradient(axis) => terms.push((first(axis), 1.0)),
-        }
+        in_space(functional, terms);
     }
 }

@@ -1,7 +1,7 @@
 //! Copies of the points of a surface along their normals, fitted in space: the paper's form of Surface DC-PSE (section 3,
 //! algorithms 1 and 2). The kernel values of the copies of a point are added up to the weight of that point.
 
-use super::{Chart, Functional, Heights, Node, first, second};
+use super::{Chart, Functional, Heights, Node, in_space};
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 
@@ -71,10 +71,6 @@ impl<const D: usize> Chart<D> for NormalCopies<'_, D> {
         _heights: Option<&Heights<D>>,
         terms: &mut Vec<([u8; D], f64)>,
     ) {
-        match functional {
-            Functional::Partial(alpha) => terms.push((alpha, 1.0)),
-            Functional::LaplaceBeltrami => terms.extend((0..D).map(|d| (second(d, d), 1.0))),
-            Functional::Gradient(axis) => terms.push((first(axis), 1.0)),
-        }
+        in_space(functional, terms);
     }
 }

@@ -249,8 +249,8 @@ impl ProblemChoice {
         }
     }
 
-    /// Work beside the construction, in products of a row.
-    pub fn work(&self, application: f64, points: f64, steps: f64, time_step: f64) -> Vec<PhaseWork> {
+    /// Work beside the construction, in products of a row; a controlled integrator makes so many steps of one.
+    pub fn work(&self, application: f64, points: f64, steps: f64, inner_steps: f64) -> Vec<PhaseWork> {
         let wide = points.ln().max(1.0);
         match self {
             Self::LaplaceBeltrami { .. } => vec![PhaseWork::every_step("operators/application", application * steps)],
@@ -272,19 +272,25 @@ impl ProblemChoice {
                 vec![PhaseWork::every_step("solver/solution", 20.0 * application * steps)]
             }
             Self::Evolution { start, integrator, .. } => {
-                let (fields, diffusivity) = match start {
-                    Start::Field(_) => (1.0, 1.0),
-                    Start::Reaction { diffusivity, .. } => (2.0, diffusivity[0].max(diffusivity[1])),
-                };
-                // Inner steps are bound by stability: 2.4 δn² or less, of a surface of about 4π.
-                let limit = 2.0 * 12.6 / points / diffusivity;
-                let inner = match integrator {
-                    EvolutionIntegrator::Controlled { .. } => (time_step / limit).max(1.0),
-                    _ => 1.0,
-                };
+                let fields = if let Start::Reaction { .. } = start { 2.0 } else { 1.0 };
+                let inner = if let EvolutionIntegrator::Controlled { .. } = integrator { inner_steps } else { 1.0 };
                 vec![PhaseWork::every_step("evolution", 6.0 * fields * application * steps * inner)]
             }
         }
+    }
+
+    /// The largest diffusivity.
+    pub fn diffusivity(&self) -> f64 {
+        match self {
+            Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => diffusivity[0].max(diffusivity[1]),
+            _ => 1.0,
+        }
+    }
+
+    /// Bytes a point that a direct decomposition fills, for rows of so many entries: n ln n of them on a surface (measured: 23 kB at
+    /// 35 entries and 16,000 points).
+    pub fn fill(&self, entries: f64, points: f64) -> f64 {
+        if let Self::Poisson { solver: Solver::SparseLu, .. } = self { 70.0 * entries * points.ln() } else { 0.0 }
     }
 
     /// The field that is operated on, its values and its exact operator.

@@ -246,15 +246,26 @@ fn scheme(
 }
 
 impl SurfaceScene {
-    /// Nodes of a fit, about.
-    fn nodes(&self, method: &Method) -> f64 {
+    /// Entries of a row, about.
+    fn entries(&self, method: &Method) -> f64 {
         let cutoff = method.support.radius / self.shape.spacing(self.count);
         let is_curve = matches!(self.shape, Shape::Circle { .. });
-        let surface = if is_curve { 2.0 * cutoff } else { std::f64::consts::PI * cutoff * cutoff };
+        1.0 + if is_curve { 2.0 * cutoff } else { std::f64::consts::PI * cutoff * cutoff }
+    }
+
+    /// Nodes of a fit, about.
+    fn nodes(&self, method: &Method) -> f64 {
+        let surface = self.entries(method);
         match method.form {
             Form::Intrinsic { .. } => surface,
             Form::Copies { layers, .. } => surface * (1.0 + 1.6 * f64::from(layers)),
         }
+    }
+
+    /// Steps of a controlled integrator to one of the scene, when stability binds them: 2 δn² by the diffusivity.
+    fn inner_steps(&self) -> f64 {
+        let spacing = self.shape.spacing(self.count);
+        (self.fixed.time_step * self.problem.diffusivity() / (2.0 * spacing * spacing)).max(1.0)
     }
 
     /// Functions of a fit.
@@ -313,8 +324,8 @@ impl Scene for SurfaceScene {
         // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
         let a_point = match &self.scheme {
             Scheme::Dcpse(method) => {
-                let entries = method.support.radius / self.shape.spacing(self.count);
-                250.0 + 2.4 * 12.0 * (std::f64::consts::PI * entries * entries + 1.0) * self.problem.copies()
+                let entries = self.entries(method);
+                250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, self.count as f64)
             }
             Scheme::Embedding { order, spacing } => {
                 let nodes =
@@ -352,10 +363,9 @@ impl Scene for SurfaceScene {
             Scheme::Dcpse(method) => {
                 let (nodes, terms) = (self.nodes(method), self.terms(method));
                 let fit = nodes * (20.0 + 0.25 * terms * terms) + 0.02 * terms.powi(3);
-                let entries = method.support.radius / self.shape.spacing(self.count);
-                let application = points * std::f64::consts::PI * entries * entries;
+                let application = points * self.entries(method);
                 let mut work = vec![PhaseWork::at_moments("operators/construction", points * fit)];
-                work.extend(self.problem.work(application, points, steps as f64, self.fixed.time_step));
+                work.extend(self.problem.work(application, points, steps as f64, self.inner_steps()));
                 work
             }
             Scheme::Embedding { order, spacing } => {
@@ -382,13 +392,13 @@ impl Scene for SurfaceScene {
             }
             (Scheme::Dcpse(method), shape) => {
                 let reach = method.support.radius;
-                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, reach);
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, reach, &interrupt);
                 let cloud = self.cloud(cloud, reach)?;
                 let problem = self.problem.build(shape, &cloud, self.seed, self.fixed.time_step);
                 Ok(Box::new(SurfaceEquation::<3, 2>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
             }
             (Scheme::Embedding { order, spacing }, shape) => {
-                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, 0.0);
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, 0.0, &interrupt);
                 let Some((field, values, operated)) = self.problem.known(shape, &cloud) else { return Err(Vec::new()) };
                 let surface: Box<dyn crate::geometry::Surface<3>> = match shape {
                     Shape::Torus(torus) => Box::new(torus.clone()),

@@ -3,6 +3,7 @@
 use crate::geometry::random::CounterRandom;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
 use crate::geometry::{Surface, Vector, fibonacci};
+use crate::parallel::Interrupt;
 use crate::point_clouds::{Bump, bump, relaxation};
 use crate::schemes::surface_equation::SurfaceCloud;
 use std::f64::consts::{PI, TAU};
@@ -138,7 +139,14 @@ pub(super) fn circle(radius: f64, count: usize, sampling: Sampling, seed: u64) -
 }
 
 /// Points of a surface in space; `reach` is the support's, for the images of a surface with edges.
-pub(super) fn in_space(shape: &Shape, count: u64, sampling: Sampling, seed: u64, reach: f64) -> SurfaceCloud<3> {
+pub(super) fn in_space(
+    shape: &Shape,
+    count: u64,
+    sampling: Sampling,
+    seed: u64,
+    reach: f64,
+    interrupt: &Interrupt,
+) -> SurfaceCloud<3> {
     if let Shape::Bump(bump) = shape {
         return with_edges(*bump, count, reach);
     }
@@ -151,7 +159,7 @@ pub(super) fn in_space(shape: &Shape, count: u64, sampling: Sampling, seed: u64,
             // A shell as thin as the drawing of points allows.
             let mut points = relaxation::random(surface, number, 0.02 * (high - low).min(), seed);
             if is_relaxed {
-                relaxation::relax(&mut points, spacing, |x| surface.nearest(x).point);
+                relaxation::relax(&mut points, spacing, |x| surface.nearest(x).point, interrupt);
             }
             points
         }
@@ -219,14 +227,15 @@ fn with_edges(bump: Bump, count: u64, reach: f64) -> SurfaceCloud<3> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Bump, Ellipsoid, PI, Sampling, Shape, circle, in_space};
+    use super::{Bump, Ellipsoid, PI, Sampling, Shape, TAU, circle, in_space};
     use crate::geometry::{Surface, Vector};
+    use crate::parallel::Interrupt;
 
     #[test]
     fn points_lie_on_the_surface_and_know_it() {
         let surface = Ellipsoid { center: Vector::<3>::zeros(), semi_axes: Vector::<3>::new(1.0, 0.8, 0.75) };
         for sampling in [Sampling::Fibonacci, Sampling::Random { is_relaxed: true }] {
-            let found = in_space(&Shape::Ellipsoid(surface.clone()), 200, sampling, 1, 0.1);
+            let found = in_space(&Shape::Ellipsoid(surface.clone()), 200, sampling, 1, 0.1, &Interrupt::default());
             for ((x, n), curvature) in found.points.iter().zip(&found.normals).zip(&found.curvatures) {
                 let nearest = surface.nearest(x);
                 assert!(nearest.distance.abs() < 1e-12 && (nearest.normal.unwrap() - n).norm() < 1e-9);
@@ -240,7 +249,8 @@ mod tests {
     #[test]
     fn a_bump_has_about_the_points_asked_for_and_both_probes() {
         for height in [0.0, 1.0, 2.0] {
-            let cloud = in_space(&Shape::Bump(Bump { height }), 18_400, Sampling::Regular, 1, 0.09);
+            let cloud =
+                in_space(&Shape::Bump(Bump { height }), 18_400, Sampling::Regular, 1, 0.09, &Interrupt::default());
             assert!((18_000..18_800).contains(&cloud.rows), "α = {height}: {}", cloud.rows);
             assert_eq!(cloud.probes.len(), 2);
             assert!(cloud.points.len() > cloud.rows && cloud.source.len() == cloud.points.len());
@@ -252,8 +262,13 @@ mod tests {
         for sampling in [Sampling::Regular, Sampling::Random { is_relaxed: true }] {
             let cloud = circle(2.0, 50, sampling, 3);
             assert!(cloud.points.iter().all(|x| (x.norm() - 2.0).abs() < 1e-14));
-            let angles: Vec<f64> = cloud.points.iter().map(|x| x[1].atan2(x[0])).collect();
-            assert_eq!(angles.len(), 50);
+            let mut angles: Vec<f64> = cloud.points.iter().map(|x| x[1].atan2(x[0])).collect();
+            angles.sort_by(f64::total_cmp);
+            let gap = |i: usize| (angles[(i + 1) % 50] - angles[i]).rem_euclid(TAU);
+            let largest = (0..50).map(gap).fold(0.0, f64::max);
+            // Even ones are a fiftieth of the circle; random ones leave gaps of ln 50 times that.
+            let most = if sampling == Sampling::Regular { 1.0 + 1e-9 } else { 50.0_f64.ln() };
+            assert!(largest <= most * TAU / 50.0, "{sampling:?}: {largest}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::band::{Band, Places, inner_half_width};
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
-use crate::schemes::measured_errors::{ErrorNorms, entry};
+use crate::schemes::measured_errors::against_exact;
 use crate::simulation::report::Newton;
 use crate::simulation::state::check_length;
 use crate::simulation::{
@@ -95,18 +95,8 @@ impl EmbeddingClosestPoint {
         if self.step == 0 {
             return Vec::new();
         }
-        let (mut errors, mut exact) = (ErrorNorms::default(), ErrorNorms::default());
-        for (value, reference) in self.value.iter().zip(&self.data.reference) {
-            errors.add(value - reference);
-            exact.add(*reference);
-        }
-        let found = [
-            ("relative", errors.rms() / exact.rms()),
-            ("max", errors.max()),
-            ("max_relative", errors.max() / exact.max()),
-        ];
         let time = self.clock().time;
-        found.map(|(norm, value)| entry("value", norm, value, time, "exact operator at the points")).to_vec()
+        against_exact("value", &self.value, &self.data.reference, time, "exact operator at the points")
     }
 }
 

@@ -3,7 +3,8 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools, against_exact};
+use super::problem::{Problem, Tools};
+use crate::schemes::measured_errors::against_exact;
 use crate::simulation::state::check_length;
 use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
 use crate::time::Clock;

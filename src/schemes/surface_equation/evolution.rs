@@ -3,11 +3,12 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools, against_exact};
+use super::problem::{Problem, Tools};
 use super::reactions::Reaction;
 use crate::linear_algebra::SparseRows;
-use crate::linear_algebra::krylov::{IncompleteFactors, Stopping, bicgstab};
-use crate::schemes::measured_errors::entry;
+use crate::linear_algebra::krylov::{IncompleteFactors, Interruptible, Stopping, bicgstab};
+use crate::parallel::Interrupt;
+use crate::schemes::measured_errors::{against_exact, entry};
 use crate::simulation::state::check_length;
 use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
 use crate::time::Clock;
@@ -94,14 +95,20 @@ impl Evolution {
             iterations: 0,
             peaks: cloud.probes.iter().map(|probe| values[*probe]).collect(),
             initial_integral: cloud.integral(&values[..cloud.rows]),
-            rate: f64::MAX,
+            rate: 0.0,
             values,
             parts,
         }
     }
 
     /// One step of the pair, or as many as the tolerance asks for.
-    fn explicit(&mut self, operator: &SparseRows, from: Clock, to: Clock) -> Result<(), StepError> {
+    fn explicit(
+        &mut self,
+        operator: &SparseRows,
+        interrupt: &Interrupt,
+        from: Clock,
+        to: Clock,
+    ) -> Result<(), StepError> {
         let Self { parts, values, pair, inner_step, attempts, .. } = self;
         let reaction = parts.reaction.as_ref();
         let mut slope = |u: &[f64], time: f64, out: &mut [f64]| slopes(operator, reaction, u, time, out);
@@ -117,6 +124,7 @@ impl Evolution {
         }
         let mut time = from.time;
         loop {
+            interrupt.check()?;
             let rest = to.time - time;
             let is_last = *inner_step >= rest * (1.0 - 1e-9);
             // Two equal steps rather than a whole one and a sliver.
@@ -147,7 +155,14 @@ impl Evolution {
     }
 
     /// A step of the implicit formula.
-    fn implicit(&mut self, operator: &SparseRows, stopping: Stopping, from: Clock, to: Clock) -> Result<(), StepError> {
+    fn implicit(
+        &mut self,
+        operator: &SparseRows,
+        stopping: Stopping,
+        interrupt: &Interrupt,
+        from: Clock,
+        to: Clock,
+    ) -> Result<(), StepError> {
         let whole = self.parts.time_step;
         // The first step has nothing before it.
         let is_first = from.step == 0;
@@ -171,7 +186,9 @@ impl Evolution {
             *right = if is_first { *now } else { (4.0 * now - before) / 3.0 };
         }
         previous.copy_from_slice(values);
-        let found = bicgstab::solve(system, factors, right, values, stopping, storage);
+        let map = Interruptible { map: system, interrupt };
+        let found = bicgstab::solve(&map, factors, right, values, stopping, storage);
+        interrupt.check()?;
         self.iterations += found.iterations;
         if !found.is_within(stopping) {
             let reason = format!("{} iterations leave a residual of {:.3e}", found.iterations, found.residual);
@@ -236,13 +253,13 @@ impl<const D: usize> Problem<D> for Evolution {
     }
 
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
-        let Tools { cloud, operators, phases, from, to } = tools;
+        let Tools { cloud, operators, interrupt, phases, from, to } = tools;
         let operator = &operators.rows[0];
         match self.parts.integrator {
             EvolutionIntegrator::Bdf2(stopping) => {
-                phases.measure("solver/solution", || self.implicit(operator, stopping, from, to))?;
+                phases.measure("solver/solution", || self.implicit(operator, stopping, interrupt, from, to))?;
             }
-            _ => phases.measure("evolution", || self.explicit(operator, from, to))?,
+            _ => phases.measure("evolution", || self.explicit(operator, interrupt, from, to))?,
         }
         if self.parts.reaction.is_some() {
             let slope = self.pair.slope();
@@ -291,12 +308,14 @@ impl<const D: usize> Problem<D> for Evolution {
             let mean = self.values[..rows].iter().sum::<f64>() / rows as f64;
             let spread = self.values[..rows].iter().map(|u| (u - mean).powi(2)).sum::<f64>() / rows as f64;
             errors.push(entry("pattern", "std", spread.sqrt(), clock.time, "a state without a pattern"));
-            errors.push(entry("pattern", "rate", self.rate, clock.time, "a steady state"));
+            if clock.step > 0 {
+                errors.push(entry("pattern", "rate", self.rate, clock.time, "a steady state"));
+            }
         }
         errors
     }
 
-    fn observables(&self, cloud: &SurfaceCloud<D>, _clock: Clock) -> Observables {
+    fn observables(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Observables {
         let rows = self.values.len() / self.fields();
         let first = &self.values[..rows];
         let mut row = vec![
@@ -305,7 +324,8 @@ impl<const D: usize> Problem<D> for Evolution {
             ("largest", first.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
         ];
         if self.parts.reaction.is_some() {
-            row.push(("rate", self.rate));
+            // Before the first step it is not known.
+            row.push(("rate", if clock.step == 0 { f64::NAN } else { self.rate }));
         }
         let probes = ["probe_0", "probe_1", "probe_2"].into_iter().zip(&cloud.probes);
         row.extend(probes.map(|(name, probe)| (name, self.values[*probe])));

@@ -2,11 +2,13 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools, against_exact};
+use super::problem::{Problem, Tools};
 use crate::linear_algebra::SparseRows;
-use crate::linear_algebra::krylov::{Convergence, IncompleteFactors, LinearMap, Stopping, WithMean, bicgstab, gmres};
+use crate::linear_algebra::krylov::{
+    Convergence, IncompleteFactors, Interruptible, LinearMap, Stopping, WithMean, bicgstab, gmres,
+};
 use crate::linear_algebra::sparse_lu::SparseLu;
-use crate::schemes::measured_errors::entry;
+use crate::schemes::measured_errors::{against_exact, entry};
 use crate::simulation::state::check_length;
 use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
 use crate::time::Clock;
@@ -95,7 +97,7 @@ impl<const D: usize> Problem<D> for Poisson {
     }
 
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
-        let Tools { operators, phases, to, .. } = tools;
+        let Tools { operators, interrupt, phases, to, .. } = tools;
         let (rows, right) = phases.measure("solver/assembly", || self.system(&operators.rows[0]));
         let unsolved = |reason: String| StepError::Unsolved { reason, step: to.step, time: to.time };
         let with_mean;
@@ -106,6 +108,7 @@ impl<const D: usize> Problem<D> for Poisson {
                 &with_mean
             }
         };
+        let map = &Interruptible { map, interrupt };
         let value = &mut self.value;
         self.convergence = match self.solver {
             Solver::SparseLu => {
@@ -132,6 +135,7 @@ impl<const D: usize> Problem<D> for Poisson {
                 })
             }
         };
+        interrupt.check()?;
         if let Solver::BiCgStab(stopping) | Solver::Gmres { stopping, .. } = self.solver
             && !self.convergence.is_within(stopping)
         {

@@ -2,7 +2,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::{Operators, Wanted};
-use crate::schemes::measured_errors::{ErrorNorms, entry};
+use crate::parallel::Interrupt;
 use crate::simulation::{ErrorEntry, Observables, Phases, RestoreError, State, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
@@ -13,6 +13,8 @@ pub struct Tools<'a, const D: usize> {
     pub cloud: &'a SurfaceCloud<D>,
     /// The operators that the problem wanted.
     pub operators: &'a Operators,
+    /// Asks to drop the step.
+    pub interrupt: &'a Interrupt,
     /// Costs.
     pub phases: &'a mut Phases,
     /// Before the step.
@@ -55,22 +57,4 @@ pub trait Problem<const D: usize>: Send {
 
     /// What choices came to.
     fn describe(&self, method: &mut BTreeMap<&'static str, String>);
-}
-
-/// ‖e‖₂/‖exact‖₂, max |e|, and max |e| by the largest of the exact values.
-pub(super) fn against_exact(
-    quantity: &str,
-    found: &[f64],
-    exact: &[f64],
-    time: f64,
-    reference: &str,
-) -> Vec<ErrorEntry> {
-    let (mut errors, mut sizes) = (ErrorNorms::default(), ErrorNorms::default());
-    for (found, exact) in found.iter().zip(exact) {
-        errors.add(found - exact);
-        sizes.add(*exact);
-    }
-    [("relative", errors.rms() / sizes.rms()), ("max", errors.max()), ("max_relative", errors.max() / sizes.max())]
-        .map(|(norm, value)| entry(quantity, norm, value, time, reference))
-        .to_vec()
 }

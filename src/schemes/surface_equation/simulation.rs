@@ -67,7 +67,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
                 operators.insert(built)
             }
         };
-        problem.step(Tools { cloud, operators, phases, from, to })?;
+        problem.step(Tools { cloud, operators, interrupt, phases, from, to })?;
         interrupt.check()?;
         if let Some(place) = problem.watched().iter().position(|value| !value.is_finite()) {
             let particle = place % cloud.rows.max(1);
