@@ -3,6 +3,7 @@
 pub mod domain;
 pub mod fibonacci;
 pub mod flows;
+pub mod frame;
 pub mod lattice;
 pub mod random;
 pub mod surfaces;

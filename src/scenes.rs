@@ -3,6 +3,9 @@
 
 mod dimension;
 pub mod droplet;
+mod flows;
+pub mod front;
+mod gbpm_parameters;
 pub mod particle_estimate;
 pub mod pcp_parameters;
 pub mod redistance;
@@ -14,7 +17,7 @@ pub mod work_estimate;
 use crate::scene::SceneKind;
 
 /// Every kind of scene.
-pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND, &droplet::KIND, &surface_pde::KIND];
+pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND, &droplet::KIND, &surface_pde::KIND, &front::KIND];
 
 /// A kind by its name.
 #[must_use]

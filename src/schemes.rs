@@ -3,6 +3,8 @@
 
 pub mod advected_level_set;
 pub mod embedding_closest_point;
+pub mod exact_motion;
+pub mod grid_based_particle;
 pub mod measured_errors;
 pub mod measured_redistancing;
 pub mod static_redistancing;

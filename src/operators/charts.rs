@@ -9,7 +9,6 @@ pub use normal_copies::NormalCopies;
 pub use tangent::TangentChart;
 
 pub use super::moment_fit::Node;
-use crate::geometry::Vector;
 
 /// What is asked of a field at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,25 +75,4 @@ fn in_space<const D: usize>(functional: Functional<D>, terms: &mut Vec<([u8; D],
         Functional::LaplaceBeltrami => terms.extend((0..D).map(|d| (second(d, d), 1.0))),
         Functional::Gradient(axis) => terms.push((first(axis), 1.0)),
     }
-}
-
-/// Unit vectors across a unit normal and each other, M = D − 1 of them.
-fn tangents<const D: usize, const M: usize>(n: &Vector<D>) -> [Vector<D>; M] {
-    // Of the axes the one that is farthest from the normal, then what is across both.
-    let mut found = [Vector::<D>::zeros(); M];
-    for a in 0..M {
-        let rest = |d: usize| {
-            let mut e = Vector::<D>::zeros();
-            e[d] = 1.0;
-            let mut e = e - n * n[d];
-            for t in &found[..a] {
-                e -= t * t[d];
-            }
-            e
-        };
-        let longest = (0..D).map(|d| (d, rest(d).norm_squared()));
-        let (axis, _) = longest.fold((0, -1.0), |best, next| if next.1 > best.1 { next } else { best });
-        found[a] = rest(axis).normalize();
-    }
-    found
 }

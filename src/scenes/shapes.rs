@@ -147,6 +147,31 @@ pub fn surface<const D: usize>(shape: &Value, pointer: &str) -> Result<Box<dyn S
     parsed.build::<D>(shape, pointer)
 }
 
+/// The parts of a checked shape: those of a union, else the shape itself.
+///
+/// # Errors
+/// As [`surface`].
+pub fn parts<const D: usize>(shape: &Value, pointer: &str) -> Result<Vec<Box<dyn Surface<D>>>, Vec<Violation>> {
+    // The whole first: parts must not overlap.
+    let whole = surface::<D>(shape, pointer)?;
+    match shape.get("of").and_then(Value::as_array) {
+        Some(of) => of.iter().enumerate().map(|(k, part)| surface::<D>(part, &format!("{pointer}/of/{k}"))).collect(),
+        None => Ok(vec![whole]),
+    }
+}
+
+/// The ball that a checked shape is, if it is one.
+#[must_use]
+pub fn ball<const D: usize>(shape: &Value) -> Option<Ball<D>> {
+    match serde_json::from_value(shape.clone()).ok()? {
+        Shape::Circle { center, radius } | Shape::Sphere { center, radius } => {
+            let center = center.unwrap_or_else(|| vec![0.0; D]);
+            (center.len() == D).then(|| Ball { center: Vector::<D>::from_column_slice(&center), radius })
+        }
+        _ => None,
+    }
+}
+
 impl Shape {
     fn build<const D: usize>(&self, written: &Value, pointer: &str) -> Result<Box<dyn Surface<D>>, Vec<Violation>> {
         let mut violations = Vec::new();

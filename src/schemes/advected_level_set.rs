@@ -1,9 +1,7 @@
 //! A level set carried by particles through a prescribed flow (PCP paper, section 4.2).
 
-mod reference;
 mod simulation;
 mod system;
 
-pub use reference::{ExactMotion, front_points};
 pub use simulation::AdvectedLevelSet;
 pub use system::{AdvectedParts, AdvectedSystem, FieldChoice, RedistanceWhen, Start};

@@ -7,7 +7,8 @@
 //! with the same weights, and g_ab = δ_ab + Z_a Z_b with its Christoffel symbols Γ^c_ab = Z_c Z_ab/(1 + |∇Z|²) takes the place
 //! of the identity.
 
-use super::{Chart, Functional, Heights, Node, first, second, tangents};
+use super::{Chart, Functional, Heights, Node, first, second};
+use crate::geometry::frame::tangents;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 

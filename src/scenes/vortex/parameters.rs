@@ -1,13 +1,12 @@
 //! The JSON of a `vortex` scene.
 
-use crate::scene::schema::{ANY, POSITIVE};
+use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant};
-use crate::scenes::{pcp_parameters, shapes};
+use crate::scenes::flows::{self, Flow, Integrator};
+use crate::scenes::{gbpm_parameters, pcp_parameters, shapes};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-/// Below round-off no tolerance can be kept.
-const TOLERANCE: Kind = Kind::Number { above: None, least: Some(1e-15), below: None, most: Some(1.0) };
 const STEPS: Kind = Kind::Integer { least: 1, most: 1_000_000_000 };
 
 pub(super) static PARAMETERS: &[Parameter] = &[
@@ -17,7 +16,7 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         Kind::Integer { least: 2, most: 3 },
         DefaultValue::Absent,
     ),
-    Parameter::new("flow", "the velocity field", Kind::Choice(flow_variants), DefaultValue::Json("\"single_vortex\"")),
+    Parameter::new("flow", "the velocity field", Kind::Choice(flows::variants), DefaultValue::Json("\"single_vortex\"")),
     Parameter::new(
         "shape",
         "the surface at the start",
@@ -40,7 +39,7 @@ pub(super) static PARAMETERS: &[Parameter] = &[
     Parameter::restart_safe("end_time", "scene time at the end", POSITIVE, DefaultValue::Json("8")),
     Parameter::new("time_step", "Δt; end_time/240 when neither it nor steps is given", POSITIVE, DefaultValue::Absent),
     Parameter::new("steps", "number of equal steps, instead of time_step", STEPS, DefaultValue::Absent),
-    Parameter::new("integrator", "path integrator", Kind::Choice(integrator_variants), DefaultValue::Json("\"rk4\"")),
+    Parameter::new("integrator", "path integrator", Kind::Choice(flows::integrators), DefaultValue::Json("\"rk4\"")),
     Parameter::new("band_h", "width w of the narrow band in h", POSITIVE, DefaultValue::Json("40")),
     Parameter::new(
         "redistance",
@@ -56,60 +55,6 @@ pub(super) static PARAMETERS: &[Parameter] = &[
     ),
     Parameter::new("method", "the method", Kind::Choice(method_variants), DefaultValue::Json("\"auto\"")),
 ];
-
-static FLOWS: &[Variant] = &[
-    Variant {
-        name: "single_vortex",
-        doc: "the spiraling vortex in the unit square (2D)",
-        parameters: &[Parameter::new(
-            "period",
-            "T of the reversal; null never turns; 8 when not given",
-            POSITIVE,
-            DefaultValue::JsonOrNull("8"),
-        )],
-    },
-    Variant {
-        name: "vortex_3d",
-        doc: "the deforming flow in the unit cube (3D)",
-        parameters: &[Parameter::new(
-            "period",
-            "T of the reversal; null never turns; 2 when not given",
-            POSITIVE,
-            DefaultValue::JsonOrNull("2"),
-        )],
-    },
-    Variant {
-        name: "rotation",
-        doc: "rigid rotation about a point in the x–y plane",
-        parameters: &[
-            Parameter::new("center", "fixed point", Kind::Vector { positive: false }, DefaultValue::Required),
-            Parameter::new("angular_velocity", "counter-clockwise", ANY, DefaultValue::Required),
-        ],
-    },
-    Variant {
-        name: "translation",
-        doc: "uniform motion",
-        parameters: &[Parameter::new("velocity", "velocity", Kind::Vector { positive: false }, DefaultValue::Required)],
-    },
-];
-
-fn flow_variants() -> &'static [Variant] {
-    FLOWS
-}
-
-static INTEGRATORS: &[Variant] = &[
-    Variant { name: "rk4", doc: "classical Runge–Kutta of order 4", parameters: &[] },
-    Variant { name: "tvd_rk2", doc: "TVD Runge–Kutta of order 2", parameters: &[] },
-    Variant {
-        name: "dopri5",
-        doc: "Dormand–Prince 5(4) with error control inside each step",
-        parameters: &[Parameter::new("tolerance", "error of an inner step", TOLERANCE, DefaultValue::Json("1e-9"))],
-    },
-];
-
-fn integrator_variants() -> &'static [Variant] {
-    INTEGRATORS
-}
 
 static REDISTANCE: &[Variant] = &[
     Variant {
@@ -133,9 +78,10 @@ fn redistance_variants() -> &'static [Variant] {
     REDISTANCE
 }
 
-static METHODS: [Variant; 2] = [
+static METHODS: [Variant; 3] = [
     Variant { name: "auto", doc: "the best method measured for the choice of field", parameters: &[] },
     Variant { name: "pcp", doc: "particle closest point", parameters: pcp_parameters::PARAMETERS },
+    Variant { name: "gbpm", doc: "grid-based particles, the front itself", parameters: gbpm_parameters::PARAMETERS },
 ];
 
 fn method_variants() -> &'static [Variant] {
@@ -185,33 +131,6 @@ pub(super) struct Written {
     pub redistance: Redistance,
     pub field: Field,
     pub method: Value,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-#[serde(tag = "type", rename_all = "snake_case")]
-pub(super) enum Flow {
-    SingleVortex {
-        period: Option<f64>,
-    },
-    #[serde(rename = "vortex_3d")]
-    Vortex3d {
-        period: Option<f64>,
-    },
-    Rotation {
-        center: Vec<f64>,
-        angular_velocity: f64,
-    },
-    Translation {
-        velocity: Vec<f64>,
-    },
-}
-
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(tag = "type", rename_all = "snake_case")]
-pub(super) enum Integrator {
-    Rk4,
-    TvdRk2,
-    Dopri5 { tolerance: f64 },
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -1,20 +1,21 @@
 //! From parameters to particles in a flow.
 
-use super::parameters::{Field, Flow, Integrator, Redistance, Written};
+use super::parameters::{Field, Redistance, Written};
 use crate::closest_point::PcpMethod;
-use crate::geometry::flows::{Rotation, SingleVortex, Translation, Vortex3d};
 use crate::geometry::lattice::Lattice;
-use crate::geometry::{self, Vector};
+use crate::geometry::Vector;
 use crate::scene::check;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
-use crate::scenes::dimension::in_dimension;
+use crate::scenes::flows::{Flow, flow};
+use crate::scenes::front::{FrontChoice, Law, understand_choice};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes, work_estimate};
 use crate::schemes::advected_level_set::{
-    AdvectedLevelSet, AdvectedParts, AdvectedSystem, ExactMotion, FieldChoice, RedistanceWhen, Start, front_points,
+    AdvectedLevelSet, AdvectedParts, AdvectedSystem, FieldChoice, RedistanceWhen, Start,
 };
+use crate::schemes::exact_motion::{ExactMotion, front_points};
 use crate::simulation::{OutputPlan, Simulation};
 use crate::time::{FixedStep, PathIntegrator};
 use serde_json::{Map, Value, json};
@@ -47,10 +48,43 @@ const AUTO_EVERY: u64 = 2;
 pub(super) fn understand(parameters: &Value) -> Understood {
     let written: Written = serde_json::from_value(parameters.clone())
         .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
+    if written.method["type"] == "gbpm" {
+        return front(&written, parameters.clone());
+    }
     match written.dimension.or_else(|| shapes::implied_dimension(&written.shape)).unwrap_or(2) {
         3 => scene::<3>(&written, parameters.clone()),
         _ => scene::<2>(&written, parameters.clone()),
     }
+}
+
+/// The same as a front of grid-based particles, which knows no band, no field and no redistancing.
+fn front(written: &Written, resolved: Value) -> Understood {
+    let mut violations = Vec::new();
+    let mut refuse = |name: &str, is_default: bool| {
+        if !is_default {
+            let detail = "grid-based particles are the front itself: this is for closest-point level sets";
+            let at = format!("/{name}");
+            violations.push(Violation::new(at, "conflict", detail, &resolved[name], json!(["the default"])));
+        }
+    };
+    refuse("jitter", written.jitter == 0.0);
+    refuse("band_h", written.band_h == 40.0);
+    refuse("redistance", matches!(written.redistance, Redistance::Auto));
+    refuse("field", written.field == Field::Dual);
+    if !violations.is_empty() {
+        return Err(violations);
+    }
+    let choice = FrontChoice {
+        law: Law::Flow { flow: written.flow.clone() },
+        shape: written.shape.clone(),
+        spacing: written.spacing,
+        end_time: written.end_time,
+        time_step: written.time_step,
+        steps: written.steps,
+        integrator: written.integrator.path(),
+        pointer: "/method",
+    };
+    understand_choice(choice, written.dimension, resolved)
 }
 
 fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
@@ -182,44 +216,11 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         half_band: 0.5 * written.band_h * written.spacing,
         fixed,
         end_time: written.end_time,
-        integrator: match written.integrator {
-            Integrator::Rk4 => PathIntegrator::Rk4,
-            Integrator::TvdRk2 => PathIntegrator::TvdRk2,
-            Integrator::Dopri5 { tolerance } => PathIntegrator::Dopri5 { tolerance },
-        },
+        integrator: written.integrator.path(),
         field,
         when,
         clouds: of_points.into_iter().collect(),
     }))
-}
-
-fn flow<const D: usize>(flow: &Flow) -> Result<Box<dyn geometry::Flow<D>>, Violation> {
-    let vector = |name: &str, numbers: &[f64]| {
-        if numbers.len() == D {
-            return Ok(Vector::<D>::from_column_slice(numbers));
-        }
-        let detail = format!("the scene has {D} dimensions");
-        Err(Violation::new(format!("/flow/{name}"), "conflict", detail, &json!(numbers), json!(format!("{D} numbers"))))
-    };
-    let elsewhere = |name: &str, place: &str| {
-        let detail = format!("{name} lives in {place}, the scene has {D} dimensions");
-        let here = if D == 2 { "single_vortex" } else { "vortex_3d" };
-        Violation::new("/flow/type", "conflict", detail, &json!(name), json!([here, "rotation", "translation"]))
-    };
-    match flow {
-        Flow::SingleVortex { period } => {
-            let vortex: Box<dyn geometry::Flow<2>> = Box::new(SingleVortex { period: *period });
-            in_dimension(vortex).ok_or_else(|| elsewhere("single_vortex", "plane"))
-        }
-        Flow::Vortex3d { period } => {
-            let vortex: Box<dyn geometry::Flow<3>> = Box::new(Vortex3d { period: *period });
-            in_dimension(vortex).ok_or_else(|| elsewhere("vortex_3d", "space"))
-        }
-        Flow::Rotation { center, angular_velocity } => {
-            Ok(Box::new(Rotation { center: vector("center", center)?, angular_velocity: *angular_velocity }))
-        }
-        Flow::Translation { velocity } => Ok(Box::new(Translation { velocity: vector("velocity", velocity)? })),
-    }
 }
 
 /// Points of a front that is carried along to learn how long it becomes, by its extent, and the steps.

@@ -1,12 +1,12 @@
 //! The particles of an advected level set, their transport and their redistancing.
 
-use super::reference::ExactMotion;
 use crate::closest_point::method::NeighborhoodChoice;
 use crate::closest_point::{Answers, LevelSurface, MaterialSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
 use crate::particles::{Particles, ScalarKey};
+use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::simulation::{CpuClock, Phases};
 use crate::time::PathIntegrator;

@@ -113,6 +113,36 @@ impl<const D: usize> ExactMotion<D> {
 }
 
 impl<const D: usize> ExactFront<'_, D> {
+    /// The front as chains of joined points at most `spacing` apart at the start; none in space.
+    #[must_use]
+    pub fn chains(&self, spacing: f64) -> Vec<Vec<Vector<D>>> {
+        let Some(front) = &self.advected else {
+            let mut chains = self.surface.outline(spacing);
+            for x in chains.iter_mut().flatten() {
+                *x = self.motion.flow.rigid_path(x, self.time).unwrap_or(*x);
+            }
+            return chains;
+        };
+        let mut chains = vec![Vec::new()];
+        for (x, is_joined) in front.points.iter().zip(&front.joined) {
+            if let Some(chain) = chains.last_mut() {
+                chain.push(*x);
+            }
+            if !is_joined {
+                chains.push(Vec::new());
+            }
+        }
+        chains.retain(|chain| !chain.is_empty());
+        chains
+    }
+
+    /// The place that a point of the surface at the start has reached, where that is known by a formula.
+    #[must_use]
+    pub fn place_by_formula(&self, start: &Vector<D>) -> Option<Vector<D>> {
+        let is_known = self.advected.is_none();
+        is_known.then(|| self.motion.flow.rigid_path(start, self.time).unwrap_or(*start))
+    }
+
     /// The signed distance of a point from the surface.
     #[must_use]
     pub fn signed_distance(&self, x: &Vector<D>) -> f64 {

@@ -1,0 +1,176 @@
+//! The parameters of the grid-based particle method, shared by `front` and by `vortex` with `method: "gbpm"`.
+
+use crate::scene::schema::POSITIVE;
+use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
+use crate::schemes::grid_based_particle::{FrontMethod, Topology};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// Degree of the reconstructions.
+pub const DEGREE: Parameter = Parameter::new(
+    "degree",
+    "degree of the local reconstructions; when not given, 4 in the plane and 2 in space and under mean_curvature",
+    Kind::Integer { least: 2, most: 4 },
+    DefaultValue::Absent,
+);
+/// Particles of a reconstruction.
+pub const NEIGHBORS: Parameter = Parameter::new(
+    "neighbors",
+    "particles of a reconstruction; when not given, 8 (6 of degree 2) in the plane, 24 (10) in space",
+    Kind::Integer { least: 3, most: 60 },
+    DefaultValue::Absent,
+);
+/// Weight.
+pub const WEIGHT: Parameter = Parameter::new(
+    "weight",
+    "k in the weights exp(−k t²), t the distance along the front in h; when not given, 1 for degree 4 in the plane, else 0",
+    Kind::Number { above: None, least: Some(0.0), below: None, most: Some(10.0) },
+    DefaultValue::Absent,
+);
+/// γ.
+pub const TUBE_RADIUS: Parameter = Parameter::new(
+    "tube_radius_h",
+    "grid points within so many h of the front have a foot-point",
+    Kind::Number { above: None, least: Some(0.8), below: None, most: Some(4.0) },
+    DefaultValue::Json("1.1"),
+);
+/// Separation.
+pub const MIN_SEPARATION: Parameter = Parameter::new(
+    "min_separation_h",
+    "distance in h that the particles of a reconstruction keep from each other",
+    Kind::Number { above: None, least: Some(0.0), below: None, most: Some(1.0) },
+    DefaultValue::Json("0.25"),
+);
+/// Segments.
+pub const SEGMENT_TEST: Parameter = Parameter::new(
+    "segment_test",
+    "how particles of different segments are told apart",
+    Kind::Choice(segment_tests),
+    DefaultValue::Json("\"normals\""),
+);
+/// Topology.
+pub const TOPOLOGY: Parameter = Parameter::new(
+    "topology",
+    "what happens where segments meet: they merge (the viscosity solution) or cross (parts are told apart by their parameter)",
+    Kind::Word(&["merge", "cross"]),
+    DefaultValue::Json("\"merge\""),
+);
+/// Step.
+pub const CFL: Parameter = Parameter::new(
+    "cfl",
+    "dt · max speed/h; when neither it nor a step is given, 10 in a flow, .75 with a given speed, and dt = .5 h² under \
+     mean_curvature",
+    POSITIVE,
+    DefaultValue::Absent,
+);
+
+/// All of them.
+pub static PARAMETERS: &[Parameter] =
+    &[DEGREE, NEIGHBORS, WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, CFL];
+
+const COSINE: Kind = Kind::Number { above: Some(-1.0), least: None, below: Some(1.0), most: None };
+
+static SEGMENT_TESTS: &[Variant] = &[
+    Variant {
+        name: "normals",
+        doc: "by the angle of their normals",
+        parameters: &[Parameter::new(
+            "cosine",
+            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space",
+            COSINE,
+            DefaultValue::Absent,
+        )],
+    },
+    Variant {
+        name: "parameter",
+        doc: "by the part of the front at the start that they belong to, carried along, and the angle of their normals",
+        parameters: &[Parameter::new(
+            "cosine",
+            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space",
+            COSINE,
+            DefaultValue::Absent,
+        )],
+    },
+];
+
+fn segment_tests() -> &'static [Variant] {
+    SEGMENT_TESTS
+}
+
+/// As checked.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Written {
+    degree: Option<usize>,
+    neighbors: Option<usize>,
+    weight: Option<f64>,
+    tube_radius_h: f64,
+    min_separation_h: f64,
+    segment_test: SegmentTest,
+    /// None where the scene has no choice.
+    topology: Option<String>,
+    /// dt · max speed/h.
+    pub cfl: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+enum SegmentTest {
+    Normals { cosine: Option<f64> },
+    Parameter { cosine: Option<f64> },
+}
+
+/// What they mean.
+#[derive(Debug, Clone, Copy)]
+pub struct Chosen {
+    /// Reconstruction.
+    pub method: FrontMethod,
+    /// Where segments meet.
+    pub topology: Topology,
+    /// Whether parts are told apart.
+    pub by_part: bool,
+}
+
+/// The method of checked parameters, and the parameters with what was left open.
+///
+/// # Errors
+/// Where there are fewer particles than coefficients.
+pub fn understand(
+    written: &Written,
+    json: &Value,
+    pointer: &str,
+    dimension: usize,
+    is_by_curvature: bool,
+) -> Result<(Chosen, Value), Violation> {
+    let is_low = is_by_curvature || dimension == 3;
+    let degree = written.degree.unwrap_or(if is_low { 2 } else { 4 });
+    let neighbors = written.neighbors.unwrap_or(match (dimension, degree) {
+        (2, 2) => 6,
+        (2, 3) => 7,
+        (2, _) => 8,
+        (_, 2) => 10,
+        (_, 3) => 16,
+        _ => 24,
+    });
+    let weight = written.weight.unwrap_or(if degree == 4 && dimension == 2 { 1.0 } else { 0.0 });
+    let terms = if dimension == 2 { degree + 1 } else { (degree + 1) * (degree + 2) / 2 };
+    if neighbors < terms {
+        let detail = format!("a reconstruction of degree {degree} has {terms} coefficients");
+        let allowed = json!(format!("a whole number ≥ {terms}"));
+        return Err(Violation::new(format!("{pointer}/neighbors"), "range", detail, &json!(neighbors), allowed));
+    }
+    let topology =
+        if written.topology.as_deref() == Some("cross") { Topology::Cross } else { Topology::Merge };
+    let (by_part, cosine, name) = match written.segment_test {
+        SegmentTest::Normals { cosine } => (topology == Topology::Cross, cosine, "normals"),
+        SegmentTest::Parameter { cosine } => (true, cosine, "parameter"),
+    };
+    let cosine = cosine.unwrap_or(if dimension == 2 { 0.2 } else { 0.5 });
+    let mut resolved = json.clone();
+    resolved["degree"] = json!(degree);
+    resolved["neighbors"] = json!(neighbors);
+    resolved["weight"] = json!(weight);
+    resolved["segment_test"] = json!({"type": name, "cosine": cosine});
+    let (tube_radius, min_separation) = (written.tube_radius_h, written.min_separation_h);
+    let method = FrontMethod { degree, neighbors, weight, tube_radius, min_separation, cosine };
+    Ok((Chosen { method, topology, by_part }, resolved))
+}

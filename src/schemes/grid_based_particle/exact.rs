@@ -1,0 +1,313 @@
+//! Where the front is exactly, and how far the foot-points are from it: errors, coverage and gaps.
+//!
+//! Distances of foot-points alone flatter a front with holes, so coverage (the largest distance from the exact front to a
+//! foot-point) and the largest gap along it stand beside every error.
+
+use super::foot_points::FootPoints;
+use super::grid::Grid;
+use super::system::for_each_near;
+use super::topology::Topology;
+use crate::geometry::surfaces::Ball;
+use crate::geometry::{Domain, Surface, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+use crate::parallel::{Interrupt, Interrupted};
+use crate::schemes::exact_motion::ExactMotion;
+use crate::schemes::measured_errors::{ErrorNorms, entry};
+use crate::simulation::ErrorEntry;
+use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+
+/// The exact motion of a front, where one is known.
+pub enum ExactFrontMotion<const D: usize> {
+    /// In a flow.
+    Flow(ExactMotion<D>),
+    /// With a constant speed: the front is where the distance from the start is speed × time, of all parts together where they merge,
+    /// of one of them where they cross.
+    Offset {
+        /// Parts of the front at the start.
+        surfaces: Vec<Box<dyn Surface<D>>>,
+        /// Along the outward normal.
+        speed: f64,
+        /// What happens where they meet.
+        topology: Topology,
+    },
+    /// Of a circle or a sphere by its mean curvature: r² = R² − 2 (D − 1) t.
+    Shrinking(Ball<D>),
+    /// Not known.
+    Unknown,
+}
+
+/// Errors of one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FrontErrors {
+    pub time: f64,
+    /// In the order of [`ENTRIES`]; NaN where nothing is known.
+    pub values: [f64; ENTRIES.len()],
+}
+
+/// Quantities and norms. The L2 norm of the distance is that of GBPM eq. 18, over the angle.
+const ENTRIES: [(&str, &str); 10] = [
+    ("front", "mean"),
+    ("front", "rms"),
+    ("front", "max"),
+    ("front", "l2"),
+    ("front", "coverage_h"),
+    ("front", "gap_h"),
+    ("radius", "mean"),
+    ("radius", "deviation"),
+    ("curvature", "rms"),
+    ("front", "count"),
+];
+
+impl FrontErrors {
+    pub const NUMBERS: usize = 1 + ENTRIES.len();
+
+    pub fn to_numbers(self) -> Vec<f64> {
+        std::iter::once(self.time).chain(self.values).collect()
+    }
+
+    pub fn from_numbers(n: &[f64]) -> Self {
+        Self { time: n[0], values: std::array::from_fn(|k| n[k + 1]) }
+    }
+
+    pub fn entries(&self) -> Vec<ErrorEntry> {
+        let known = ENTRIES.iter().zip(self.values).filter(|(_, value)| !value.is_nan());
+        known.map(|((quantity, norm), value)| entry(quantity, norm, value, self.time, "exact motion")).collect()
+    }
+}
+
+/// Points of the exact curve per spacing.
+const POINTS_PER_SPACING: f64 = 20.0;
+
+impl<const D: usize> ExactFrontMotion<D> {
+    /// The exact front is a ball with this centre and radius at a time, if it is one.
+    fn ball(&self, ball: Option<&Ball<D>>, time: f64) -> Option<Ball<D>> {
+        let ball = ball?;
+        match self {
+            Self::Flow(motion) => {
+                let flow = motion.flow();
+                let is_back = flow.return_time().is_some_and(|period| {
+                    let turns = time / period;
+                    (turns - turns.round()).abs() < 1e-9
+                });
+                let center = flow.rigid_path(&ball.center, time).or(is_back.then_some(ball.center))?;
+                Some(Ball { center, radius: ball.radius })
+            }
+            Self::Offset { speed, .. } => {
+                let radius = ball.radius + speed * time;
+                (radius > 0.0).then_some(Ball { center: ball.center, radius })
+            }
+            Self::Shrinking(start) => {
+                let square = start.radius * start.radius - 2.0 * (D as f64 - 1.0) * time;
+                (square > 0.0).then(|| Ball { center: start.center, radius: square.sqrt() })
+            }
+            Self::Unknown => None,
+        }
+    }
+
+    /// When the front vanishes, where that is known.
+    pub(super) fn extinction(&self, ball: Option<&Ball<D>>) -> Option<f64> {
+        match (self, ball) {
+            (Self::Shrinking(start), _) => Some(start.radius * start.radius / (2.0 * (D as f64 - 1.0))),
+            (Self::Offset { speed, .. }, Some(ball)) if *speed < 0.0 => Some(ball.radius / -speed),
+            _ => None,
+        }
+    }
+
+    /// Distances of the foot-points from the exact front, and of the exact front from them.
+    pub(super) fn errors(
+        &self,
+        ball: Option<&Ball<D>>,
+        feet: &FootPoints<D>,
+        grid: &Grid,
+        time: f64,
+        interrupt: &Interrupt,
+    ) -> Result<Option<FrontErrors>, Interrupted> {
+        let ball = self.ball(ball, time);
+        let spacing = grid.spacing;
+        let mut chains = Vec::new();
+        let mut loose = Vec::new();
+        let distances: Vec<f64> = if let Some(ball) = &ball {
+            chains = ball.outline(spacing / POINTS_PER_SPACING);
+            if chains.is_empty() {
+                for_each_near(ball, 0.7 * spacing, grid, |_, x| loose.push(ball.nearest(&x).point));
+            }
+            feet.positions.iter().map(|x| (x - ball.center).norm() - ball.radius).collect()
+        } else {
+            match self {
+                Self::Flow(motion) => {
+                    let Some(front) = motion.front(time, spacing, interrupt)? else { return Ok(None) };
+                    chains = front.chains(spacing / POINTS_PER_SPACING);
+                    if let (true, Some(surface)) = (chains.is_empty(), motion.surface()) {
+                        for_each_near(surface, 0.7 * spacing, grid, |_, x| {
+                            loose.extend(front.place_by_formula(&surface.nearest(&x).point));
+                        });
+                    }
+                    feet.positions.par_iter().map(|x| front.signed_distance(x)).collect()
+                }
+                Self::Offset { surfaces, speed, topology } => {
+                    let way = speed * time;
+                    let level = |x: &Vector<D>| offset_distance(surfaces, *topology, x, way);
+                    loose = offset_points(surfaces, *topology, grid, way);
+                    feet.positions.iter().map(level).collect()
+                }
+                Self::Shrinking(_) | Self::Unknown => return Ok(None),
+            }
+        };
+        interrupt.check()?;
+        let mut norms = ErrorNorms::default();
+        let mut sum = 0.0;
+        for distance in &distances {
+            norms.add(*distance);
+            sum += distance.abs();
+        }
+        let count = feet.len() as f64;
+        let mut cells = CellList::new(Domain::unbounded());
+        cells.rebuild(feet.positions.iter().copied(), spacing);
+        let coverage = if feet.is_empty() {
+            f64::INFINITY
+        } else {
+            let samples = chains.iter().flatten().chain(&loose);
+            let far = samples.map(|x| cells.nearest(x, f64::INFINITY).map_or(f64::INFINITY, |(_, r)| r));
+            far.fold(f64::NAN, f64::max) / spacing
+        };
+        let gap = if chains.is_empty() { f64::NAN } else { largest_gap(&chains, &feet.positions) / spacing };
+        let mut values = [f64::NAN; ENTRIES.len()];
+        values[..3].copy_from_slice(&[sum / count, norms.rms(), norms.max()]);
+        (values[4], values[5], values[9]) = (coverage, gap, count);
+        if let Some(ball) = &ball {
+            let mean = distances.iter().sum::<f64>() / count;
+            let square = distances.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / count;
+            (values[6], values[7]) = (ball.radius + mean, square.sqrt());
+            let bend = (D as f64 - 1.0) / ball.radius;
+            let mut norms = ErrorNorms::default();
+            feet.curvatures.iter().for_each(|curvature| norms.add(curvature - bend));
+            values[8] = norms.rms();
+            if D == 2 {
+                values[3] = over_angle(ball, &feet.positions, &distances);
+            }
+        }
+        Ok(Some(FrontErrors { time, values }))
+    }
+}
+
+/// [∫ d² dθ]^½ by the trapezoidal rule over the angles of the foot-points (GBPM eq. 18).
+fn over_angle<const D: usize>(ball: &Ball<D>, positions: &[Vector<D>], distances: &[f64]) -> f64 {
+    let angle = |x: &Vector<D>| (x[1] - ball.center[1]).atan2(x[0] - ball.center[0]);
+    let mut sorted: Vec<(f64, f64)> = positions.iter().map(angle).zip(distances.iter().copied()).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let turn = std::f64::consts::TAU;
+    let next = sorted.iter().cycle().skip(1);
+    let sum: f64 = sorted
+        .iter()
+        .zip(next)
+        .map(|(a, b)| 0.5 * (a.1 * a.1 + b.1 * b.1) * (b.0 - a.0).rem_euclid(turn))
+        .sum();
+    sum.sqrt()
+}
+
+/// The distance from the front that has moved by `way` along the normals; its sign is that of the start's level.
+fn offset_distance<const D: usize>(
+    surfaces: &[Box<dyn Surface<D>>],
+    topology: Topology,
+    x: &Vector<D>,
+    way: f64,
+) -> f64 {
+    let levels = surfaces.iter().map(|surface| surface.signed_distance(x) - way);
+    match topology {
+        // The union's outer distance is the least of its parts'.
+        Topology::Merge => levels.fold(f64::INFINITY, f64::min),
+        Topology::Cross => levels.fold(f64::INFINITY, |best, level| if level.abs() < best.abs() { level } else { best }),
+    }
+}
+
+/// Points of that front: grid points near it, moved along the ray from the start that passes through them.
+fn offset_points<const D: usize>(
+    surfaces: &[Box<dyn Surface<D>>],
+    topology: Topology,
+    grid: &Grid,
+    way: f64,
+) -> Vec<Vector<D>> {
+    let mut points = Vec::new();
+    for surface in surfaces {
+        for_each_near(surface.as_ref(), way.abs() + grid.spacing, grid, |_, x| {
+            let exact = surface.nearest(&x);
+            if (exact.distance - way).abs() > 0.7 * grid.spacing || exact.distance == 0.0 {
+                return;
+            }
+            let point = exact.point + (x - exact.point) * (way / exact.distance);
+            if offset_distance(surfaces, topology, &point, way).abs() < 1e-9 {
+                points.push(point);
+            }
+        });
+    }
+    points
+}
+
+/// The longest part of the chains between the nearest points of the given places.
+fn largest_gap<const D: usize>(chains: &[Vec<Vector<D>>], places: &[Vector<D>]) -> f64 {
+    let all: Vec<Vector<D>> = chains.iter().flatten().copied().collect();
+    let mut cells = CellList::new(Domain::unbounded());
+    let step = all.windows(2).map(|pair| (pair[1] - pair[0]).norm()).fold(f64::INFINITY, f64::min);
+    cells.rebuild(all.iter().copied(), step.max(f64::MIN_POSITIVE));
+    let mut is_hit = vec![false; all.len()];
+    for place in places {
+        if let Some((nearest, _)) = cells.nearest(place, f64::INFINITY) {
+            is_hit[nearest] = true;
+        }
+    }
+    let mut first = 0;
+    let mut largest = 0.0_f64;
+    for chain in chains {
+        let hits = &is_hit[first..first + chain.len()];
+        first += chain.len();
+        // Once round from the first hit, and on to it again; a chain without a hit is one gap.
+        let mut since_hit = 0.0;
+        let mut before_first = None;
+        for (k, hit) in hits.iter().enumerate() {
+            if k > 0 {
+                since_hit += (chain[k] - chain[k - 1]).norm();
+            }
+            if *hit {
+                if before_first.is_none() {
+                    before_first = Some(since_hit);
+                } else {
+                    largest = largest.max(since_hit);
+                }
+                since_hit = 0.0;
+            }
+        }
+        largest = largest.max(since_hit + before_first.unwrap_or(0.0));
+    }
+    largest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{largest_gap, over_angle};
+    use crate::geometry::Vector;
+    use crate::geometry::surfaces::{Ball, Surface};
+
+    fn ball() -> Ball<2> {
+        Ball { center: Vector::<2>::new(0.3, 0.1), radius: 0.5 }
+    }
+
+    fn at(angle: f64) -> Vector<2> {
+        Vector::<2>::new(0.3 + 0.5 * angle.cos(), 0.1 + 0.5 * angle.sin())
+    }
+
+    #[test]
+    fn a_missing_arc_is_the_largest_gap() {
+        let chains = ball().outline(0.001);
+        let places: Vec<Vector<2>> = (0..100).map(|k| at(f64::from(k) * 0.05 + 0.4)).collect();
+        let missing = std::f64::consts::TAU - 99.0 * 0.05;
+        assert!((largest_gap(&chains, &places) - 0.5 * missing).abs() < 2e-3);
+        assert!((largest_gap(&chains, &[]) - 0.5 * std::f64::consts::TAU).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_constant_error_is_weighed_by_the_whole_turn() {
+        let places: Vec<Vector<2>> = [0.1, 0.5, 2.0, 3.0, 5.0].map(at).to_vec();
+        let norm = over_angle(&ball(), &places, &[0.2; 5]);
+        assert!((norm - 0.2 * std::f64::consts::TAU.sqrt()).abs() < 1e-12);
+    }
+}

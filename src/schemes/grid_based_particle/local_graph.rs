@@ -1,0 +1,279 @@
+//! A front as the graph of a polynomial over a tangent plane (GBPM 3.3.1): f(s), s of M = D − 1 coordinates, all lengths
+//! in spacings.
+
+use crate::linear_algebra::least_squares::LeastSquares;
+use crate::polynomials::MultiIndexSet;
+
+/// The highest degree.
+pub(super) const MOST_DEGREE: usize = 4;
+/// Terms of two variables up to that degree.
+const MOST_TERMS: usize = 15;
+/// Newton's steps to a closest point at most.
+const MOST_ITERATIONS: usize = 30;
+/// The longest of them.
+const LONGEST_STEP: f64 = 0.5;
+/// A step that changes nothing.
+const STILL: f64 = 1e-15;
+/// The last step of an answer that counts as found.
+const FOUND: f64 = 1e-9;
+
+/// Exponents of the terms.
+#[derive(Debug, Clone)]
+pub(super) struct Terms<const M: usize> {
+    indices: Vec<[u8; M]>,
+}
+
+/// Value, slopes and second derivatives of f.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GraphJet<const M: usize> {
+    pub value: f64,
+    pub first: [f64; M],
+    pub second: [[f64; M]; M],
+}
+
+/// f with its coefficients.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LocalGraph<'a, const M: usize> {
+    terms: &'a Terms<M>,
+    coefficients: [f64; MOST_TERMS],
+}
+
+impl<const M: usize> Terms<M> {
+    pub fn new(degree: usize) -> Self {
+        let set = MultiIndexSet::<M>::total_degree(degree.min(MOST_DEGREE));
+        Self { indices: set.indices().to_vec() }
+    }
+
+    pub fn count(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// The least-squares fit to heights z_j at s_j with weights exp(−k |s_j|²), or None where the points do not
+    /// determine it.
+    pub fn fit(&self, points: &[([f64; M], f64)], k: f64, room: &mut LeastSquares) -> Option<LocalGraph<'_, M>> {
+        let n = self.count();
+        if points.len() < n {
+            return None;
+        }
+        room.reset(points.len(), n);
+        let mut row = [0.0; MOST_TERMS];
+        for (j, (s, z)) in points.iter().enumerate() {
+            let square: f64 = s.iter().map(|s| s * s).sum();
+            let root = (-0.5 * k * square).exp();
+            let powers = powers(s);
+            for (value, index) in row.iter_mut().zip(&self.indices) {
+                *value = root * product(&powers, index);
+            }
+            room.set_row(j, &row[..n], root * z);
+        }
+        let (found, solution) = room.solve();
+        if found.rank < n {
+            return None;
+        }
+        let mut coefficients = [0.0; MOST_TERMS];
+        coefficients[..n].copy_from_slice(solution);
+        Some(LocalGraph { terms: self, coefficients })
+    }
+}
+
+/// s_d^k.
+fn powers<const M: usize>(s: &[f64; M]) -> [[f64; MOST_DEGREE + 1]; M] {
+    s.map(|s| {
+        let mut powers = [1.0; MOST_DEGREE + 1];
+        for k in 1..=MOST_DEGREE {
+            powers[k] = powers[k - 1] * s;
+        }
+        powers
+    })
+}
+
+fn product<const M: usize>(powers: &[[f64; MOST_DEGREE + 1]; M], index: &[u8; M]) -> f64 {
+    powers.iter().zip(index).map(|(powers, k)| powers[usize::from(*k)]).product()
+}
+
+impl<const M: usize> LocalGraph<'_, M> {
+    /// f and its derivatives at s.
+    pub fn jet(&self, s: &[f64; M]) -> GraphJet<M> {
+        let powers = powers(s);
+        let mut jet = GraphJet { value: 0.0, first: [0.0; M], second: [[0.0; M]; M] };
+        for (c, index) in self.coefficients.iter().zip(&self.terms.indices) {
+            jet.value += c * product(&powers, index);
+            for a in 0..M {
+                let Some((factor, lower)) = lowered(index, a) else { continue };
+                jet.first[a] += c * factor * product(&powers, &lower);
+                for b in 0..=a {
+                    if let Some((again, lowest)) = lowered(&lower, b) {
+                        jet.second[a][b] += c * factor * again * product(&powers, &lowest);
+                    }
+                }
+            }
+        }
+        for a in 0..M {
+            for b in a + 1..M {
+                jet.second[a][b] = jet.second[b][a];
+            }
+        }
+        jet
+    }
+
+    /// The closest point of the graph to (p, height), searched from `start`: Newton's iteration for
+    /// d(s) = ½ |s − p|² + ½ (f(s) − height)² (GBPM eq. 4), with the Hessian without its indefinite part where that
+    /// leads uphill. None where it does not settle.
+    pub fn closest(&self, p: &[f64; M], height: f64, start: [f64; M]) -> Option<([f64; M], GraphJet<M>)> {
+        let mut s = start;
+        let mut jet = self.jet(&s);
+        let mut last = f64::INFINITY;
+        for _ in 0..MOST_ITERATIONS {
+            let rest = jet.value - height;
+            let gradient: [f64; M] = std::array::from_fn(|a| s[a] - p[a] + rest * jet.first[a]);
+            let hessian = |bend: f64| -> [[f64; M]; M] {
+                std::array::from_fn(|a| {
+                    std::array::from_fn(|b| {
+                        f64::from(u8::from(a == b)) + jet.first[a] * jet.first[b] + bend * jet.second[a][b]
+                    })
+                })
+            };
+            let step = solve_positive(&hessian(rest), &gradient).or_else(|| solve_positive(&hessian(0.0), &gradient))?;
+            let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
+            let scale = if length > LONGEST_STEP { LONGEST_STEP / length } else { 1.0 };
+            for (s, step) in s.iter_mut().zip(step) {
+                *s -= scale * step;
+            }
+            jet = self.jet(&s);
+            // At round-off steps stop shrinking.
+            if length <= STILL || (length <= FOUND && length >= 0.5 * last) {
+                return Some((s, jet));
+            }
+            last = length;
+        }
+        (last <= FOUND).then_some((s, jet))
+    }
+}
+
+/// The exponents of ∂_a of a monomial and its factor; None where the derivative vanishes.
+fn lowered<const M: usize>(index: &[u8; M], a: usize) -> Option<(f64, [u8; M])> {
+    let k = index[a];
+    let mut lower = *index;
+    lower[a] = k.checked_sub(1)?;
+    Some((f64::from(k), lower))
+}
+
+/// The solution of a symmetric system of one or two equations, if it is clearly positive definite.
+fn solve_positive<const M: usize>(matrix: &[[f64; M]; M], b: &[f64; M]) -> Option<[f64; M]> {
+    const LEAST: f64 = 1e-3;
+    let mut x = *b;
+    let a = matrix[0][0];
+    if a <= LEAST {
+        return None;
+    }
+    if M == 1 {
+        x[0] = b[0] / a;
+    } else {
+        let (c, d) = (matrix[0][1], matrix[1][1]);
+        let det = a * d - c * c;
+        if d <= LEAST || det <= LEAST * a {
+            return None;
+        }
+        x[0] = (d * b[0] - c * b[1]) / det;
+        x[1] = (a * b[1] - c * b[0]) / det;
+    }
+    Some(x)
+}
+
+impl<const M: usize> GraphJet<M> {
+    /// 1 + |∇f|².
+    fn stretch(&self) -> f64 {
+        1.0 + self.first.iter().map(|f| f * f).sum::<f64>()
+    }
+
+    /// The upward unit normal, along the coordinates and up.
+    pub fn normal(&self) -> ([f64; M], f64) {
+        let inverse = 1.0 / self.stretch().sqrt();
+        (self.first.map(|f| -f * inverse), inverse)
+    }
+
+    /// ∇·n of the upward normal: positive where the graph is a hill.
+    pub fn curvature(&self) -> f64 {
+        let stretch = self.stretch();
+        let mut sum = 0.0;
+        for a in 0..M {
+            sum += stretch * self.second[a][a];
+            for b in 0..M {
+                sum -= self.first[a] * self.first[b] * self.second[a][b];
+            }
+        }
+        -sum / (stretch * stretch.sqrt())
+    }
+
+    /// The product of the principal curvatures of a surface; zero of a curve.
+    pub fn gauss_curvature(&self) -> f64 {
+        if M == 1 {
+            return 0.0;
+        }
+        let [first, .., last] = &self.second[..] else { return 0.0 };
+        let det = first[0] * last[M - 1] - first[M - 1] * last[0];
+        det / (self.stretch() * self.stretch())
+    }
+
+    /// The largest principal curvature by absolute value.
+    pub fn sharpest(&self) -> f64 {
+        let mean = 0.5 * self.curvature();
+        if M == 1 {
+            return 2.0 * mean.abs();
+        }
+        mean.abs() + (mean * mean - self.gauss_curvature()).max(0.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Terms;
+    use crate::linear_algebra::least_squares::LeastSquares;
+
+    #[test]
+    fn a_polynomial_is_reproduced_with_its_curvatures() {
+        let f = |x: f64, y: f64| 0.3 + 0.1 * x - 0.2 * y + 0.4 * x * x + 0.15 * x * y - 0.3 * y * y;
+        let points: Vec<([f64; 2], f64)> = (0..12)
+            .map(|k| {
+                let (x, y) = (f64::from(k % 4) - 1.3, f64::from(k / 4) - 0.8);
+                ([x, y], f(x, y))
+            })
+            .collect();
+        let terms = Terms::<2>::new(2);
+        let mut room = LeastSquares::default();
+        let graph = terms.fit(&points, 0.7, &mut room).unwrap();
+        let jet = graph.jet(&[0.2, -0.1]);
+        assert!((jet.value - f(0.2, -0.1)).abs() < 1e-13);
+        assert!((jet.first[0] - (0.1 + 0.8 * 0.2 - 0.015)).abs() < 1e-13);
+        assert!((jet.second[0][1] - 0.15).abs() < 1e-13 && (jet.second[1][0] - 0.15).abs() < 1e-13);
+        // The definition of the mean curvature by differences of the normal.
+        let e = 1e-5;
+        let normal = |x: f64, y: f64| graph.jet(&[x, y]).normal().0;
+        let divergence = (normal(0.2 + e, -0.1)[0] - normal(0.2 - e, -0.1)[0] + normal(0.2, -0.1 + e)[1]
+            - normal(0.2, -0.1 - e)[1])
+            / (2.0 * e);
+        assert!((jet.curvature() - divergence).abs() < 1e-8);
+        let det = jet.second[0][0] * jet.second[1][1] - 0.15 * 0.15;
+        assert!((jet.gauss_curvature() - det / (1.0 + jet.first[0].powi(2) + jet.first[1].powi(2)).powi(2)).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_closest_point_is_across_the_graph() {
+        let points: Vec<([f64; 1], f64)> =
+            (0..8).map(|k| f64::from(k) * 0.5 - 1.8).map(|x| ([x], (9.0 - x * x).sqrt() - 3.0)).collect();
+        let terms = Terms::<1>::new(4);
+        let mut room = LeastSquares::default();
+        let graph = terms.fit(&points, 1.0, &mut room).unwrap();
+        for (p, height) in [(0.4, 1.0), (-0.6, -1.1), (0.0, 0.3)] {
+            let (s, jet) = graph.closest(&[p], height, [0.0]).unwrap();
+            assert!((s[0] - p + (jet.value - height) * jet.first[0]).abs() < 1e-13);
+            // On a circle of radius 3 about (0, −3).
+            let (x, y) = (s[0], jet.value + 3.0);
+            assert!((x * (height + 3.0) - y * p).abs() < 3e-3, "{p} {height}");
+            assert!((jet.curvature() - 1.0 / 3.0).abs() < 1e-2);
+        }
+        assert!(terms.fit(&points[..4], 1.0, &mut room).is_none());
+        let same = [([0.1], 0.0); 9];
+        assert!(terms.fit(&same, 1.0, &mut room).is_none());
+    }
+}

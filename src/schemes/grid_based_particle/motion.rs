@@ -1,0 +1,74 @@
+//! Motion of the foot-points (GBPM 3.2).
+
+use super::foot_points::FootPoints;
+use crate::geometry::frame::{across, tangents};
+use crate::geometry::{Flow, Vector};
+use crate::parallel::{BLOCK, Interrupt, Interrupted};
+use crate::time::PathIntegrator;
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
+
+/// What moves a front.
+pub enum Law<const D: usize> {
+    /// A prescribed velocity field.
+    Flow(Box<dyn Flow<D>>),
+    /// A constant speed along the outward normal: along straight lines, on which normals stay as they are.
+    Normal {
+        /// Positive outward.
+        speed: f64,
+    },
+    /// Velocity −κ n, κ = ∇·n.
+    MeanCurvature,
+}
+
+/// Offset of the points by which a tangent is carried along, in spacings.
+const OFFSET: f64 = 1e-4;
+
+/// Carries particles and their normals through a flow; returns the longest way in spacings.
+///
+/// A tangent is the difference of two points close by, and the normal stays across all tangents: with steps of several
+/// spacings the normals of before would tell segments apart no more.
+pub(super) fn carry<const D: usize, const M: usize>(
+    feet: &mut FootPoints<D>,
+    flow: &dyn Flow<D>,
+    integrator: PathIntegrator,
+    (time, step): (f64, f64),
+    spacing: f64,
+    interrupt: &Interrupt,
+) -> Result<f64, Interrupted> {
+    let offset = OFFSET * spacing;
+    let blocks = feet.positions.par_chunks_mut(BLOCK).zip(feet.normals.par_chunks_mut(BLOCK));
+    let longest = blocks
+        .map(|(positions, normals)| {
+            if interrupt.is_raised() {
+                return 0.0;
+            }
+            let mut longest = 0.0_f64;
+            for (x, n) in positions.iter_mut().zip(normals) {
+                let frame = tangents::<D, M>(n);
+                let side = across(&frame).dot(n).signum();
+                let next = integrator.advance(flow, x, time, step);
+                let carried = frame.map(|t| integrator.advance(flow, &(*x + t * offset), time, step) - next);
+                *n = across(&carried) * side;
+                longest = longest.max((next - *x).norm_squared());
+                *x = next;
+            }
+            longest
+        })
+        // A maximum does not depend on the order of its terms.
+        .reduce(|| 0.0, f64::max);
+    interrupt.check()?;
+    Ok(longest.sqrt() / spacing)
+}
+
+/// Moves particles along their normals; returns the way in spacings.
+pub(super) fn along_normals<const D: usize>(feet: &mut FootPoints<D>, way: f64, spacing: f64) -> f64 {
+    for (x, n) in feet.positions.iter_mut().zip(&feet.normals) {
+        *x += n * way;
+    }
+    if feet.is_empty() { 0.0 } else { way.abs() / spacing }
+}
+
+/// −κ n.
+pub(super) fn curvature_velocity<const D: usize>(curvature: f64, normal: &Vector<D>) -> Vector<D> {
+    normal * -curvature
+}

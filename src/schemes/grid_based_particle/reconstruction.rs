@@ -1,0 +1,249 @@
+//! The closest point of the front to a place, by a local reconstruction through the particles about it (GBPM 3.3.1 to 3.3.3).
+
+use super::foot_points::{FootPoint, FootPoints};
+use super::local_graph::{GraphJet, Terms};
+use super::method::FrontMethod;
+use crate::geometry::Vector;
+use crate::geometry::frame::tangents;
+use crate::linear_algebra::least_squares::LeastSquares;
+use crate::neighbors::{CellList, Neighbor, NeighborSearch};
+
+/// How far past its particles a reconstruction is trusted, in spacings: the paper's zero loses the ends of thin filaments.
+const MOST_EXTRAPOLATION: f64 = 0.3;
+/// Cosine between the normal of the base point and that of the answer below which the graph has folded.
+const LEAST_AGREEMENT: f64 = 0.2;
+/// Cosine below which the reconstruction is made again in the frame of the normal that it found.
+const TURNED: f64 = 0.9;
+/// The largest |κ| h of a front that its particles resolve.
+const SHARPEST: f64 = 2.0;
+/// Segments that are tried at one place.
+const MOST_SEGMENTS: usize = 3;
+/// How much farther than the best answer so far the first particle of another segment may lie, in spacings.
+const SEGMENT_MARGIN: f64 = 0.5;
+/// How the neighbourhood grows, and its largest radius in spacings.
+const GROWTH: f64 = 1.4;
+const FARTHEST: f64 = 6.0;
+
+/// Why there is no foot-point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Failure {
+    /// Too few particles of one segment are near.
+    Starved,
+    /// The closest point lies beyond the particles.
+    Extrapolated,
+    /// The front turns too sharply for the spacing.
+    Unresolved,
+}
+
+/// What a reconstruction reads.
+pub(super) struct Reconstruction<'a, const D: usize, const M: usize> {
+    pub feet: &'a FootPoints<D>,
+    pub cells: &'a CellList<D>,
+    pub method: &'a FrontMethod,
+    /// Of the degree asked for, and of the quadratic that takes its place where that does not do.
+    pub terms: &'a Terms<M>,
+    pub quadratic: &'a Terms<M>,
+    /// Whether segments are told apart by the part of the front beside their normals.
+    pub by_part: bool,
+    pub spacing: f64,
+}
+
+/// Storage of a thread.
+#[derive(Debug)]
+pub(super) struct Room<const D: usize, const M: usize> {
+    near: Vec<Neighbor<D>>,
+    chosen: Vec<usize>,
+    bases: Vec<usize>,
+    points: Vec<([f64; M], f64)>,
+    squares: LeastSquares,
+}
+
+impl<const D: usize, const M: usize> Default for Room<D, M> {
+    fn default() -> Self {
+        Self {
+            near: Vec::new(),
+            chosen: Vec::new(),
+            bases: Vec::new(),
+            points: Vec::new(),
+            squares: LeastSquares::default(),
+        }
+    }
+}
+
+impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
+    /// The closest point of the front to p.
+    ///
+    /// 1. The particles about p, nearest first. 2. The nearest is the base of a segment: the particles whose normals agree
+    ///    with its own. 3. A reconstruction of the segment, and its closest point. 4. The same for the nearest particle that belongs to
+    ///    no segment so far, as long as its segment may be nearer. The nearest answer wins.
+    ///
+    /// # Errors
+    /// [`Failure`] of the nearest segment where none has an answer.
+    pub fn closest(&self, p: &Vector<D>, room: &mut Room<D, M>) -> Result<FootPoint<D>, Failure> {
+        let mut reach = self.method.tube_radius + if M == 1 { 1.4 } else { 1.0 };
+        self.gather(p, reach, room);
+        room.bases.clear();
+        let mut best: Result<(f64, FootPoint<D>), Failure> = Err(Failure::Starved);
+        for segment in 0..MOST_SEGMENTS {
+            let next = room.near.iter().find(|near| !room.bases.iter().any(|base| self.agrees(*base, near.index)));
+            let Some(base) = next.copied() else { break };
+            if let Ok((distance, _)) = best
+                && base.r2.sqrt() > distance + SEGMENT_MARGIN * self.spacing
+            {
+                break;
+            }
+            room.bases.push(base.index);
+            let found = self.of_segment(p, base.index, &mut reach, room);
+            match found {
+                Ok(foot) => {
+                    let distance = (foot.position - p).norm();
+                    if best.as_ref().map_or(true, |(nearest, _)| distance < *nearest) {
+                        best = Ok((distance, foot));
+                    }
+                }
+                Err(failure) if segment == 0 => best = Err(failure),
+                Err(_) => {}
+            }
+        }
+        best.map(|(_, foot)| foot)
+    }
+
+    /// Whether two particles are of one segment (GBPM 3.3.2).
+    pub fn agrees(&self, i: usize, j: usize) -> bool {
+        (!self.by_part || self.feet.parts[i] == self.feet.parts[j])
+            && self.feet.normals[i].dot(&self.feet.normals[j]) > self.method.cosine
+    }
+
+    fn gather(&self, p: &Vector<D>, reach: f64, room: &mut Room<D, M>) {
+        self.cells.gather(p, reach * self.spacing, &mut room.near);
+        room.near.sort_unstable_by(|a, b| a.r2.total_cmp(&b.r2).then(a.index.cmp(&b.index)));
+    }
+
+    /// Particles of the segment of a base, nearest first, each some way from those taken before.
+    fn choose(&self, base: usize, room: &mut Room<D, M>) {
+        let least = (self.method.min_separation * self.spacing).powi(2);
+        room.chosen.clear();
+        room.chosen.push(base);
+        for near in &room.near {
+            if room.chosen.len() >= self.method.neighbors {
+                return;
+            }
+            let x = &self.feet.positions[near.index];
+            let is_apart = |j: &usize| (self.feet.positions[*j] - x).norm_squared() >= least;
+            if near.index != base && self.agrees(base, near.index) && room.chosen.iter().all(is_apart) {
+                room.chosen.push(near.index);
+            }
+        }
+    }
+
+    fn of_segment(
+        &self,
+        p: &Vector<D>,
+        base: usize,
+        reach: &mut f64,
+        room: &mut Room<D, M>,
+    ) -> Result<FootPoint<D>, Failure> {
+        loop {
+            self.choose(base, room);
+            if room.chosen.len() >= self.method.neighbors || *reach * GROWTH > FARTHEST {
+                break;
+            }
+            *reach *= GROWTH;
+            self.gather(p, *reach, room);
+        }
+        if room.chosen.len() < self.quadratic.count() {
+            return Err(Failure::Starved);
+        }
+        let first = self.fit(p, base, &self.feet.normals[base], self.terms, room);
+        let first = match first {
+            Ok(foot) if foot.normal.dot(&self.feet.normals[base]) < TURNED => {
+                self.fit(p, base, &foot.normal, self.terms, room)
+            }
+            other => other,
+        };
+        if first.is_ok() {
+            return first;
+        }
+        // Where the front turns within the stencil, its mean normal is the better upward direction.
+        let mean: Vector<D> = room.chosen.iter().map(|j| self.feet.normals[*j]).sum();
+        let Some(mean) = mean.try_normalize(0.1) else { return first };
+        self.fit(p, base, &mean, self.quadratic, room).or(first)
+    }
+
+    /// One fit in the frame of an upward direction.
+    fn fit(
+        &self,
+        p: &Vector<D>,
+        base: usize,
+        up: &Vector<D>,
+        terms: &Terms<M>,
+        room: &mut Room<D, M>,
+    ) -> Result<FootPoint<D>, Failure> {
+        let origin = self.feet.positions[base];
+        let frame = tangents::<D, M>(up);
+        let inverse = 1.0 / self.spacing;
+        let local = |x: &Vector<D>| -> ([f64; M], f64) {
+            let d = (x - origin) * inverse;
+            (frame.map(|t| t.dot(&d)), up.dot(&d))
+        };
+        room.points.clear();
+        room.points.extend(room.chosen.iter().map(|j| local(&self.feet.positions[*j])));
+        let graph = terms.fit(&room.points, self.method.weight, &mut room.squares).ok_or(Failure::Starved)?;
+        let (across, height) = local(p);
+        let start = inside(&across, &room.points);
+        let (s, jet) = graph.closest(&across, height, start).ok_or(Failure::Unresolved)?;
+        if extrapolation(&s, &room.points) > MOST_EXTRAPOLATION {
+            return Err(Failure::Extrapolated);
+        }
+        let (flat, rise) = jet.normal();
+        let mut normal = up * rise;
+        for (t, part) in frame.iter().zip(flat) {
+            normal += t * part;
+        }
+        let is_sharp = jet.sharpest() > SHARPEST || jet.sharpest().is_nan();
+        if is_sharp || normal.dot(&self.feet.normals[base]) < LEAST_AGREEMENT {
+            return Err(Failure::Unresolved);
+        }
+        let mut position = origin + up * (jet.value * self.spacing);
+        for (t, s) in frame.iter().zip(s) {
+            position += t * (s * self.spacing);
+        }
+        Ok(FootPoint { position, normal, part: self.feet.parts[base], ..self.bent(&jet) })
+    }
+
+    fn bent(&self, jet: &GraphJet<M>) -> FootPoint<D> {
+        FootPoint {
+            position: Vector::<D>::zeros(),
+            normal: Vector::<D>::zeros(),
+            curvature: jet.curvature() / self.spacing,
+            gauss_curvature: jet.gauss_curvature() / (self.spacing * self.spacing),
+            part: 0,
+        }
+    }
+}
+
+/// A place within the box of the points.
+fn inside<const M: usize>(s: &[f64; M], points: &[([f64; M], f64)]) -> [f64; M] {
+    std::array::from_fn(|a| {
+        let (low, high) = points.iter().fold((0.0_f64, 0.0_f64), |(l, h), (x, _)| (l.min(x[a]), h.max(x[a])));
+        s[a].clamp(low, high)
+    })
+}
+
+/// How far s lies outside the points, seen from their middle.
+fn extrapolation<const M: usize>(s: &[f64; M], points: &[([f64; M], f64)]) -> f64 {
+    let share = 1.0 / points.len().max(1) as f64;
+    let mut way = *s;
+    for (x, _) in points {
+        for (way, x) in way.iter_mut().zip(x) {
+            *way -= share * x;
+        }
+    }
+    let length = way.iter().map(|w| w * w).sum::<f64>().sqrt();
+    if length == 0.0 {
+        return 0.0;
+    }
+    let along = |x: &[f64; M]| x.iter().zip(&way).map(|(x, w)| x * w).sum::<f64>() / length;
+    let farthest = points.iter().fold(f64::NEG_INFINITY, |most, (x, _)| most.max(along(x)));
+    along(s) - farthest
+}

@@ -1,0 +1,230 @@
+//! A front step by step.
+
+use super::exact::{ExactFrontMotion, FrontErrors};
+use super::foot_points::FootPoints;
+use super::motion::{self, Law};
+use super::resampling::Removals;
+use super::system::FrontSystem;
+use crate::geometry::Vector;
+use crate::geometry::surfaces::Ball;
+use crate::schemes::measured_errors::entry;
+use crate::simulation::report::Newton;
+use crate::simulation::state::check_length;
+use crate::simulation::{
+    CpuClock, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State, StepError,
+};
+use crate::time::{Clock, FixedStep};
+use std::collections::BTreeMap;
+
+/// A front as a simulation, M = D − 1.
+pub struct GridBasedParticles<const D: usize, const M: usize> {
+    system: FrontSystem<D, M>,
+    exact: ExactFrontMotion<D>,
+    /// The front at the start, where it is a ball.
+    ball: Option<Ball<D>>,
+    fixed: FixedStep,
+    step: u64,
+    max_cfl: f64,
+    /// When the last particle went.
+    vanished: Option<f64>,
+    errors: Vec<FrontErrors>,
+    findings: Vec<Finding>,
+    phases: Phases,
+    method: BTreeMap<&'static str, String>,
+}
+
+impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
+    /// At time 0.
+    #[must_use]
+    pub fn new(
+        system: FrontSystem<D, M>,
+        exact: ExactFrontMotion<D>,
+        ball: Option<Ball<D>>,
+        fixed: FixedStep,
+        cpu_clock: CpuClock,
+        method: BTreeMap<&'static str, String>,
+    ) -> Self {
+        Self {
+            system,
+            exact,
+            ball,
+            fixed,
+            step: 0,
+            max_cfl: 0.0,
+            vanished: None,
+            errors: Vec::new(),
+            findings: Vec::new(),
+            phases: Phases::new(cpu_clock),
+            method,
+        }
+    }
+
+    /// At the end, and where a flow turns.
+    fn is_error_due(&self, step: u64) -> bool {
+        let turn = match &self.system.parts.law {
+            Law::Flow(flow) => flow.return_time(),
+            _ => None,
+        };
+        step == self.fixed.steps || turn.is_some_and(|turn| self.fixed.reaches(step, 0.5 * turn))
+    }
+
+    fn velocity(&self, i: usize) -> Vector<D> {
+        let feet = &self.system.feet;
+        match &self.system.parts.law {
+            Law::Flow(flow) => flow.velocity(&feet.positions[i], self.clock().time),
+            Law::Normal { speed } => feet.normals[i] * *speed,
+            Law::MeanCurvature => motion::curvature_velocity(feet.curvatures[i], &feet.normals[i]),
+        }
+    }
+}
+
+impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
+    fn clock(&self) -> Clock {
+        self.fixed.clock(self.step)
+    }
+
+    fn end(&self) -> Clock {
+        self.fixed.clock(self.fixed.steps)
+    }
+
+    /// 1. Motion, topology and resampling, as long as there is a front. 2. A look at the numbers. 3. Errors, where they are due.
+    fn step(&mut self) -> Result<(), StepError> {
+        let (from, to) = (self.clock(), self.fixed.clock(self.step + 1));
+        if !self.system.feet.is_empty() {
+            let way = self.system.advance(from.time, self.fixed.time_step, &mut self.phases)?;
+            self.max_cfl = self.max_cfl.max(way);
+            let feet = &self.system.feet;
+            let is_broken = |i: &usize| {
+                !(feet.positions[*i].iter().all(|c| c.is_finite()) && feet.normals[*i].iter().all(|c| c.is_finite()))
+            };
+            if let Some(particle) = (0..feet.len()).find(is_broken) {
+                return Err(StepError::NonFinite { field: "position", particle, step: to.step, time: to.time });
+            }
+            if feet.is_empty() {
+                self.vanished = Some(to.time);
+                let counts = self.system.removals.entries().map(|(name, count)| format!("{name} {count}")).join(", ");
+                let message = format!("no foot-point is left at time {}; so far: {counts}", to.time);
+                self.findings.push(Finding { name: "front_vanished", message, time: to.time });
+            }
+        }
+        if self.is_error_due(to.step) {
+            let Self { exact, ball, system, phases, .. } = self;
+            let (feet, grid, interrupt) = (&system.feet, &system.parts.grid, &system.parts.interrupt);
+            let found = phases.measure("errors", || exact.errors(ball.as_ref(), feet, grid, to.time, interrupt))?;
+            self.errors.extend(found);
+        }
+        self.step = to.step;
+        Ok(())
+    }
+
+    fn observables(&self) -> Observables {
+        let feet = &self.system.feet;
+        let removals = &self.system.removals;
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let radius = self.ball.as_ref().map_or(f64::NAN, |ball| {
+            let radii: Vec<f64> = feet.positions.iter().map(|x| (x - ball.center).norm()).collect();
+            mean(&radii)
+        });
+        vec![
+            ("time", self.clock().time),
+            ("time_step", self.fixed.time_step),
+            ("foot_points", feet.len() as f64),
+            ("curvature_mean", mean(&feet.curvatures)),
+            ("radius_mean", radius),
+            ("cfl", self.max_cfl),
+            ("unresolved", (removals.starved + removals.extrapolated + removals.unresolved) as f64),
+            ("swept", removals.swept as f64),
+            ("kept", removals.kept as f64),
+        ]
+    }
+
+    fn fields(&self) -> Fields {
+        let feet = &self.system.feet;
+        let grid = self.system.parts.grid;
+        let mut fields = Fields::at(&feet.positions);
+        fields.vector("normal", feet.normals.iter().copied());
+        fields.scalar("curvature", feet.curvatures.clone());
+        if D == 3 {
+            fields.scalar("gauss_curvature", feet.gauss_curvatures.clone());
+        }
+        fields.vector("velocity", (0..feet.len()).map(|i| self.velocity(i)));
+        fields.vector("grid_point", feet.nodes.iter().map(|node| grid.place::<D>(*node)));
+        fields.scalar("segment", feet.parts.iter().map(|part| f64::from(*part)).collect());
+        fields.id("particle_id", (0..feet.len() as u64).collect());
+        fields
+    }
+
+    fn state(&self) -> State {
+        let Clock { step, time } = self.clock();
+        let mut state = State { step, time, ..State::default() };
+        self.system.feet.save(&mut state);
+        state.push_counts("removals", self.system.removals.entries().map(|(_, count)| count).to_vec());
+        state.push_reals("monitors", &[self.max_cfl, self.vanished.unwrap_or(f64::NAN)]);
+        let errors: Vec<f64> = self.errors.iter().flat_map(|e| e.to_numbers()).collect();
+        state.push_reals("errors", &errors);
+        state
+    }
+
+    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
+        if state.step > self.fixed.steps {
+            return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
+        }
+        let feet = FootPoints::load(state)?;
+        let (removals, monitors) = (state.counts("removals")?, state.reals("monitors")?);
+        let errors = state.reals("errors")?;
+        let removals: [u64; 6] = removals.try_into().map_err(|_| RestoreError::Length {
+            name: "removals".into(),
+            got: removals.len(),
+            expected: 6,
+        })?;
+        check_length("monitors", monitors.len(), 2)?;
+        check_length("errors", errors.len(), errors.len() / FrontErrors::NUMBERS * FrontErrors::NUMBERS)?;
+        self.system.feet = feet;
+        self.system.removals = Removals::from_numbers(removals);
+        self.max_cfl = monitors[0];
+        self.vanished = (!monitors[1].is_nan()).then_some(monitors[1]);
+        self.errors = errors.chunks_exact(FrontErrors::NUMBERS).map(FrontErrors::from_numbers).collect();
+        self.step = state.step;
+        Ok(())
+    }
+
+    fn report(&self) -> Report {
+        let mut errors: Vec<_> = self.errors.iter().flat_map(FrontErrors::entries).collect();
+        if let Some(time) = self.vanished {
+            errors.push(entry("extinction", "time", time, time, "the last particle removed"));
+            if let Some(exact) = self.exact.extinction(self.ball.as_ref()) {
+                errors.push(entry("extinction", "absolute", (time - exact).abs(), time, "exact motion"));
+            }
+        }
+        Report {
+            errors,
+            health: self.health(),
+            worst_condition: 1.0,
+            rescued_fits: self.system.removals.entries().into_iter().filter(|(_, count)| *count > 0).collect(),
+            newton: Newton::default(),
+            method: self.method.clone(),
+        }
+    }
+
+    fn phases(&self) -> &Phases {
+        &self.phases
+    }
+
+    fn health(&self) -> Health {
+        let removals = &self.system.removals;
+        Health {
+            finite: self.system.feet.positions.iter().all(|x| x.iter().all(|c| c.is_finite())),
+            max_cfl: self.max_cfl,
+            volume_drift: None,
+            rescued_fits: removals.kept,
+        }
+    }
+
+    fn particle_count(&self) -> usize {
+        self.system.feet.len()
+    }
+
+    fn take_findings(&mut self) -> Vec<Finding> {
+        std::mem::take(&mut self.findings)
+    }
+}

@@ -1,0 +1,262 @@
+//! The front: its foot-points, and how a step moves and renews them.
+
+use super::foot_points::{FootPoint, FootPoints};
+use super::grid::{Grid, Node};
+use super::local_graph::Terms;
+use super::method::FrontMethod;
+use super::motion::{self, Law};
+use super::reconstruction::{Failure, Reconstruction, Room};
+use super::resampling::{Outcome, Removals, fill};
+use super::topology::{Topology, mark_unswept};
+use crate::geometry::{Domain, Surface, Vector};
+use crate::neighbors::CellList;
+use crate::parallel::{Interrupt, Interrupted, PerThread};
+use crate::simulation::Phases;
+use crate::time::PathIntegrator;
+
+/// What a front is made of beside its foot-points.
+pub struct FrontParts<const D: usize> {
+    /// The underlying grid.
+    pub grid: Grid,
+    /// Reconstruction.
+    pub method: FrontMethod,
+    /// What moves it.
+    pub law: Law<D>,
+    /// Path integrator, of a flow and of motion by curvature.
+    pub integrator: PathIntegrator,
+    /// What happens where segments meet.
+    pub topology: Topology,
+    /// Whether segments are also told apart by the part of the front that they belonged to at the start.
+    pub by_part: bool,
+    /// Asks a running step to be dropped.
+    pub interrupt: Interrupt,
+}
+
+/// A front in D dimensions, M = D − 1.
+pub struct FrontSystem<const D: usize, const M: usize> {
+    pub(super) parts: FrontParts<D>,
+    pub(super) feet: FootPoints<D>,
+    /// The next ones in the making.
+    pub(super) fresh: FootPoints<D>,
+    pub(super) cells: CellList<D>,
+    pub(super) fresh_cells: CellList<D>,
+    pub(super) terms: Terms<M>,
+    pub(super) quadratic: Terms<M>,
+    pub(super) candidates: Vec<Node>,
+    pub(super) outcomes: Vec<Outcome<D>>,
+    pub(super) rooms: PerThread<Room<D, M>>,
+    pub(super) removals: Removals,
+    keep: Vec<bool>,
+    /// Positions at the start of a step, and the sum of its stages' velocities.
+    starts: Vec<Vector<D>>,
+    slopes: Vec<Vector<D>>,
+}
+
+impl<const D: usize, const M: usize> FrontSystem<D, M> {
+    /// The foot-points of all grid points within the tube about the parts of a front (GBPM 3.2).
+    ///
+    /// At a corner, where a surface has no normal, it is the direction from the corner to the grid point, outward.
+    #[must_use]
+    pub fn about(surfaces: &[Box<dyn Surface<D>>], parts: FrontParts<D>) -> Self {
+        let mut feet = FootPoints::default();
+        let radius = parts.method.tube_radius * parts.grid.spacing;
+        let mut near: Vec<(Node, FootPoint<D>)> = Vec::new();
+        for (part, surface) in surfaces.iter().enumerate() {
+            for_each_near(surface.as_ref(), radius, &parts.grid, |node, place| {
+                let exact = surface.nearest(&place);
+                let way = (place - exact.point) * exact.distance.signum();
+                let normal = exact.normal.or_else(|| way.try_normalize(0.0));
+                if let Some(normal) = normal.filter(|_| exact.distance.abs() <= radius) {
+                    let curvature = exact.curvature.unwrap_or(0.0);
+                    let foot =
+                        FootPoint { position: exact.point, normal, curvature, gauss_curvature: 0.0, part: part as u32 };
+                    near.push((node, foot));
+                }
+            });
+        }
+        // Where parts share a grid point the nearer one has it.
+        let distance = |(node, foot): &(Node, FootPoint<D>)| (foot.position - parts.grid.place::<D>(*node)).norm();
+        near.sort_by(|a, b| a.0.cmp(&b.0).then(distance(a).total_cmp(&distance(b))).then(a.1.part.cmp(&b.1.part)));
+        near.dedup_by_key(|(node, _)| *node);
+        for (node, foot) in &near {
+            feet.push(*node, foot);
+        }
+        let (terms, quadratic) = (Terms::new(parts.method.degree), Terms::new(2));
+        Self {
+            parts,
+            feet,
+            fresh: FootPoints::default(),
+            cells: CellList::new(Domain::unbounded()),
+            fresh_cells: CellList::new(Domain::unbounded()),
+            terms,
+            quadratic,
+            candidates: Vec::new(),
+            outcomes: Vec::new(),
+            rooms: PerThread::new(),
+            removals: Removals::default(),
+            keep: Vec::new(),
+            starts: Vec::new(),
+            slopes: Vec::new(),
+        }
+    }
+
+    /// Reconstruction through the particles as they stand and were sorted.
+    pub(super) fn reconstruction(&self) -> Reconstruction<'_, D, M> {
+        Reconstruction {
+            feet: &self.feet,
+            cells: &self.cells,
+            method: &self.parts.method,
+            terms: &self.terms,
+            quadratic: &self.quadratic,
+            by_part: self.parts.by_part,
+            spacing: self.parts.grid.spacing,
+        }
+    }
+
+    pub(super) fn sort_cells(&mut self) {
+        self.cells.rebuild(self.feet.positions.iter().copied(), self.parts.grid.spacing);
+    }
+
+    /// Moves and renews the foot-points; returns the longest way in spacings.
+    ///
+    /// 1. Motion. 2. What other segments have swept goes. 3. Resampling. 4. The same again for what it has
+    ///    drawn past other segments.
+    pub(super) fn advance(&mut self, time: f64, step: f64, phases: &mut Phases) -> Result<f64, Interrupted> {
+        let clock = phases.clock();
+        let start = clock();
+        let spacing = self.parts.grid.spacing;
+        let way = match &self.parts.law {
+            Law::Flow(flow) => motion::carry::<D, M>(
+                &mut self.feet,
+                flow.as_ref(),
+                self.parts.integrator,
+                (time, step),
+                spacing,
+                &self.parts.interrupt,
+            )?,
+            Law::Normal { speed } => motion::along_normals(&mut self.feet, speed * step, spacing),
+            Law::MeanCurvature => self.by_curvature(step)?,
+        };
+        let moved = clock();
+        phases.book("front/motion", moved - start);
+        self.remove_swept(step)?;
+        let swept = clock();
+        phases.book("front/topology", swept - moved);
+        self.resample()?;
+        let sampled = clock();
+        phases.book("front/resampling", sampled - swept);
+        self.remove_swept(step)?;
+        phases.book("front/topology", clock() - sampled);
+        Ok(way)
+    }
+
+    /// Removes what another segment has passed, where segments merge. In a flow none can pass another.
+    fn remove_swept(&mut self, step: f64) -> Result<(), Interrupted> {
+        if self.parts.topology == Topology::Cross || matches!(self.parts.law, Law::Flow(_)) {
+            return Ok(());
+        }
+        self.sort_cells();
+        let Self { feet, cells, keep, parts, .. } = self;
+        let curvatures = &feet.curvatures;
+        let way = |i: usize| match parts.law {
+            Law::Normal { speed } => speed * step,
+            Law::MeanCurvature => -curvatures[i] * step,
+            Law::Flow(_) => 0.0,
+        };
+        mark_unswept(feet, cells, &parts.method, parts.grid.spacing, &way, keep, &parts.interrupt)?;
+        let removed = keep.iter().filter(|keep| !**keep).count();
+        if removed > 0 {
+            self.removals.swept += removed as u64;
+            feet.retain(keep);
+        }
+        Ok(())
+    }
+
+    /// Runge–Kutta stages of dy/dt = −κ n, each with curvatures and normals of reconstructions through the particles of the
+    /// stage.
+    fn by_curvature(&mut self, step: f64) -> Result<f64, Interrupted> {
+        let stages: &[(f64, f64)] = match self.parts.integrator {
+            PathIntegrator::TvdRk2 => &[(0.0, 0.5), (1.0, 0.5)],
+            _ => &[(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)],
+        };
+        let n = self.feet.len();
+        self.starts.clear();
+        self.starts.extend_from_slice(&self.feet.positions);
+        self.slopes.clear();
+        self.slopes.resize(n, Vector::<D>::zeros());
+        for (k, (offset, weight)) in stages.iter().enumerate() {
+            if k > 0 {
+                for i in 0..n {
+                    let velocity = motion::curvature_velocity(self.feet.curvatures[i], &self.feet.normals[i]);
+                    self.feet.positions[i] = self.starts[i] + velocity * (offset * step);
+                }
+                self.renew_geometry()?;
+            }
+            for i in 0..n {
+                let velocity = motion::curvature_velocity(self.feet.curvatures[i], &self.feet.normals[i]);
+                self.slopes[i] += velocity * *weight;
+            }
+        }
+        let mut longest = 0.0_f64;
+        for i in 0..n {
+            self.feet.positions[i] = self.starts[i] + self.slopes[i] * step;
+            longest = longest.max(self.slopes[i].norm());
+        }
+        Ok(longest * step / self.parts.grid.spacing)
+    }
+
+    /// Normals and curvatures at the particles where they stand; where a reconstruction fails the last ones stay.
+    fn renew_geometry(&mut self) -> Result<(), Interrupted> {
+        self.sort_cells();
+        self.outcomes.clear();
+        self.outcomes.resize(self.feet.len(), Err(Failure::Starved));
+        let mut outcomes = std::mem::take(&mut self.outcomes);
+        let (positions, interrupt) = (&self.feet.positions, &self.parts.interrupt);
+        let filled = fill(&self.reconstruction(), positions, &mut outcomes, &self.rooms, interrupt, |x| *x);
+        self.outcomes = outcomes;
+        filled?;
+        for (i, outcome) in self.outcomes.iter().enumerate() {
+            if let Ok(foot) = outcome {
+                self.feet.normals[i] = foot.normal;
+                self.feet.curvatures[i] = foot.curvature;
+                self.feet.gauss_curvatures[i] = foot.gauss_curvature;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Calls for the grid points within a distance of a surface: boxes of grid points are halved as long as the surface may pass
+/// through.
+pub(super) fn for_each_near<const D: usize>(
+    surface: &dyn Surface<D>,
+    radius: f64,
+    grid: &Grid,
+    mut visit: impl FnMut(Node, Vector<D>),
+) {
+    let (low, high) = surface.bounding_box();
+    let margin = radius + grid.spacing;
+    let (Some(low), Some(high)) = (grid.nearest(&low.add_scalar(-margin)), grid.nearest(&high.add_scalar(margin)))
+    else {
+        return;
+    };
+    let mut boxes = vec![(low, high)];
+    while let Some((low, high)) = boxes.pop() {
+        let center = Vector::<D>::from_fn(|d, _| 0.5 * (low[d] + high[d]) as f64 * grid.spacing);
+        let half = Vector::<D>::from_fn(|d, _| 0.5 * (high[d] - low[d]) as f64 * grid.spacing).norm();
+        if surface.signed_distance(&center).abs() > half * (1.0 + 1e-12) + radius {
+            continue;
+        }
+        let longest = (0..D).fold(0, |best, d| if high[d] - low[d] > high[best] - low[best] { d } else { best });
+        if high[longest] == low[longest] {
+            visit(Grid::node(&low), center);
+            continue;
+        }
+        let middle = low[longest] + (high[longest] - low[longest]) / 2;
+        let (mut below, mut above) = (high, low);
+        below[longest] = middle;
+        above[longest] = middle + 1;
+        boxes.push((low, below));
+        boxes.push((above, high));
+    }
+}
