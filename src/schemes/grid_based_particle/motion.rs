@@ -20,6 +20,18 @@ pub enum Law<const D: usize> {
     MeanCurvature,
 }
 
+impl<const D: usize> Law<D> {
+    /// Whether a corner becomes round, seen from a grid point at a distance on the side where it is the closest point:
+    /// where it moves towards that side, and always by its curvature.
+    pub(super) fn opens_corners(&self, distance: f64) -> bool {
+        match self {
+            Self::Flow(_) => false,
+            Self::Normal { speed } => speed * distance > 0.0,
+            Self::MeanCurvature => true,
+        }
+    }
+}
+
 /// Offset of the points by which a tangent is carried along, in spacings.
 const OFFSET: f64 = 1e-4;
 

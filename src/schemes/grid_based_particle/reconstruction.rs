@@ -12,8 +12,10 @@ use crate::neighbors::{CellList, Neighbor, NeighborSearch};
 const MOST_EXTRAPOLATION: f64 = 0.3;
 /// Cosine between the normal of the base point and that of the answer below which the graph has folded.
 const LEAST_AGREEMENT: f64 = 0.2;
-/// Cosine below which the reconstruction is made again in the frame of the normal that it found.
-const TURNED: f64 = 0.9;
+/// Cosine of normals within a stencil below which the front turns too much for the degree asked for.
+const TURNED: f64 = 0.7;
+/// How far from the nearest of its particles an answer may lie, in spacings.
+const MOST_LONELY: f64 = 1.0;
 /// The largest |κ| h of a front that its particles resolve.
 const SHARPEST: f64 = 2.0;
 /// Segments that are tried at one place.
@@ -154,18 +156,17 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if room.chosen.len() < self.quadratic.count() {
             return Err(Failure::Starved);
         }
-        let first = self.fit(p, base, &self.feet.normals[base], self.terms, room);
-        let first = match first {
-            Ok(foot) if foot.normal.dot(&self.feet.normals[base]) < TURNED => {
-                self.fit(p, base, &foot.normal, self.terms, room)
+        let normals = &self.feet.normals;
+        let straightest = room.chosen.iter().map(|j| normals[*j].dot(&normals[base])).fold(1.0, f64::min);
+        let mut first = Err(Failure::Unresolved);
+        if straightest > TURNED {
+            first = self.fit(p, base, &normals[base], self.terms, room);
+            if first.is_ok() {
+                return first;
             }
-            other => other,
-        };
-        if first.is_ok() {
-            return first;
         }
-        // Where the front turns within the stencil, its mean normal is the better upward direction.
-        let mean: Vector<D> = room.chosen.iter().map(|j| self.feet.normals[*j]).sum();
+        // Where the front turns within the stencil, its mean normal is the better upward direction, and less is known of it.
+        let mean: Vector<D> = room.chosen.iter().map(|j| normals[*j]).sum();
         let Some(mean) = mean.try_normalize(0.1) else { return first };
         self.fit(p, base, &mean, self.quadratic, room).or(first)
     }
@@ -207,6 +208,11 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let mut position = origin + up * (jet.value * self.spacing);
         for (t, s) in frame.iter().zip(s) {
             position += t * (s * self.spacing);
+        }
+        let nearest = |j: &usize| (self.feet.positions[*j] - position).norm_squared();
+        let nearest = room.chosen.iter().map(nearest).fold(f64::INFINITY, f64::min);
+        if nearest > (MOST_LONELY * self.spacing).powi(2) {
+            return Err(Failure::Extrapolated);
         }
         Ok(FootPoint { position, normal, part: self.feet.parts[base], ..self.bent(&jet) })
     }

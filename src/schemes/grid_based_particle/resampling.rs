@@ -132,11 +132,11 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         let grid = self.parts.grid;
         let reach = COVERED * grid.spacing;
         self.fresh_cells.rebuild(self.fresh.positions.iter().copied(), grid.spacing);
-        let number = self.fresh.len();
+        let order = self.fresh_cells.order();
         for i in 0..self.feet.len() {
             let foot = self.feet.get(i);
-            let is_replaced = self.fresh_cells.any_within(&foot.position, reach, |j| {
-                j < number && self.fresh.normals[j].dot(&foot.normal) > self.parts.method.cosine
+            let is_replaced = self.fresh_cells.any_within(&foot.position, reach, |place| {
+                self.fresh.normals[order[place]].dot(&foot.normal) > self.parts.method.cosine
             });
             if !is_replaced && let Some(at) = grid.nearest(&foot.position) {
                 let node: Node = super::Grid::node(&at);

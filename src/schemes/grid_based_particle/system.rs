@@ -55,7 +55,8 @@ pub struct FrontSystem<const D: usize, const M: usize> {
 impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// The foot-points of all grid points within the tube about the parts of a front (GBPM 3.2).
     ///
-    /// At a corner, where a surface has no normal, it is the direction from the corner to the grid point, outward.
+    /// At a corner, where a surface has no normal, it is the direction from the corner to the grid point, outward, where the
+    /// corner opens; elsewhere the sides go on until they meet.
     #[must_use]
     pub fn about(surfaces: &[Box<dyn Surface<D>>], parts: FrontParts<D>) -> Self {
         let mut feet = FootPoints::default();
@@ -65,7 +66,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             for_each_near(surface.as_ref(), radius, &parts.grid, |node, place| {
                 let exact = surface.nearest(&place);
                 let way = (place - exact.point) * exact.distance.signum();
-                let normal = exact.normal.or_else(|| way.try_normalize(0.0));
+                let fan = || parts.law.opens_corners(exact.distance).then(|| way.try_normalize(0.0)).flatten();
+                let normal = exact.normal.or_else(fan);
                 if let Some(normal) = normal.filter(|_| exact.distance.abs() <= radius) {
                     let curvature = exact.curvature.unwrap_or(0.0);
                     let foot =
