@@ -17,7 +17,8 @@ pub mod work_estimate;
 use crate::scene::SceneKind;
 
 /// Every kind of scene.
-pub static SCENES: &[&SceneKind] = &[&redistance::KIND, &vortex::KIND, &droplet::KIND, &surface_pde::KIND, &front::KIND];
+pub static SCENES: &[&SceneKind] =
+    &[&redistance::KIND, &vortex::KIND, &droplet::KIND, &surface_pde::KIND, &front::KIND];
 
 /// A kind by its name.
 #[must_use]

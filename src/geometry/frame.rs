@@ -49,7 +49,8 @@ mod tests {
 
     #[test]
     fn a_frame_is_orthonormal_and_its_normal_comes_back() {
-        for n in [Vector::<3>::new(0.0, 0.0, 1.0), Vector::<3>::new(0.36, -0.48, 0.8), Vector::<3>::new(-1.0, 0.0, 0.0)] {
+        for n in [Vector::<3>::new(0.0, 0.0, 1.0), Vector::<3>::new(0.36, -0.48, 0.8), Vector::<3>::new(-1.0, 0.0, 0.0)]
+        {
             let frame = tangents::<3, 2>(&n);
             assert!(frame[0].dot(&frame[1]).abs() < 1e-15 && (frame[0].norm() - 1.0).abs() < 1e-15);
             assert!(frame.iter().all(|t| t.dot(&n).abs() < 1e-15));

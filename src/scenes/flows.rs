@@ -99,7 +99,6 @@ pub enum Integrator {
     Dopri5 { tolerance: f64 },
 }
 
-
 impl Integrator {
     /// The integrator.
     #[must_use]

@@ -65,8 +65,7 @@ pub const CFL: Parameter = Parameter::new(
 );
 
 /// All of them.
-pub static PARAMETERS: &[Parameter] =
-    &[DEGREE, NEIGHBORS, WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, CFL];
+pub static PARAMETERS: &[Parameter] = &[DEGREE, NEIGHBORS, WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, CFL];
 
 const COSINE: Kind = Kind::Number { above: Some(-1.0), least: None, below: Some(1.0), most: None };
 
@@ -158,8 +157,7 @@ pub fn understand(
         let allowed = json!(format!("a whole number ≥ {terms}"));
         return Err(Violation::new(format!("{pointer}/neighbors"), "range", detail, &json!(neighbors), allowed));
     }
-    let topology =
-        if written.topology.as_deref() == Some("cross") { Topology::Cross } else { Topology::Merge };
+    let topology = if written.topology.as_deref() == Some("cross") { Topology::Cross } else { Topology::Merge };
     let (by_part, cosine, name) = match written.segment_test {
         SegmentTest::Normals { cosine } => (topology == Topology::Cross, cosine, "normals"),
         SegmentTest::Parameter { cosine } => (true, cosine, "parameter"),

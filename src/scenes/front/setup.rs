@@ -10,7 +10,7 @@ use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::{shapes, work_estimate};
 use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::grid_based_particle::{
-    self as gbpm, ExactFrontMotion, FrontParts, FrontSystem, GridBasedParticles, Grid,
+    self as gbpm, ExactFrontMotion, FrontParts, FrontSystem, Grid, GridBasedParticles,
 };
 use crate::simulation::{OutputPlan, Simulation};
 use crate::time::{FixedStep, PathIntegrator};

@@ -16,7 +16,12 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         Kind::Integer { least: 2, most: 3 },
         DefaultValue::Absent,
     ),
-    Parameter::new("flow", "the velocity field", Kind::Choice(flows::variants), DefaultValue::Json("\"single_vortex\"")),
+    Parameter::new(
+        "flow",
+        "the velocity field",
+        Kind::Choice(flows::variants),
+        DefaultValue::Json("\"single_vortex\""),
+    ),
     Parameter::new(
         "shape",
         "the surface at the start",

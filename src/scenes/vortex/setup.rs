@@ -2,8 +2,8 @@
 
 use super::parameters::{Field, Redistance, Written};
 use crate::closest_point::PcpMethod;
-use crate::geometry::lattice::Lattice;
 use crate::geometry::Vector;
+use crate::geometry::lattice::Lattice;
 use crate::scene::check;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};

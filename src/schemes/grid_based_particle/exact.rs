@@ -197,11 +197,8 @@ fn over_angle<const D: usize>(ball: &Ball<D>, positions: &[Vector<D>], distances
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let turn = std::f64::consts::TAU;
     let next = sorted.iter().cycle().skip(1);
-    let sum: f64 = sorted
-        .iter()
-        .zip(next)
-        .map(|(a, b)| 0.5 * (a.1 * a.1 + b.1 * b.1) * (b.0 - a.0).rem_euclid(turn))
-        .sum();
+    let sum: f64 =
+        sorted.iter().zip(next).map(|(a, b)| 0.5 * (a.1 * a.1 + b.1 * b.1) * (b.0 - a.0).rem_euclid(turn)).sum();
     sum.sqrt()
 }
 
@@ -216,7 +213,9 @@ fn offset_distance<const D: usize>(
     match topology {
         // The union's outer distance is the least of its parts'.
         Topology::Merge => levels.fold(f64::INFINITY, f64::min),
-        Topology::Cross => levels.fold(f64::INFINITY, |best, level| if level.abs() < best.abs() { level } else { best }),
+        Topology::Cross => {
+            levels.fold(f64::INFINITY, |best, level| if level.abs() < best.abs() { level } else { best })
+        }
     }
 }
 

@@ -133,7 +133,8 @@ impl<const M: usize> LocalGraph<'_, M> {
                     })
                 })
             };
-            let step = solve_positive(&hessian(rest), &gradient).or_else(|| solve_positive(&hessian(0.0), &gradient))?;
+            let step =
+                solve_positive(&hessian(rest), &gradient).or_else(|| solve_positive(&hessian(0.0), &gradient))?;
             let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
             let scale = if length > LONGEST_STEP { LONGEST_STEP / length } else { 1.0 };
             for (s, step) in s.iter_mut().zip(step) {
@@ -254,7 +255,9 @@ mod tests {
             / (2.0 * e);
         assert!((jet.curvature() - divergence).abs() < 1e-8);
         let det = jet.second[0][0] * jet.second[1][1] - 0.15 * 0.15;
-        assert!((jet.gauss_curvature() - det / (1.0 + jet.first[0].powi(2) + jet.first[1].powi(2)).powi(2)).abs() < 1e-13);
+        assert!(
+            (jet.gauss_curvature() - det / (1.0 + jet.first[0].powi(2) + jet.first[1].powi(2)).powi(2)).abs() < 1e-13
+        );
     }
 
     #[test]

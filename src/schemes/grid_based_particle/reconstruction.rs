@@ -14,8 +14,9 @@ const MOST_EXTRAPOLATION: f64 = 0.3;
 const LEAST_AGREEMENT: f64 = 0.2;
 /// Cosine of normals within a stencil below which the front turns too much for the degree asked for.
 const TURNED: f64 = 0.7;
-/// How far from the nearest of its particles an answer may lie, in spacings.
+/// How far from the nearest of its particles an answer may lie, in spacings: past the last of them, and between two.
 const MOST_LONELY: f64 = 1.0;
+pub(super) const WIDEST_BRIDGE: f64 = 3.0;
 /// The largest |κ| h of a front that its particles resolve.
 const SHARPEST: f64 = 2.0;
 /// Segments that are tried at one place.
@@ -193,7 +194,8 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let (across, height) = local(p);
         let start = inside(&across, &room.points);
         let (s, jet) = graph.closest(&across, height, start).ok_or(Failure::Unresolved)?;
-        if extrapolation(&s, &room.points) > MOST_EXTRAPOLATION {
+        let beyond = extrapolation(&s, &room.points);
+        if beyond > MOST_EXTRAPOLATION {
             return Err(Failure::Extrapolated);
         }
         let (flat, rise) = jet.normal();
@@ -211,7 +213,8 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
         let nearest = |j: &usize| (self.feet.positions[*j] - position).norm_squared();
         let nearest = room.chosen.iter().map(nearest).fold(f64::INFINITY, f64::min);
-        if nearest > (MOST_LONELY * self.spacing).powi(2) {
+        let most = if beyond > 0.0 { MOST_LONELY } else { WIDEST_BRIDGE };
+        if nearest > (most * self.spacing).powi(2) {
             return Err(Failure::Extrapolated);
         }
         Ok(FootPoint { position, normal, part: self.feet.parts[base], ..self.bent(&jet) })

@@ -5,9 +5,11 @@
 
 use super::foot_points::FootPoint;
 use super::grid::Node;
-use super::reconstruction::{Failure, Reconstruction, Room};
+use super::reconstruction::{Failure, Reconstruction, Room, WIDEST_BRIDGE};
 use super::system::FrontSystem;
 use crate::geometry::Vector;
+use crate::geometry::frame::tangents;
+use crate::neighbors::NeighborSearch;
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
@@ -17,7 +19,7 @@ const ALONG: f64 = 1.4;
 /// How much farther than γ across the front, in spacings: for the bend of the front.
 const MARGIN: f64 = 0.35;
 /// A moved particle with a new foot-point of its segment within so many spacings needs not stay.
-const COVERED: f64 = 0.75;
+const COVERED: f64 = 0.55;
 
 /// How many particles were removed, and why; and what was done to keep the front whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -87,15 +89,17 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// The grid points that the particles have about them, each once and in order.
     fn propose(&mut self) {
         let grid = self.parts.grid;
-        let (across, along) =
-            ((self.parts.method.tube_radius + MARGIN) * grid.spacing, (ALONG * grid.spacing).powi(2));
-        let reach = (self.parts.method.tube_radius + MARGIN).hypot(ALONG).floor() as i64 + 1;
+        let across = (self.parts.method.tube_radius + MARGIN) * grid.spacing;
         self.candidates.clear();
-        for (y, n) in self.feet.positions.iter().zip(&self.feet.normals) {
+        for i in 0..self.feet.len() {
+            let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
             if grid.nearest(y).is_none() {
                 self.removals.outside += 1;
                 continue;
             }
+            let along = if self.is_at_gap(i) { WIDEST_BRIDGE } else { ALONG };
+            let reach = (self.parts.method.tube_radius + MARGIN).hypot(along).floor() as i64 + 1;
+            let along = (along * grid.spacing).powi(2);
             grid.for_each_about(y, reach, |node, place| {
                 let d = place - y;
                 let height = d.dot(n);
@@ -106,6 +110,27 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         }
         self.candidates.sort_unstable();
         self.candidates.dedup();
+    }
+
+    /// Whether a particle has nobody of its segment near it in some direction along the front: a motion has drawn its neighbours
+    /// away, or a sharp tip has become round again and lacks particles.
+    fn is_at_gap(&self, i: usize) -> bool {
+        let spacing = self.parts.grid.spacing;
+        let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
+        let frame = tangents::<D, M>(n);
+        let mut has_neighbor = [[false; 2]; M];
+        self.cells.for_each_within(y, ALONG * spacing, |j, d, square| {
+            if j != i && self.feet.normals[j].dot(n) > self.parts.method.cosine {
+                for (has, t) in has_neighbor.iter_mut().zip(&frame) {
+                    // Within 60° of the direction, so that in space somebody is on every side.
+                    let ahead = t.dot(d);
+                    if 4.0 * ahead * ahead >= square {
+                        has[usize::from(ahead > 0.0)] = true;
+                    }
+                }
+            }
+        });
+        !has_neighbor.iter().flatten().all(|has| *has)
     }
 
     /// New foot-points from the outcomes within the tube.
