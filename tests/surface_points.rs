@@ -103,7 +103,6 @@ fn operators_are_those_of_the_surface_and_no_error_is_made_up() {
         assert!(off < 1e-2, "{off}");
         assert!(simulation.report().errors.is_empty());
     }
-    // Δ_S u = Y_2 less its mean has the solution −Y_2/6; it is a wave here, whose mean nobody took away.
     let poisson = body(&json!({"problem": {"type": "poisson", "field": field}, "method": order}));
     let simulation = finished(&poisson, &cloud);
     let errors = simulation.report().errors;
@@ -203,7 +202,10 @@ fn what_is_wrong_with_points_is_said_before_the_first_step() {
     assert!(findings[0].message.contains("more: neighbours on one side alone"), "{}", findings[0].message);
     assert!(findings[1].message.starts_with("point 70:"), "{}", findings[1].message);
     assert_eq!(simulation.take_findings(), []);
+    // A wrong normal is replaced.
     pool(2).install(|| simulation.step()).unwrap();
+    let mean = column(simulation.as_ref(), "mean_curvature");
+    assert!((mean[70] - 1.0).abs() < 1e-2 && mean.iter().all(|h| (h - 1.0).abs() < 0.2), "{}", mean[70]);
 
     let mut twins = cloud.clone();
     twins.positions[7] = twins.positions[1999];

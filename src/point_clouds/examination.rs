@@ -128,7 +128,7 @@ pub enum Flaw {
         /// Of the support.
         radius: f64,
     },
-    /// Given normals that oppose those about them, or do not stand on the points about them.
+    /// Given normals that opposed those about them, or did not stand on the points about them.
     InconsistentNormals(Named),
 }
 
@@ -154,7 +154,10 @@ impl fmt::Display for Flaw {
                 write!(f, "{points}: another part of the surface lies within the support of {radius:.4e}")
             }
             Self::InconsistentNormals(points) => {
-                write!(f, "{points}: the normal opposes those of most neighbours, or does not stand on the surface")
+                write!(
+                    f,
+                    "{points}: the normal opposes those of most neighbours, or does not stand on the surface; one that is estimated takes its place"
+                )
             }
         }
     }
@@ -209,7 +212,7 @@ impl<'a, const D: usize> Examined<'a, D> {
             return Err(out_of_scale(first));
         }
         // Of a surface about fifty points lie within; of a curve a number of spacings and a half, as lattices want.
-        let radius = if D == 2 { 1.125 } else { 2.0 } * first;
+        let radius = if D == 2 { 2.25 } else { 2.0 } * first;
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(points.iter().copied(), radius);
         let fullest = cells.starts().windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
@@ -253,24 +256,27 @@ impl<'a, const D: usize> Examined<'a, D> {
         Err(Unusable::Duplicates { points, pair: [i, j], distance: square.sqrt() })
     }
 
-    /// What is wrong with the points and their unit normals for operators with supports of a radius.
-    #[must_use]
-    pub fn flaws(&self, normals: &[Vector<D>], source: NormalSource, radius: f64) -> Vec<Flaw> {
+    /// What is wrong with the points and their unit normals for operators with supports of a radius. Inconsistent normals are
+    /// replaced by estimated ones that face where most neighbours' do.
+    pub fn flaws(&self, normals: &mut [Vector<D>], source: NormalSource, radius: f64) -> Vec<Flaw> {
         let at = |(i, _): (usize, &Vector<D>)| self.about(i, normals, source, radius);
-        let seen: Vec<Seen> = self.points.par_iter().with_min_len(64).enumerate().map(at).collect();
-        let those = |holds: fn(&Seen) -> bool| Named::those(seen.len(), |i| holds(&seen[i]));
+        let seen: Vec<Seen<D>> = self.points.par_iter().with_min_len(64).enumerate().map(at).collect();
+        for (normal, seen) in normals.iter_mut().zip(&seen) {
+            *normal = seen.instead.unwrap_or(*normal);
+        }
+        let those = |holds: fn(&Seen<D>) -> bool| Named::those(seen.len(), |i| holds(&seen[i]));
         let holes = those(|seen| seen.is_at_edge).map(Flaw::Holes);
         let sheets = those(|seen| seen.has_sheet).map(|points| Flaw::CloseSheets { points, radius });
-        let normals = those(|seen| seen.is_inconsistent).map(Flaw::InconsistentNormals);
-        [holes, sheets, normals].into_iter().flatten().collect()
+        let inconsistent = those(|seen| seen.instead.is_some()).map(Flaw::InconsistentNormals);
+        [holes, sheets, inconsistent].into_iter().flatten().collect()
     }
 
     /// What can be seen from a point.
-    fn about(&self, i: usize, normals: &[Vector<D>], source: NormalSource, radius: f64) -> Seen {
+    fn about(&self, i: usize, normals: &[Vector<D>], source: NormalSource, radius: f64) -> Seen<D> {
         let (x, n) = (&self.points[i], &normals[i]);
         let near = NEAR * self.local[i];
         let [first, second] = tangents(n);
-        let mut angles = Vec::new();
+        let (mut angles, mut facing) = (Vec::new(), Vector::<D>::zeros());
         let (mut opposing, mut has_sheet) = (0, false);
         self.cells.for_each_within(x, near.max(radius), |j, dx, square| {
             let turn = n.dot(&normals[j]);
@@ -281,19 +287,26 @@ impl<'a, const D: usize> Examined<'a, D> {
                 angles.push(dx.dot(&second).atan2(dx.dot(&first)));
                 opposing += usize::from(turn < 0.0);
             }
+            if j != i && square <= near * near {
+                facing += normals[j];
+            }
         });
-        let is_inconsistent = source == NormalSource::Given
-            && (2 * opposing > angles.len()
-                || plane(&self.cells, i, x, near).is_ok_and(|across| across.dot(n).abs() < 0.5));
-        Seen { is_at_edge: widest_gap(angles) > WIDEST_GAP[D - 2], has_sheet, is_inconsistent }
+        let across = || plane(&self.cells, i, x, near).map(|n| if n.dot(&facing) < 0.0 { -n } else { n }).ok();
+        let estimated = if source == NormalSource::Given { across() } else { None };
+        // The plane through two sheets tells nothing of either, a gap across a wrong normal nothing of the surface.
+        let is_off = |across: &Vector<D>| !has_sheet && across.dot(n).abs() < 0.5;
+        let instead = estimated.filter(|across| 2 * opposing > angles.len() || is_off(across));
+        let is_at_edge = instead.is_none() && widest_gap(angles) > WIDEST_GAP[D - 2];
+        Seen { is_at_edge, has_sheet, instead }
     }
 }
 
 /// What can be seen from a point.
-struct Seen {
+struct Seen<const D: usize> {
     is_at_edge: bool,
     has_sheet: bool,
-    is_inconsistent: bool,
+    /// The normal to be taken in the place of an inconsistent one.
+    instead: Option<Vector<D>>,
 }
 
 /// Normals of length one.

@@ -35,14 +35,14 @@ pub(super) fn build<const D: usize, const M: usize>(
     let (Some(Scheme::Dcpse(method)), Some(problem), true) = (scheme, problem, violations.is_empty()) else {
         return Err(violations);
     };
-    let (normals, source) = match given {
+    let (mut normals, source) = match given {
         Some(given) => (given, NormalSource::Given),
         None => {
             let found = normals::estimate(&points, examined.radius_of_normals());
             (found.map_err(|reason| refuse(reason.to_string()))?, NormalSource::Estimated)
         }
     };
-    let flaws = examined.flaws(&normals, source, method.support.radius);
+    let flaws = examined.flaws(&mut normals, source, method.support.radius);
     let finding = |flaw: Flaw| Finding { name: flaw.name(), message: flaw.to_string(), time: 0.0 };
     let origin = format!(
         "{} of them, {:.4e} apart, {} normals{}",

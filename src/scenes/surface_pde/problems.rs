@@ -91,9 +91,9 @@ fn field(
         _ => {
             // Before points are read their size is not known, and so neither what a wave is by it.
             let is_sized = !matches!(shape, Shape::Points(extent) if !extent.is_known);
-            if chosen["k"].is_null() && is_sized {
-                let wave: Vec<f64> = DEFAULT_WAVE.iter().take(shape.dimension()).map(|k| k / shape.reach()).collect();
-                chosen["k"] = json!(wave);
+            if chosen["k"].is_null() {
+                let wave = DEFAULT_WAVE.iter().take(shape.dimension()).map(|k| k / shape.reach());
+                chosen["k"] = is_sized.then(|| wave.collect::<Vec<f64>>()).into();
             }
             let k = if chosen["k"].is_null() {
                 Vector::<3>::from(DEFAULT_WAVE)
