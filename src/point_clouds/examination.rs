@@ -314,8 +314,8 @@ struct Seen<const D: usize> {
 /// # Errors
 /// [`Unusable::ZeroNormals`]: some have none.
 pub fn unit_normals<const D: usize>(given: &[Vector<D>]) -> Result<Vec<Vector<D>>, Unusable> {
-    // By the largest component first: its square may be no number.
-    let has_length = |i: usize| (f64::MIN_POSITIVE..=f64::MAX).contains(&given[i].amax());
+    // By the largest component, whose square may be no number; NaN is not the largest.
+    let has_length = |i: usize| given[i].iter().all(|c| c.is_finite()) && given[i].amax() >= f64::MIN_POSITIVE;
     match Named::those(given.len(), |i| !has_length(i)) {
         Some(points) => Err(Unusable::ZeroNormals(points)),
         None => Ok(given.iter().map(|n| (n / n.amax()).normalize()).collect()),

@@ -303,3 +303,27 @@ fn what_is_wrong_with_an_uploaded_surface_is_an_event_or_ends_the_job_with_the_p
     assert_eq!(failed["reason"], "input.damaged");
     assert!(failed.to_string().contains("points 3, 1500:"), "{failed}");
 }
+
+#[test]
+fn a_surface_is_run_from_a_local_mesh_too() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    std::fs::write(at("sphere.ply"), sphere_ply()).unwrap();
+    let run = |normals: Value, out: &str| {
+        let surface = json!({"type": "points", "file": at("sphere.ply")});
+        let scene = json!({"kind": "surface_pde", "surface": surface, "problem": "curvature", "normals": normals});
+        std::fs::write(at("scene.json"), scene.to_string()).unwrap();
+        Command::new(program()).arg("run").arg(at("scene.json")).arg("--out").arg(at(out)).output().unwrap()
+    };
+    let mut normals = Vec::new();
+    for (asked, out) in [(json!({"type": "given", "metric": "normals"}), "given"), (json!("estimated"), "estimated")] {
+        let done = run(asked, out);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let file = hdf5::File::open(at(out).join("frames/000001.vtkhdf")).unwrap();
+        normals.push(file.dataset("VTKHDF/PointData/normal").unwrap().read_raw::<f64>().unwrap());
+        let mean = file.dataset("VTKHDF/PointData/mean_curvature").unwrap().read_raw::<f64>().unwrap();
+        assert!(mean.iter().all(|h| (h - 0.5).abs() < 1e-2));
+    }
+    let off = |(given, estimated): (&f64, &f64)| (given - estimated).abs();
+    assert!(normals[0].iter().zip(&normals[1]).map(off).fold(0.0, f64::max) < 1e-2);
+}

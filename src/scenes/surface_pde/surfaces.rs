@@ -30,7 +30,7 @@ pub(super) struct Extent {
     dimension: usize,
     /// Length or area.
     measure: f64,
-    /// The largest distance from the origin.
+    /// The largest distance from the middle of their box.
     reach: f64,
     /// Where the cap begins.
     cap: f64,
@@ -44,14 +44,15 @@ const BELOW_CAP: f64 = 0.9;
 impl Extent {
     /// Of points that are so far apart.
     pub fn of<const D: usize>(points: &[Vector<D>], spacing: f64) -> Self {
+        let low = points.iter().fold(Vector::<D>::repeat(f64::INFINITY), |low, x| low.inf(x));
+        let high = points.iter().fold(Vector::<D>::repeat(f64::NEG_INFINITY), |high, x| high.sup(x));
+        let middle = 0.5 * (low + high);
         let axis = if D == 3 { 2 } else { 0 };
-        let low = points.iter().map(|x| x[axis]).fold(f64::INFINITY, f64::min);
-        let high = points.iter().map(|x| x[axis]).fold(f64::NEG_INFINITY, f64::max);
         Self {
             dimension: D,
             measure: points.len() as f64 * spacing.powi(D as i32 - 1),
-            reach: points.iter().map(|x| x.norm()).fold(0.0, f64::max),
-            cap: low + BELOW_CAP * (high - low),
+            reach: points.iter().map(|x| (x - middle).norm()).fold(0.0, f64::max),
+            cap: low[axis] + BELOW_CAP * (high[axis] - low[axis]),
             is_known: true,
         }
     }
@@ -131,7 +132,7 @@ impl Shape {
         }
     }
 
-    /// A length that all of the surface is within.
+    /// A length that all of the surface is within, about the origin or the middle of points.
     pub fn reach(&self) -> f64 {
         match self {
             Self::Circle { radius } => *radius,
