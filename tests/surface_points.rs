@@ -143,7 +143,7 @@ fn bodies() -> Vec<(Value, Cloud)> {
 
 fn same(a: &State, b: &State) -> bool {
     let bits = |state: &State| -> Vec<(String, Vec<u64>)> {
-        state.reals.iter().map(|c| (c.name.to_string(), c.values.iter().map(|x| x.to_bits()).collect())).collect()
+        state.reals.iter().map(|c| (c.name.clone(), c.values.iter().map(|x| x.to_bits()).collect())).collect()
     };
     a.step == b.step && a.counts == b.counts && bits(a) == bits(b)
 }
