@@ -374,7 +374,7 @@ fn estimates_of_particles_are_within_five_per_cent() {
 fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
     // Particles of a circle with a level that is no distance, as somebody else's program might write them.
     let circle = |x: f64, y: f64| (x - 0.5).hypot(y - 0.5) - 0.25;
-    let mut cloud = Cloud { positions: Vec::new(), level: Some(Vec::new()) };
+    let mut cloud = Cloud { positions: Vec::new(), level: Some(Vec::new()), normals: None };
     for k in 0..1600 {
         let (x, y) = (f64::from(k % 40) * 0.025, f64::from(k / 40) * 0.025 + 0.001 * f64::from(k % 7));
         cloud.positions.push([x, y, 0.0]);
@@ -382,7 +382,8 @@ fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
         // Whoever has no level knows nothing of the surface.
         cloud.level.as_mut().unwrap().push(if level.abs() < 0.2 { level } else { f64::NAN });
     }
-    let queries = Cloud { positions: vec![[0.5, 0.5, 0.0], [0.9, 0.5, 0.0], [0.5, 0.3, 0.0]], level: None };
+    let positions = vec![[0.5, 0.5, 0.0], [0.9, 0.5, 0.0], [0.5, 0.3, 0.0]];
+    let queries = Cloud { positions, ..Cloud::default() };
     let clouds = Clouds::from([("/shape", cloud), ("/queries", queries)]);
     let points = json!({"type": "points", "file": "circle.vtkhdf"});
     let with = |scene_json: Value| {

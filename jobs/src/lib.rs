@@ -22,6 +22,7 @@ pub mod executor;
 pub mod forecast;
 pub mod formats;
 pub mod fsck;
+pub mod inputs;
 pub mod job;
 pub mod local_run;
 pub mod lock;

@@ -3,7 +3,8 @@
 use crate::artifacts;
 use crate::body::Wishes;
 use crate::checkpoint::{self, CheckpointError, Counters, Meta};
-use crate::formats::{cloud_file, picture, vtkhdf};
+use crate::formats::{picture, vtkhdf};
+use crate::inputs;
 use crate::job::Reason;
 use crate::observers::checkpoints::Checkpoints;
 use crate::observers::frames::Frames;
@@ -14,7 +15,7 @@ use crate::order::{Order, StartCheckpoint};
 use crate::process;
 use crate::records::{Record, RecordSink, Verdict};
 use crate::report;
-use meniscus::scene::{BuildContext, CloudReference, CloudSource, Clouds, Scene, understand};
+use meniscus::scene::{BuildContext, understand};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
 use meniscus::simulation::{CpuClock, RunError, Simulation, State, StepError, run};
@@ -102,24 +103,6 @@ fn storage_verdict(error: &(dyn std::error::Error + 'static), directory: &Path) 
     Verdict::Failed { reason: Reason::StorageIo, message: error.to_string() }
 }
 
-/// The points that a scene takes from files.
-fn read_clouds(scene: &dyn Scene, order: &Order) -> Result<Clouds, Failure> {
-    let read = |cloud: CloudReference| {
-        let (name, found) = match &cloud.source {
-            CloudSource::File(file) => (file, vtkhdf::read_cloud(Path::new(file)).map_err(|e| e.to_string())),
-            CloudSource::Upload(id) => {
-                let path = order.inputs.get(id).ok_or_else(|| "the upload is gone".to_owned());
-                let read = |path| std::fs::File::open(path).and_then(|mut file| cloud_file::read(&mut file));
-                (id, path.and_then(|path| read(path).map_err(|error| error.to_string())))
-            }
-        };
-        found
-            .map(|points| (cloud.pointer, points))
-            .map_err(|cause| Failure::Known(Reason::InputDamaged, format!("{} ({name}): {cause}", cloud.pointer)))
-    };
-    scene.clouds().into_iter().map(read).collect()
-}
-
 fn attempt(
     order: &Order,
     directory: &Path,
@@ -138,7 +121,8 @@ fn attempt(
     // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
     let mut progress = ProgressMeter::new(order.usage, order.time.clone());
     pool.install(|| {
-        let clouds = read_clouds(scene.as_ref(), order)?;
+        let clouds =
+            inputs::read(scene.as_ref(), order).map_err(|cause| Failure::Known(Reason::InputDamaged, cause))?;
         let context = BuildContext {
             clouds,
             plan: wishes.plan(),
@@ -367,7 +351,7 @@ fn draw_picture(
             }
         }
     }
-    let spacing = picture::spacing(&order.body["scene"]);
+    let spacing = picture::spacing(&order.body["scene"], &views);
     let path = directory.join("picture.svg");
     let drawn = picture::draw(&artifacts::unfinished(&path), &views, spacing)
         .and_then(|()| artifacts::finish(&path).map_err(|e| e.to_string()))

@@ -37,7 +37,12 @@ pub fn estimate<const D: usize>(points: &[Vector<D>], radius: f64) -> Result<Vec
 }
 
 /// The direction of least spread of the neighbours about their mean, weighted by (1 − r²/R²)².
-fn plane<const D: usize>(cells: &CellList<D>, i: usize, x: &Vector<D>, radius: f64) -> Result<Vector<D>, NoPlane> {
+pub(super) fn plane<const D: usize>(
+    cells: &CellList<D>,
+    i: usize,
+    x: &Vector<D>,
+    radius: f64,
+) -> Result<Vector<D>, NoPlane> {
     let (mut weight, mut count) = (0.0, 0);
     let mut mean = Vector::<D>::zeros();
     let mut spread = [[0.0; 3]; 3];

@@ -1,4 +1,5 @@
-//! Points that a scene takes from outside: a shape made of particles with their level, or places to ask about.
+//! Points that a scene takes from outside: a shape made of particles with their level, a surface with its normals, or
+//! places to ask about.
 //!
 //! The engine opens nothing. A scene says by pointer what it needs, whoever builds it hands over the arrays.
 
@@ -7,13 +8,15 @@ use crate::scene::Violation;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Points, with a level where they have one.
+/// Points, with a level or normals where they have some.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Cloud {
     /// x, y, z; z is 0 for points of the plane.
     pub positions: Vec<[f64; 3]>,
     /// φ, one number a point.
     pub level: Option<Vec<f64>>,
+    /// Normals of a surface, of any length, one a point.
+    pub normals: Option<Vec<[f64; 3]>>,
 }
 
 /// What stands at a pointer of a scene.
@@ -116,6 +119,26 @@ pub fn points_with_levels<const D: usize>(
     let known = points.into_iter().zip(level).filter(|(_, level)| !level.is_nan());
     let (points, level): (Vec<_>, Vec<_>) = known.map(|(x, level)| (x, *level)).unzip();
     if points.is_empty() { Err(refuse("no point has a phi that is a number".to_owned())) } else { Ok((points, level)) }
+}
+
+/// The normals of the points of a cloud, if it has some.
+///
+/// # Errors
+/// Another number of them than of points, or a z in the plane.
+pub fn normals<const D: usize>(clouds: &Clouds, pointer: &'static str) -> Result<Option<Vec<Vector<D>>>, Violation> {
+    let refuse = |detail: String| Violation::new(pointer, "data", detail, &Value::Null, json!("PointData/normal"));
+    let Some((cloud, normals)) = clouds.get(pointer).and_then(|cloud| Some((cloud, cloud.normals.as_ref()?))) else {
+        return Ok(None);
+    };
+    if normals.len() != cloud.positions.len() {
+        return Err(refuse(format!("{} normals for {} points", normals.len(), cloud.positions.len())));
+    }
+    if D == 2
+        && let Some(place) = normals.iter().position(|n| n[2] != 0.0)
+    {
+        return Err(refuse(format!("the normal of point {place} has z = {} in the plane", normals[place][2])));
+    }
+    Ok(Some(normals.iter().map(|n| Vector::<D>::from_fn(|d, _| n[d])).collect()))
 }
 
 /// A violation where the spacing of a scene is not that of its points: the median distance to the nearest other point

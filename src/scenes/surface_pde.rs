@@ -1,6 +1,7 @@
 //! `surface_pde`: operators and equations on surfaces (Surface DC-PSE paper).
 
 mod parameters;
+mod points;
 mod problems;
 mod rows;
 mod setup;

@@ -2,6 +2,7 @@
 
 use crate::service;
 use crate::support::{Service, eventually, program, steady_job};
+use meniscus::geometry::{Vector, fibonacci};
 use serde_json::{Value, json};
 use std::process::Command;
 use std::time::Duration;
@@ -203,4 +204,126 @@ fn checkpoints_on_demand_are_listed_and_kept_while_they_are_used() {
         });
     }
     service.wait_for(&id, &["succeeded"]);
+}
+
+/// A sphere as XYZ, six numbers a line with normals, three without.
+fn sphere_xyz(has_normals: bool) -> Vec<u8> {
+    let line = |n: Vector<3>| {
+        let [x, y, z] = (n * 2.0).into();
+        let normal = if has_normals { format!(" {} {} {}", n[0], n[1], n[2]) } else { String::new() };
+        format!("{x} {y} {z}{normal}\n")
+    };
+    fibonacci::sphere(1500).into_iter().map(line).collect::<String>().into_bytes()
+}
+
+/// The same as PLY, in 32 bits, with normals that are as long as the radius.
+fn sphere_ply() -> Vec<u8> {
+    let names = ["x", "y", "z", "nx", "ny", "nz"].map(|name| format!("property float {name}\n")).concat();
+    let mut bytes =
+        format!("ply\nformat binary_little_endian 1.0\nelement vertex 1500\n{names}end_header\n").into_bytes();
+    for x in fibonacci::sphere(1500) {
+        let x: [f64; 3] = (x * 2.0).into();
+        bytes.extend(x.iter().chain(&x).flat_map(|c| (*c as f32).to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn equations_are_solved_on_uploaded_surfaces_with_and_without_normals() {
+    let (directory, service) = service(&["--slots", "1"]);
+    let run = |scene: Value| {
+        let id = service.submit(&json!({"scene": scene}));
+        service.wait_for(&id, &["succeeded"]);
+        let frame = service.get(&format!("/v1/jobs/{id}/files/frames/000001.vtkhdf")).bytes;
+        (id, frame)
+    };
+    // H of a sphere of radius 2 is 1/2.
+    let column = |frame: &[u8], name: &str| -> Vec<f64> {
+        let path = directory.path().join("frame.vtkhdf");
+        std::fs::write(&path, frame).unwrap();
+        let file = hdf5::File::open(&path).unwrap();
+        file.dataset(&format!("VTKHDF/PointData/{name}")).unwrap().read_raw().unwrap()
+    };
+    let on = |surface: &Value, more: Value| {
+        let mut scene = json!({"kind": "surface_pde", "surface": {"type": "points", "upload": surface["id"]}});
+        scene.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        scene
+    };
+    let mut with_normals = Vec::new();
+    for (bytes, has_normals) in [(sphere_xyz(true), true), (sphere_xyz(false), false), (sphere_ply(), true)] {
+        let surface = upload(&service, "surface", &bytes);
+        assert_eq!((&surface["found"]["points"], &surface["found"]["normals"]), (&json!(1500), &json!(has_normals)));
+        let (id, frame) = run(on(&surface, json!({"problem": "curvature"})));
+        let mean = column(&frame, "mean_curvature");
+        assert!(mean.len() == 1500 && mean.iter().all(|h| (h - 0.5).abs() < 1e-2), "{mean:?}");
+        let report = service.get(&format!("/v1/jobs/{id}/report")).json();
+        assert_eq!(report["errors"], json!([]));
+        let said = report["method"]["points"].as_str().unwrap();
+        assert!(said.contains(if has_normals { "their own normals" } else { "estimated normals" }), "{said}");
+        with_normals = frame;
+    }
+    // A frame has points and normals: it is a surface again.
+    let surface = upload(&service, "surface", &with_normals);
+    assert_eq!(surface["found"]["fields"], json!(["normal"]), "{surface}");
+    let wave = json!({"type": "plane_wave", "k": [0.5, 0, 0]});
+    let (_, frame) = run(on(&surface, json!({"problem": {"type": "laplace_beltrami", "field": wave}})));
+    for (value, x) in column(&frame, "value").iter().zip(fibonacci::sphere(1500)) {
+        // −(k² − (k·n)²) sin k·x − 2/R (k·n) cos k·x with k = 1/2 along x and R = 2.
+        let exact = -0.25 * (1.0 - x[0] * x[0]) * x[0].sin() - 0.5 * x[0] * x[0].cos();
+        assert!((value - exact).abs() < 1e-2, "{value} for {exact}");
+    }
+    let job = on(&surface, json!({"problem": {"type": "poisson", "condition": "dirichlet"}}));
+    assert_eq!(service.post("/v1/jobs", &json!({"scene": job})).pointers(), ["/scene/problem/condition"]);
+    let estimate = service.post("/v1/estimates", &json!({"scene": on(&surface, json!({}))})).json();
+    assert_eq!(estimate["particles"], 1500, "{estimate}");
+    // Places have no normals and are no surface.
+    let places = upload(&service, "queries", &sphere_xyz(true));
+    assert_eq!(service.post("/v1/jobs", &json!({"scene": on(&places, json!({}))})).pointers(), ["/scene/surface"]);
+}
+
+#[test]
+fn what_is_wrong_with_an_uploaded_surface_is_an_event_or_ends_the_job_with_the_points_named() {
+    let (_directory, service) = service(&["--slots", "1"]);
+    let job = |bytes: &[u8]| {
+        let surface = upload(&service, "surface", bytes);
+        let surface = json!({"type": "points", "upload": surface["id"]});
+        service.submit(&json!({"scene": {"kind": "surface_pde", "surface": surface, "problem": "curvature"}}))
+    };
+    let whole = String::from_utf8(sphere_xyz(true)).unwrap();
+    let lines: Vec<&str> = whole.lines().collect();
+    let holed = job(lines[..1450].join("\n").as_bytes());
+    service.wait_for(&holed, &["succeeded"]);
+    let events = service.get(&format!("/v1/jobs/{holed}/events?limit=100")).json();
+    let findings: Vec<&Value> =
+        events["items"].as_array().unwrap().iter().filter(|event| event["type"] == "finding").collect();
+    assert_eq!(findings.len(), 1, "{events}");
+    assert!(findings[0].to_string().contains("more: neighbours on one side alone"), "{findings:?}");
+    let twins = job(format!("{whole}{}\n", lines[3]).as_bytes());
+    let failed = service.wait_for(&twins, &["failed"]);
+    assert_eq!(failed["reason"], "input.damaged");
+    assert!(failed.to_string().contains("points 3, 1500:"), "{failed}");
+}
+
+#[test]
+fn a_surface_is_run_from_a_local_mesh_too() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    std::fs::write(at("sphere.ply"), sphere_ply()).unwrap();
+    let run = |normals: Value, out: &str| {
+        let surface = json!({"type": "points", "file": at("sphere.ply")});
+        let scene = json!({"kind": "surface_pde", "surface": surface, "problem": "curvature", "normals": normals});
+        std::fs::write(at("scene.json"), scene.to_string()).unwrap();
+        Command::new(program()).arg("run").arg(at("scene.json")).arg("--out").arg(at(out)).output().unwrap()
+    };
+    let mut normals = Vec::new();
+    for (asked, out) in [(json!({"type": "given", "metric": "normals"}), "given"), (json!("estimated"), "estimated")] {
+        let done = run(asked, out);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let file = hdf5::File::open(at(out).join("frames/000001.vtkhdf")).unwrap();
+        normals.push(file.dataset("VTKHDF/PointData/normal").unwrap().read_raw::<f64>().unwrap());
+        let mean = file.dataset("VTKHDF/PointData/mean_curvature").unwrap().read_raw::<f64>().unwrap();
+        assert!(mean.iter().all(|h| (h - 0.5).abs() < 1e-2));
+    }
+    let off = |(given, estimated): (&f64, &f64)| (given - estimated).abs();
+    assert!(normals[0].iter().zip(&normals[1]).map(off).fold(0.0, f64::max) < 1e-2);
 }

@@ -44,13 +44,14 @@ pub(super) fn size_of(
     match &cloud.source {
         CloudSource::File(_) if local_files => Ok(None),
         CloudSource::File(file) => {
-            let detail = "a local file is valid for `meniscus run` alone; POST /v1/uploads?as=points takes files";
+            let detail = "a local file is valid for `meniscus run` alone; POST /v1/uploads takes files";
             Err(Violation::new(cloud.pointer, "not_here", detail, &json!(file), json!({"upload": "upl_…"})))
         }
         CloudSource::Upload(upload) => {
             // Points with a level are good as places to ask about, too; places have no level.
             let wanted: &[Purpose] = match cloud.pointer {
                 "/queries" => &[Purpose::Queries, Purpose::Points, Purpose::Surface],
+                "/surface" => &[Purpose::Surface],
                 _ => &[Purpose::Points],
             };
             let found = sources.uploaded_points(upload).filter(|(purpose, _)| wanted.contains(purpose));

@@ -19,7 +19,12 @@ impl Sources for OneCheckpoint {
     }
 
     fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
-        Some((if id == "upl_places" { Purpose::Queries } else { Purpose::Points }, 5000))
+        let purpose = match id {
+            "upl_places" => Purpose::Queries,
+            "upl_surface" => Purpose::Surface,
+            _ => Purpose::Points,
+        };
+        Some((purpose, 5000))
     }
 }
 
@@ -36,6 +41,14 @@ fn points_come_from_uploads_of_the_right_purpose() {
     assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/shape", "not_found"));
     let both = json!({"scene": {"kind": "redistance", "shape": {"type": "points", "upload": "a", "file": "b"}}});
     assert_eq!(parse(&both, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "conflict");
+    let surface = |id: &str| json!({"scene": {"kind": "surface_pde", "surface": {"type": "points", "upload": id}, "problem": "curvature"}});
+    let job = parse(&surface("upl_surface"), ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(
+        (job.uploads.as_slice(), job.forecast.estimate.particles),
+        (["upl_surface".to_owned()].as_slice(), 5000)
+    );
+    let found = parse(&surface("upl_points"), ALLOWANCE, &OneCheckpoint).err().unwrap();
+    assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/surface", "not_found"));
     let none = json!({"scene": {"kind": "vortex", "shape": "points"}});
     assert_eq!(parse(&none, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "required");
 }

@@ -27,11 +27,18 @@ pub fn draw(path: &Path, frames: &[FrameView], spacing: f64) -> Result<(), Strin
     root.present().map_err(|e| e.to_string())
 }
 
-/// How far points of a scene are apart in its pictures: h, or as far as so many points of a surface of unit size are.
+/// How far points of a scene are apart in its pictures: h, or as far as so many points of a surface of unit size are, of one
+/// from outside by the diagonal of its box.
 #[must_use]
-pub fn spacing(scene: &Value) -> f64 {
+pub fn spacing(scene: &Value, frames: &[FrameView]) -> f64 {
     let of_count = || scene["count"].as_f64().map(|count| 3.5 / count.sqrt());
-    scene["spacing"].as_f64().or_else(of_count).unwrap_or(0.05)
+    let of_frame = || {
+        let points = &frames.first()?.points;
+        let of_axis = |d: usize| points.iter().map(move |x| x[d]);
+        let side = |d: usize| of_axis(d).fold(f64::MIN, f64::max) - of_axis(d).fold(f64::MAX, f64::min);
+        Some((0..3).map(|d| side(d).powi(2)).sum::<f64>().sqrt() / (points.len() as f64).sqrt())
+    };
+    scene["spacing"].as_f64().or_else(of_count).or_else(of_frame).filter(|h| h.is_normal()).unwrap_or(0.05)
 }
 
 fn draw_panel(panel: &DrawingArea<SVGBackend, Shift>, frame: &FrameView, spacing: f64) -> Result<(), String> {

@@ -124,7 +124,8 @@ pub struct Structure {
     pub groups: BTreeSet<String>,
 }
 
-const SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
+/// What HDF5 files begin with.
+pub const SIGNATURE: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 const UNDEFINED: u64 = u64::MAX;
 /// Objects of a file at most.
 const MOST_OBJECTS: usize = 4096;

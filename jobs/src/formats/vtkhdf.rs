@@ -114,7 +114,20 @@ pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
         Ok(phi) => Some(phi.read_raw()?),
         Err(_) => None,
     };
-    Ok(Cloud { positions: positions.to_vec(), level })
+    Ok(Cloud { positions: positions.to_vec(), level, normals: None })
+}
+
+/// Reads `normal` of the points, if they have it, from a frame or any file that is laid out like one.
+///
+/// # Errors
+/// Whatever libhdf5 reports, and normals that are no triples.
+pub fn read_normals(path: &Path) -> Result<Option<Vec<[f64; 3]>>, CloudError> {
+    let Ok(normal) = File::open(path)?.dataset("VTKHDF/PointData/normal") else { return Ok(None) };
+    let numbers: Vec<f64> = normal.read_raw()?;
+    match numbers.as_chunks::<3>() {
+        (normals, []) => Ok(Some(normals.to_vec())),
+        _ => Err(CloudError::NoNormals { numbers: numbers.len() }),
+    }
 }
 
 /// Why a file holds no points.
@@ -126,6 +139,12 @@ pub enum CloudError {
     /// Coordinates.
     #[error("/VTKHDF/Points holds {numbers} numbers, which are no triples")]
     NotTriples {
+        /// How many.
+        numbers: usize,
+    },
+    /// Components.
+    #[error("/VTKHDF/PointData/normal holds {numbers} numbers, which are no triples")]
+    NoNormals {
         /// How many.
         numbers: usize,
     },

@@ -25,7 +25,7 @@ pub fn run(purpose: Purpose, path: &Path, out: &mut dyn Write) -> io::Result<()>
         Ok((findings, cloud)) => {
             writeln!(out, "{}", json!({"ready": findings}))?;
             if let Some(cloud) = cloud {
-                cloud_file::write(&mut out, &cloud.positions, cloud.level.as_deref())?;
+                cloud_file::write(&mut out, &cloud)?;
             }
         }
         Err(reason) => writeln!(out, "{}", json!({"rejected": reason}))?,
@@ -37,7 +37,7 @@ fn inspect(purpose: Purpose, path: &Path) -> Result<(Findings, Option<Cloud>), S
     let mut file = File::open(path).map_err(|error| error.to_string())?;
     let mut head = [0; 8];
     let length = file.read(&mut head).map_err(|error| error.to_string())?;
-    let is_hdf5 = head[..length] == *b"\x89HDF\r\n\x1a\n";
+    let is_hdf5 = head[..length] == *structure::SIGNATURE;
     match purpose {
         Purpose::Surface | Purpose::Queries if !is_hdf5 => of_mesh(purpose, path),
         Purpose::Checkpoint => of_checkpoint(&file, path).map(|findings| (findings, None)),
@@ -54,7 +54,9 @@ fn of_mesh(purpose: Purpose, path: &Path) -> Result<(Findings, Option<Cloud>), S
     let mesh = mesh::read(&bytes)?;
     let is_closed = if mesh.faces.is_empty() { Value::Null } else { json!(mesh.is_closed()) };
     let extra = json!({"normals": !mesh.normals.is_empty(), "faces": mesh.faces.len(), "is_closed": is_closed});
-    let cloud = Cloud { positions: mesh.points, level: None };
+    // Places have no normals.
+    let normals = (purpose == Purpose::Surface && !mesh.normals.is_empty()).then_some(mesh.normals);
+    let cloud = Cloud { positions: mesh.points, level: None, normals };
     let mut findings = about(&cloud);
     if let (Value::Object(findings), Value::Object(extra)) = (&mut findings, extra) {
         findings.extend(extra.into_iter().filter(|_| purpose == Purpose::Surface));
@@ -67,9 +69,11 @@ fn about(cloud: &Cloud) -> Findings {
     let bound = |pick: fn(f64, f64) -> f64, start: f64| -> [f64; 3] {
         std::array::from_fn(|d| cloud.positions.iter().map(|x| x[d]).fold(start, pick))
     };
+    let phi = cloud.level.as_ref().map(|_| "phi");
+    let normal = cloud.normals.as_ref().map(|_| "normal");
     json!({
         "points": cloud.positions.len(),
-        "fields": if cloud.level.is_some() { json!(["phi"]) } else { json!([]) },
+        "fields": phi.into_iter().chain(normal).collect::<Vec<_>>(),
         "low": bound(f64::min, f64::INFINITY),
         "high": bound(f64::max, f64::NEG_INFINITY),
     })
@@ -94,20 +98,36 @@ fn of_points(purpose: Purpose, file: &File, path: &Path) -> Result<(Findings, Cl
         }
         _ => {}
     }
+    let normal = structure.data_sets.get("/VTKHDF/PointData/normal").filter(|_| purpose == Purpose::Surface);
+    if let Some(normal) = normal.filter(|normal| !normal.is_float || normal.extent != [count, 3]) {
+        let found = &normal.extent;
+        return Err(format!("/VTKHDF/PointData/normal must be [{count}, 3] floating-point numbers, not {found:?}"));
+    }
+    let has_normals = normal.is_some();
     jail::shut_the_door(file).map_err(|error| error.to_string())?;
     let mut cloud = vtkhdf::read_cloud(path).map_err(|error| error.to_string())?;
+    if has_normals {
+        cloud.normals = vtkhdf::read_normals(path).map_err(|error| error.to_string())?;
+    }
     if let Some(k) = cloud.positions.iter().position(|x| x.iter().any(|c| !c.is_finite())) {
         return Err(format!("the position of point {k} is not finite"));
     }
     // Places are asked about: what they may have beside does not matter.
     cloud.level = cloud.level.filter(|_| purpose == Purpose::Points);
+    if let Some(k) = cloud.normals.iter().flatten().position(|n| n.iter().any(|c| !c.is_finite())) {
+        return Err(format!("the normal of point {k} is not finite"));
+    }
     if let Some(k) = cloud.level.iter().flatten().position(|level| level.is_infinite()) {
         return Err(format!("phi of point {k} is infinite"));
     }
     if cloud.level.as_ref().is_some_and(|level| level.iter().all(|level| level.is_nan())) {
         return Err("no point has a phi that is a number".to_owned());
     }
-    Ok((about(&cloud), cloud))
+    let mut findings = about(&cloud);
+    if purpose == Purpose::Surface {
+        findings["normals"] = json!(has_normals);
+    }
+    Ok((findings, cloud))
 }
 
 fn of_checkpoint(file: &File, path: &Path) -> Result<Findings, String> {

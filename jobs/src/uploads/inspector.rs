@@ -2,6 +2,7 @@
 
 use super::Findings;
 use crate::artifacts;
+use crate::formats::cloud_file;
 use crate::store::uploads::{CLOUD, CONTENT};
 use crate::store::{Store, UploadRow};
 use serde_json::Value;
@@ -127,8 +128,7 @@ fn take(output: impl Read, target: &Path) -> io::Result<Result<Findings, String>
     }
     if !output.fill_buf()?.is_empty() {
         let mut file = File::create(artifacts::unfinished(target))?;
-        let most = 24 + super::MOST_POINTS * 32;
-        let written = io::copy(&mut output.take(most), &mut file)
+        let written = io::copy(&mut output.take(cloud_file::MOST_BYTES), &mut file)
             .and_then(|_| file.flush())
             .and_then(|()| artifacts::finish(target));
         if let Err(error) = written {

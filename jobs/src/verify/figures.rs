@@ -94,7 +94,7 @@ impl Bench {
         for file in chosen.iter().filter_map(|k| files.get(*k)) {
             views.extend(vtkhdf::read_frame(file).map_err(|error| error.to_string())?);
         }
-        picture::draw(path, &views, picture::spacing(scene))
+        picture::draw(path, &views, picture::spacing(scene, &views))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::scene::schema::{NOT_NEGATIVE, POSITIVE};
 use crate::scene::{DefaultValue, Kind, Parameter, Variant};
+use crate::scenes::shapes;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
@@ -17,15 +18,15 @@ pub(super) static PARAMETERS: &[Parameter] = &[
     ),
     Parameter::new(
         "dimension",
-        "that of the surface: 2 for circles, else 3",
+        "that of the surface: 2 for circles, of points when it is given, else 3",
         Kind::Integer { least: 2, most: 3 },
         DefaultValue::Absent,
     ),
     Parameter::new(
         "count",
-        "number of points; of a bump about",
+        "number of points; of a bump about; 4000 when not given",
         Kind::Integer { least: 20, most: 100_000_000 },
-        DefaultValue::Json("4000"),
+        DefaultValue::Absent,
     ),
     Parameter::new(
         "sampling",
@@ -42,9 +43,9 @@ pub(super) static PARAMETERS: &[Parameter] = &[
     Parameter::new("method", "the method", Kind::Choice(|| METHODS), DefaultValue::Json("\"surface_dcpse\"")),
     Parameter::new(
         "normals",
-        "the normals that operators are made with",
+        "the normals that operators are made with; `given` for points, else `exact`, when not given",
         Kind::Choice(|| NORMALS),
-        DefaultValue::Json("\"exact\""),
+        DefaultValue::Absent,
     ),
     Parameter::new(
         "solver",
@@ -92,6 +93,11 @@ static SURFACES: &[Variant] = &[
         doc: "the square [−2, 2]² with a bump α ζ(|x − p|/r) of r = 0.25 at p = (−0.5, 0), edges without flux",
         parameters: &[Parameter::new("height", "α", NOT_NEGATIVE, DefaultValue::Json("1"))],
     },
+    Variant {
+        name: "points",
+        doc: "points of a file (HDF5, PLY, OBJ, XYZ), with normals where it has some; nothing is known of it exactly",
+        parameters: shapes::POINTS.parameters,
+    },
 ];
 
 const RADIUS: &[Parameter] = &[Parameter::new("radius", "R", POSITIVE, DefaultValue::Json("1"))];
@@ -120,7 +126,7 @@ static PROBLEMS: &[Variant] = &[
     Variant { name: "laplace_beltrami", doc: "Δₛ of a field: `value` against `reference`", parameters: &[FIELD] },
     Variant {
         name: "poisson",
-        doc: "Δₛ u = Δₛ of a field: `value` is u, `reference` the field",
+        doc: "Δₛ u = Δₛ of a field: `value` is u, `reference` the field; on points Δₛ u = the field less its mean",
         parameters: &[
             FIELD,
             Parameter::new(
@@ -302,6 +308,16 @@ static METHODS: &[Variant] = &[
 
 static NORMALS: &[Variant] = &[
     Variant { name: "exact", doc: "those of the surface", parameters: &[] },
+    Variant {
+        name: "given",
+        doc: "those that came with points, estimated where none did",
+        parameters: &[Parameter::new(
+            "metric",
+            "`heights` are fitted, or normals are taken as exact (then they must have come)",
+            Kind::Word(&["heights", "normals"]),
+            DefaultValue::Json("\"heights\""),
+        )],
+    },
     Variant { name: "estimated", doc: "from the points alone, the metric by fitted heights", parameters: &[] },
     Variant {
         name: "perturbed",
@@ -351,11 +367,11 @@ pub(super) fn preset(_name: &str, _given: &Map<String, Value>) -> Map<String, Va
 pub(super) struct Written {
     pub surface: Value,
     pub dimension: Option<u64>,
-    pub count: u64,
+    pub count: Option<u64>,
     pub sampling: Option<String>,
     pub problem: Value,
     pub method: Value,
-    pub normals: Value,
+    pub normals: Option<Value>,
     pub solver: Value,
     pub seed: u64,
     pub repeat: u64,

@@ -89,13 +89,15 @@ fn field(
             ExactField::TruncatedGaussian { center, sigma: chosen["sigma"].as_f64().unwrap_or(0.2) }
         }
         _ => {
+            // Before points are read their size is not known, and so neither what a wave is by it.
+            let is_sized = !matches!(shape, Shape::Points(extent) if !extent.is_known);
             if chosen["k"].is_null() {
-                let is_flat = matches!(shape, Shape::Circle { .. });
-                let wave: Vec<f64> =
-                    DEFAULT_WAVE.iter().take(if is_flat { 2 } else { 3 }).map(|k| k / shape.reach()).collect();
-                chosen["k"] = json!(wave);
+                let wave = DEFAULT_WAVE.iter().take(shape.dimension()).map(|k| k / shape.reach());
+                chosen["k"] = is_sized.then(|| wave.collect::<Vec<f64>>()).into();
             }
-            let k = if let Shape::Circle { .. } = shape {
+            let k = if chosen["k"].is_null() {
+                Vector::<3>::from(DEFAULT_WAVE)
+            } else if shape.is_curve() {
                 if chosen["k"].as_array().map_or(0, Vec::len) != 2 {
                     let (place, detail) = (format!("{pointer}/k"), "a vector in the plane has two numbers");
                     violations.push(Violation::new(place, "range", detail, &chosen["k"], json!(2)));
@@ -105,7 +107,7 @@ fn field(
                 in_space(&chosen["k"], &format!("{pointer}/k"), violations)
             };
             let size = k.norm() * shape.reach();
-            if !size.is_nan() && !(1e-6..1e6).contains(&size) {
+            if is_sized && !size.is_nan() && !(1e-6..1e6).contains(&size) {
                 let detail = "by the size of the surface a wave must have a length that numbers can tell";
                 violations.push(Violation::new(format!("{pointer}/k"), "range", detail, &chosen["k"], Value::Null));
             }
@@ -144,11 +146,13 @@ pub(super) fn understand(
                 let got = &problem["type"];
                 violations.push(Violation::new("/problem", "conflict", detail, got, json!(["diffusion"])));
             }
-            ProblemChoice::Poisson {
-                field,
-                is_dirichlet: problem["condition"] == "dirichlet",
-                solver: solver(&written.solver),
+            let is_dirichlet = problem["condition"] == "dirichlet";
+            if let (Shape::Points(_), true) = (shape, is_dirichlet) {
+                let detail = "points hold the exact solution, which is not known on points from outside";
+                let (got, allowed) = (&problem["condition"], json!(["zero_mean"]));
+                violations.push(Violation::new("/problem/condition", "conflict", detail, got, allowed));
             }
+            ProblemChoice::Poisson { field, is_dirichlet, solver: solver(&written.solver) }
         }
         Some("diffusion") => {
             let name = "initial";
@@ -168,6 +172,11 @@ pub(super) fn understand(
         Some("reaction_diffusion") => {
             let manufactured =
                 if problem["manufactured"].is_null() { None } else { Some(field_of("manufactured", violations)?) };
+            if let (Shape::Points(_), Some(_)) = (shape, manufactured) {
+                let detail = "forcing takes the exact operator, which is not known on points from outside";
+                let got = &problem["manufactured"];
+                violations.push(Violation::new("/problem/manufactured", "conflict", detail, got, Value::Null));
+            }
             let number = |of: &Value, name: &str| of[name].as_f64().unwrap_or(1.0);
             let model = &problem["model"];
             let model = match model["type"].as_str() {
@@ -201,15 +210,19 @@ fn raised<const D: usize>(x: &Vector<D>) -> Vector<3> {
     Vector::<3>::from_fn(|d, _| if d < D { x[d] } else { 0.0 })
 }
 
-/// A field and Δ_S of it at the points of a cloud, by the exact normals of the shape.
-fn known<const D: usize>(field: &ExactField, shape: &Shape, cloud: &SurfaceCloud<D>) -> (Vec<f64>, Vec<f64>) {
-    (0..cloud.rows)
-        .map(|i| {
-            let x = raised(&cloud.points[i]);
-            let n = shape.normal(&x);
-            (field.value(&x), field.laplace_beltrami(&x, &n, cloud.curvatures[i]))
-        })
-        .unzip()
+/// A field at the points of a cloud.
+fn values<const D: usize>(field: &ExactField, cloud: &SurfaceCloud<D>) -> Vec<f64> {
+    cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect()
+}
+
+/// Δ_S of it, by the exact normals and curvatures of a shape that has them.
+fn operated<const D: usize>(field: &ExactField, shape: &Shape, cloud: &SurfaceCloud<D>) -> Option<Vec<f64>> {
+    let at = |(x, curvature): (&Vector<D>, &f64)| {
+        let x = raised(x);
+        Some(field.laplace_beltrami(&x, &shape.normal(&x)?, *curvature))
+    };
+    let is_known = cloud.curvatures.len() == cloud.rows;
+    is_known.then(|| cloud.points.iter().zip(&cloud.curvatures).map(at).collect()).flatten()
 }
 
 impl ProblemChoice {
@@ -234,8 +247,11 @@ impl ProblemChoice {
         }
     }
 
-    pub fn field_names(&self) -> Vec<&'static str> {
+    pub fn field_names(&self, shape: &Shape) -> Vec<&'static str> {
         match self {
+            Self::LaplaceBeltrami { .. } | Self::Poisson { .. } if matches!(shape, Shape::Points(_)) => {
+                vec!["value", "field"]
+            }
             Self::LaplaceBeltrami { .. } | Self::Poisson { .. } => vec!["value", "field", "reference"],
             Self::Curvature { .. } => vec!["mean_curvature", "gauss_curvature"],
             Self::Evolution { start: Start::Field(field), .. } => match field {
@@ -296,8 +312,7 @@ impl ProblemChoice {
     /// The field that is operated on, its values and its exact operator.
     pub fn known(&self, shape: &Shape, cloud: &SurfaceCloud<3>) -> Option<(ExactField, Vec<f64>, Vec<f64>)> {
         let Self::LaplaceBeltrami { field } = self else { return None };
-        let (values, operated) = known(field, shape, cloud);
-        Some((*field, values, operated))
+        Some((*field, values(field, cloud), operated(field, shape, cloud)?))
     }
 
     pub fn build<const D: usize>(
@@ -309,18 +324,21 @@ impl ProblemChoice {
     ) -> Box<dyn Problem<D>> {
         match self {
             Self::LaplaceBeltrami { field } => {
-                let (values, operated) = known(field, shape, cloud);
-                Box::new(Pointwise::new(values, operated))
+                Box::new(Pointwise::new(values(field, cloud), operated(field, shape, cloud)))
             }
             Self::Curvature { of_heights } => Box::new(Curvature::new(cloud.rows, *of_heights)),
             Self::Poisson { field, is_dirichlet, solver } => {
-                let (values, operated) = known(field, shape, cloud);
+                let values = values(field, cloud);
                 let condition = if *is_dirichlet {
-                    Condition::Dirichlet(held(shape, cloud))
+                    Condition::Dirichlet(held(shape, cloud).into_iter().map(|i| (i, values[i])).collect())
                 } else {
                     Condition::ZeroMean { alpha: shape.least_eigenvalue() }
                 };
-                Box::new(Poisson::new(operated, values, condition, *solver))
+                let (right, exact) = match operated(field, shape, cloud) {
+                    Some(operated) => (operated, Some(values)),
+                    None => (values, None),
+                };
+                Box::new(Poisson::new(right, exact, condition, *solver))
             }
             Self::Evolution { start, integrator, .. } => {
                 let (initial, reaction, exact) = begin(start, shape, cloud, seed);
@@ -351,12 +369,12 @@ fn begin<const D: usize>(
 ) -> (Vec<f64>, Option<Reaction>, ExactCourse) {
     match start {
         Start::Field(field) => {
-            let (values, _) = known(field, shape, cloud);
             let exact = field.decay(shape.reach()).map_or(ExactCourse::Unknown, ExactCourse::Decay);
-            (values, None, exact)
+            (values(field, cloud), None, exact)
         }
         Start::Reaction { model, diffusivity, noise, manufactured } => {
-            let known = manufactured.as_ref().map(|field| known(field, shape, cloud));
+            let known = |field: &ExactField| Some((values(field, cloud), operated(field, shape, cloud)?));
+            let known = manufactured.as_ref().and_then(known);
             let is_exact = known.is_some();
             let reaction = Reaction { model: *model, diffusivity: *diffusivity, manufactured: known };
             let random = CounterRandom::new(seed ^ 0x7265_6163);
@@ -364,9 +382,9 @@ fn begin<const D: usize>(
             let at = |i: usize| match (&reaction.manufactured, model) {
                 (Some((field, _)), _) => reaction.exact(field[i], 0.0),
                 (None, Model::GrayScott { .. }) => {
-                    // A cap about the z axis (in the plane the x axis) where the second substance is sown.
+                    // A cap where the second substance is sown.
                     let axis = if D == 3 { 2 } else { 0 };
-                    let is_sown = cloud.points[i][axis] > 0.8 * shape.top();
+                    let is_sown = cloud.points[i][axis] > shape.cap();
                     let [u, v] = if is_sown { [0.5, 0.25] } else { rest };
                     let off = noise * random.symmetric(&[i as i64]);
                     [u, v * (1.0 + off)]

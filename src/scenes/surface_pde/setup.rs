@@ -1,15 +1,16 @@
-//! From parameters to points, a method and a problem.
+//! From parameters to points, a method and a problem. Points from outside are unknown until a run is built ([`points`]).
 
 use super::parameters::Written;
+use super::points;
 use super::problems::{self, ProblemChoice};
-use super::surfaces::{self, Sampling, Shape};
+use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
 use crate::operators::Support;
 use crate::operators::charts::tangent::Metric;
 use crate::point_clouds::{Bump, normals};
-use crate::scene::cloud::CloudSizes;
+use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::work_estimate;
@@ -21,29 +22,36 @@ use serde_json::{Value, json};
 
 /// Where normals come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Normals {
+pub(super) enum Normals {
     Exact,
     Estimated,
-    Perturbed { sigma: f64 },
+    Perturbed {
+        sigma: f64,
+    },
+    /// With points from outside; estimated where they have none and nothing depends on it.
+    Given {
+        must_be_there: bool,
+    },
 }
 
 /// The method of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Scheme {
+pub(super) enum Scheme {
     Dcpse(Method),
     Embedding { order: usize, spacing: f64 },
 }
 
-struct SurfaceScene {
-    resolved: Value,
+pub(super) struct SurfaceScene {
+    pub written: Written,
+    pub resolved: Value,
     shape: Shape,
     count: u64,
     sampling: Sampling,
-    seed: u64,
-    normals: Normals,
+    pub normals: Normals,
     scheme: Scheme,
     problem: ProblemChoice,
-    fixed: FixedStep,
+    pub fixed: FixedStep,
+    points: Option<CloudReference>,
 }
 
 /// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbours as there are functions, about; larger
@@ -72,54 +80,22 @@ pub(super) fn understand(parameters: &Value) -> Understood {
         .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
     let mut violations = Vec::new();
     let mut resolved = parameters.clone();
-    let shape = shape(&written.surface, &mut violations);
-    let dimension = if let Shape::Circle { .. } = shape { 2 } else { 3 };
+    let points = cloud::named(&written.surface, "/surface", &mut violations);
+    let shape = shape(&written, &mut violations);
+    let dimension = shape.dimension() as u64;
     if let Some(given) = written.dimension.filter(|given| *given != dimension) {
         let detail = format!("this surface lies in {dimension} dimensions");
         violations.push(Violation::new("/dimension", "conflict", detail, &json!(given), json!(dimension)));
     }
     resolved["dimension"] = json!(dimension);
-    let default_sampling = if let Shape::Circle { .. } | Shape::Bump(_) = shape { "regular" } else { "fibonacci" };
-    let name = written.sampling.as_deref().unwrap_or(default_sampling);
-    let sampling = match name {
-        "regular" => Sampling::Regular,
-        "random" => Sampling::Random { is_relaxed: true },
-        "random_raw" => Sampling::Random { is_relaxed: false },
-        _ => Sampling::Fibonacci,
-    };
-    let has_lattice = matches!(shape, Shape::Circle { .. } | Shape::Bump(_));
-    let allowed: &[&str] = match shape {
-        Shape::Circle { .. } => &["regular", "random", "random_raw"],
-        Shape::Bump(_) => &["regular"],
-        _ => &["fibonacci", "random", "random_raw"],
-    };
-    if !allowed.contains(&name) {
-        let detail = if has_lattice { "not on this surface" } else { "this surface has no lattice" };
-        violations.push(Violation::new("/sampling", "conflict", detail, &json!(name), json!(allowed)));
-    }
-    resolved["sampling"] = json!(name);
-    let normals = match written.normals["type"].as_str() {
-        Some("estimated") => Normals::Estimated,
-        Some("perturbed") => Normals::Perturbed { sigma: written.normals["sigma"].as_f64().unwrap_or(0.01) },
-        _ => Normals::Exact,
-    };
-    let metric = match normals {
-        Normals::Exact => Metric::OfNormals,
-        Normals::Perturbed { .. } if written.normals["metric"] == "normals" => Metric::OfNormals,
-        _ => Metric::OfHeights,
-    };
-    let scheme = scheme(&written, &shape, metric, &mut resolved, &mut violations);
-    let problem = problems::understand(&written, &shape, metric, &mut resolved, &mut violations);
+    let count = written.count.unwrap_or(DEFAULT_COUNT);
+    let sampling = surfaces::sampling(&written, &shape, &mut resolved, &mut violations);
+    let normals = normals(&written, &shape, &mut resolved, &mut violations);
+    let (scheme, problem) = choices(&written, &shape, count, &mut resolved, &mut violations);
     if let (Some(Scheme::Embedding { .. }), Some(problem)) = (&scheme, &problem) {
         if shape.in_space().is_none() {
-            let detail = "the embedding method is for spheres, ellipsoids and tori";
-            violations.push(Violation::new(
-                "/method",
-                "conflict",
-                detail,
-                &json!("closest_point"),
-                json!(["surface_dcpse"]),
-            ));
+            let (detail, got) = ("the embedding method is for spheres, ellipsoids and tori", json!("closest_point"));
+            violations.push(Violation::new("/method", "conflict", detail, &got, json!(["surface_dcpse"])));
         }
         if !matches!(problem, ProblemChoice::LaplaceBeltrami { .. }) {
             let detail = "the embedding method is there for the operator applied to a field";
@@ -143,11 +119,57 @@ pub(super) fn understand(parameters: &Value) -> Understood {
     if let ProblemChoice::Evolution { .. } = problem {
         resolved["problem"]["time_step"] = json!(fixed.time_step);
     }
-    let (count, seed) = (written.count, written.seed);
-    Ok(Box::new(SurfaceScene { resolved, shape, count, sampling, seed, normals, scheme, problem, fixed }))
+    Ok(Box::new(SurfaceScene { written, resolved, shape, count, sampling, normals, scheme, problem, fixed, points }))
 }
 
-fn shape(surface: &Value, violations: &mut Vec<Violation>) -> Shape {
+/// Method and problem for a shape and a number of points; again for points from outside, once they are read.
+pub(super) fn choices(
+    written: &Written,
+    shape: &Shape,
+    count: u64,
+    resolved: &mut Value,
+    violations: &mut Vec<Violation>,
+) -> (Option<Scheme>, Option<ProblemChoice>) {
+    let normals = &resolved["normals"];
+    let metric = match normals["type"].as_str() {
+        Some("exact") => Metric::OfNormals,
+        Some("perturbed" | "given") if normals["metric"] == "normals" => Metric::OfNormals,
+        _ => Metric::OfHeights,
+    };
+    let scheme = scheme(written, shape, count, metric, resolved, violations);
+    (scheme, problems::understand(written, shape, metric, resolved, violations))
+}
+
+/// Where normals come from: nobody knows those of points from outside exactly, and those of other surfaces are not given.
+fn normals(written: &Written, shape: &Shape, resolved: &mut Value, violations: &mut Vec<Violation>) -> Normals {
+    let (default, allowed, detail) = match shape {
+        Shape::Points(_) => (
+            json!({"type": "given", "metric": "heights"}),
+            ["given", "estimated"].as_slice(),
+            "the exact normals of points from outside are not known; `given` takes theirs",
+        ),
+        _ => {
+            let detail = "the normals of this surface are known, nobody gives them";
+            (json!({"type": "exact"}), ["exact", "estimated", "perturbed"].as_slice(), detail)
+        }
+    };
+    let chosen = written.normals.clone().unwrap_or(default);
+    let name = chosen["type"].as_str().unwrap_or_default();
+    if !allowed.contains(&name) {
+        violations.push(Violation::new("/normals", "conflict", detail, &json!(name), json!(allowed)));
+    }
+    let normals = match name {
+        "estimated" => Normals::Estimated,
+        "perturbed" => Normals::Perturbed { sigma: chosen["sigma"].as_f64().unwrap_or(0.01) },
+        "given" => Normals::Given { must_be_there: chosen["metric"] == "normals" },
+        _ => Normals::Exact,
+    };
+    resolved["normals"] = chosen;
+    normals
+}
+
+fn shape(written: &Written, violations: &mut Vec<Violation>) -> Shape {
+    let surface = &written.surface;
     let number = |name: &str| surface[name].as_f64().unwrap_or(1.0);
     let center = Vector::<3>::zeros();
     match surface["type"].as_str() {
@@ -167,6 +189,7 @@ fn shape(surface: &Value, violations: &mut Vec<Violation>) -> Shape {
             Shape::Torus(Torus { center, major_radius, minor_radius })
         }
         Some("bump") => Shape::Bump(Bump { height: number("height") }),
+        Some("points") => Shape::Points(Extent::unknown(written.dimension.map_or(3, |dimension| dimension as usize))),
         _ => Shape::Ellipsoid(Ellipsoid { center, semi_axes: Vector::<3>::repeat(number("radius")) }),
     }
 }
@@ -174,13 +197,14 @@ fn shape(surface: &Value, violations: &mut Vec<Violation>) -> Shape {
 fn scheme(
     written: &Written,
     shape: &Shape,
+    count: u64,
     metric: Metric,
     resolved: &mut Value,
     violations: &mut Vec<Violation>,
 ) -> Option<Scheme> {
     let method = &written.method;
     let order = method["order"].as_u64().unwrap_or(2);
-    let spacing = shape.spacing(written.count);
+    let spacing = shape.spacing(count);
     let wrong_order = |allowed: Value| {
         Violation::new("/method/order", "range", "there is no method of this order", &json!(order), allowed)
     };
@@ -188,16 +212,15 @@ fn scheme(
         if order != 2 && order != 4 {
             violations.push(wrong_order(json!([2, 4])));
         }
-        if !matches!(written.normals["type"].as_str(), Some("exact")) {
+        if let Some(given) = written.normals.as_ref().filter(|normals| normals["type"] != "exact") {
             let detail = "the embedding method has exact closest points and asks for no normals";
-            let got = &written.normals["type"];
-            violations.push(Violation::new("/normals", "conflict", detail, got, json!(["exact"])));
+            violations.push(Violation::new("/normals", "conflict", detail, &given["type"], json!(["exact"])));
         }
         let grid = method["spacing"].as_f64().unwrap_or(spacing);
         resolved["method"]["spacing"] = json!(grid);
         return Some(Scheme::Embedding { order: order as usize, spacing: grid });
     }
-    let is_curve = matches!(shape, Shape::Circle { .. });
+    let is_curve = shape.is_curve();
     let is_copies = method["form"] == "copies";
     let Some((degree, default_cutoff)) = support(order, is_curve, is_copies) else {
         violations.push(wrong_order(json!([2, 4, 6])));
@@ -206,13 +229,13 @@ fn scheme(
     let cutoff_dn = method["cutoff_dn"].as_f64().unwrap_or(default_cutoff);
     resolved["method"]["cutoff_dn"] = json!(cutoff_dn);
     if is_copies {
-        let n = written.count as f64;
+        let n = count as f64;
         let apart = if is_curve { 3.0 / (n - 1.0) } else { spacing };
         let apart = method["normal_spacing"].as_f64().unwrap_or(apart);
         let layers = method["layers"].as_u64().unwrap_or(if is_curve { 4 } else { 2 }) as u32;
         resolved["method"]["normal_spacing"] = json!(apart);
         resolved["method"]["layers"] = json!(layers);
-        if metric == Metric::OfHeights || matches!(shape, Shape::Bump(_)) {
+        if metric == Metric::OfHeights || matches!(shape, Shape::Bump(_) | Shape::Points(_)) {
             let detail = "copies along normals want exact normals and a closed surface";
             violations.push(Violation::new("/method/form", "conflict", detail, &json!("copies"), json!(["intrinsic"])));
         }
@@ -228,10 +251,10 @@ fn scheme(
     let terms = if is_curve { degree as f64 } else { ((degree + 1) * (degree + 2) / 2 - 1) as f64 };
     // Only points whose normals differ by less than 60° count: a quarter of a sphere, less where it is flat.
     let least_count = (8.0 * terms).ceil();
-    if (written.count as f64) < least_count {
+    if (count as f64) < least_count {
         let detail = format!("a fit of {terms} functions wants {least_count} points at least on a closed surface");
-        let allowed = json!({"least": least_count});
-        violations.push(Violation::new("/count", "range", detail, &json!(written.count), allowed));
+        let place = if let Shape::Points(_) = shape { "/surface" } else { "/count" };
+        violations.push(Violation::new(place, "range", detail, &json!(count), json!({"least": least_count})));
     }
     let least_cutoff = if is_curve { 0.6 * terms } else { (1.2 * terms / std::f64::consts::PI).sqrt() };
     if cutoff_dn < least_cutoff {
@@ -249,7 +272,7 @@ impl SurfaceScene {
     /// Entries of a row, about.
     fn entries(&self, method: &Method) -> f64 {
         let cutoff = method.support.radius / self.shape.spacing(self.count);
-        let is_curve = matches!(self.shape, Shape::Circle { .. });
+        let is_curve = self.shape.is_curve();
         1.0 + if is_curve { 2.0 * cutoff } else { std::f64::consts::PI * cutoff * cutoff }
     }
 
@@ -263,15 +286,15 @@ impl SurfaceScene {
     }
 
     /// Steps of a controlled integrator to one of the scene, when stability binds them: 2 δn² by the diffusivity.
-    fn inner_steps(&self) -> f64 {
-        let spacing = self.shape.spacing(self.count);
+    fn inner_steps(&self, count: u64) -> f64 {
+        let spacing = self.shape.spacing(count);
         (self.fixed.time_step * self.problem.diffusivity() / (2.0 * spacing * spacing)).max(1.0)
     }
 
     /// Functions of a fit.
     fn terms(&self, method: &Method) -> f64 {
         let n = method.support.degree as f64;
-        let is_curve = matches!(self.shape, Shape::Circle { .. });
+        let is_curve = self.shape.is_curve();
         let coordinates = if is_curve { 1 } else { 2 } + usize::from(matches!(method.form, Form::Copies { .. }));
         match coordinates {
             1 => n,
@@ -287,9 +310,9 @@ impl SurfaceScene {
         radius: f64,
     ) -> Result<SurfaceCloud<D>, Vec<Violation>> {
         match self.normals {
-            Normals::Exact => {}
+            Normals::Exact | Normals::Given { .. } => {}
             Normals::Perturbed { sigma } => {
-                let random = CounterRandom::new(self.seed ^ 0x6e6f_726d);
+                let random = CounterRandom::new(self.written.seed ^ 0x6e6f_726d);
                 for (i, normal) in cloud.normals[..cloud.rows].iter_mut().enumerate() {
                     let off = Vector::<D>::from_fn(|d, _| sigma * random.symmetric(&[i as i64, d as i64]));
                     *normal = (*normal + off).normalize();
@@ -315,17 +338,25 @@ impl Scene for SurfaceScene {
     }
 
     fn field_names(&self) -> Vec<&'static str> {
-        let mut names = self.problem.field_names();
-        names.extend(["normal", "curvature", "particle_id"]);
+        let mut names = self.problem.field_names(&self.shape);
+        names.extend(["normal", "particle_id"]);
+        if self.points.is_none() {
+            names.push("curvature");
+        }
         names
     }
 
-    fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
+    fn clouds(&self) -> Vec<CloudReference> {
+        self.points.iter().cloned().collect()
+    }
+
+    fn estimate(&self, sizes: &CloudSizes) -> Estimate {
+        let count = sizes.get("/surface").copied().unwrap_or(self.count);
         // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
         let a_point = match &self.scheme {
             Scheme::Dcpse(method) => {
                 let entries = self.entries(method);
-                250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, self.count as f64)
+                250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, count as f64)
             }
             Scheme::Embedding { order, spacing } => {
                 let nodes =
@@ -334,16 +365,16 @@ impl Scene for SurfaceScene {
             }
         };
         Estimate {
-            particles: self.count,
+            particles: count,
             steps: self.fixed.steps,
             time_step: self.fixed.time_step,
             end_time: self.fixed.clock(self.fixed.steps).time,
-            memory_bytes: (a_point * self.count as f64) as u64,
+            memory_bytes: (a_point * count as f64) as u64,
         }
     }
 
     fn family(&self) -> String {
-        let dimension = if let Shape::Circle { .. } = self.shape { 2 } else { 3 };
+        let dimension = self.shape.dimension();
         let problem = self.problem.name();
         match &self.scheme {
             Scheme::Dcpse(Method { support, form: Form::Intrinsic { .. } }) => {
@@ -365,7 +396,7 @@ impl Scene for SurfaceScene {
                 let fit = nodes * (20.0 + 0.25 * terms * terms) + 0.02 * terms.powi(3);
                 let application = points * self.entries(method);
                 let mut work = vec![PhaseWork::at_moments("operators/construction", points * fit)];
-                work.extend(self.problem.work(application, points, steps as f64, self.inner_steps()));
+                work.extend(self.problem.work(application, points, steps as f64, self.inner_steps(particles)));
                 work
             }
             Scheme::Embedding { order, spacing } => {
@@ -382,28 +413,35 @@ impl Scene for SurfaceScene {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
+        if let Shape::Points(_) = self.shape {
+            return if self.shape.is_curve() {
+                points::build::<2, 1>(self, context)
+            } else {
+                points::build::<3, 2>(self, context)
+            };
+        }
         let BuildContext { interrupt, cpu_clock, .. } = context;
         match (&self.scheme, &self.shape) {
             (Scheme::Dcpse(method), Shape::Circle { radius }) => {
-                let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.seed);
+                let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.written.seed);
                 let cloud = self.cloud(cloud, method.support.radius)?;
-                let problem = self.problem.build(&self.shape, &cloud, self.seed, self.fixed.time_step);
+                let problem = self.problem.build(&self.shape, &cloud, self.written.seed, self.fixed.time_step);
                 Ok(Box::new(SurfaceEquation::<2, 1>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
             }
             (Scheme::Dcpse(method), shape) => {
                 let reach = method.support.radius;
-                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, reach, &interrupt);
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.written.seed, reach, &interrupt);
                 let cloud = self.cloud(cloud, reach)?;
-                let problem = self.problem.build(shape, &cloud, self.seed, self.fixed.time_step);
+                let problem = self.problem.build(shape, &cloud, self.written.seed, self.fixed.time_step);
                 Ok(Box::new(SurfaceEquation::<3, 2>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
             }
             (Scheme::Embedding { order, spacing }, shape) => {
-                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.seed, 0.0, &interrupt);
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.written.seed, 0.0, &interrupt);
                 let Some((field, values, operated)) = self.problem.known(shape, &cloud) else { return Err(Vec::new()) };
                 let surface: Box<dyn crate::geometry::Surface<3>> = match shape {
                     Shape::Torus(torus) => Box::new(torus.clone()),
                     Shape::Ellipsoid(ellipsoid) => Box::new(ellipsoid.clone()),
-                    Shape::Circle { .. } | Shape::Bump(_) => return Err(Vec::new()),
+                    Shape::Circle { .. } | Shape::Bump(_) | Shape::Points(_) => return Err(Vec::new()),
                 };
                 let parts = EmbeddingParts { order: *order, spacing: *spacing, repeats: self.fixed.steps };
                 let SurfaceCloud { points, normals, curvatures, .. } = cloud;

@@ -1,20 +1,67 @@
 //! Surfaces as points with exact normals and curvatures, by how they are spread.
 
+use super::parameters::Written;
 use crate::geometry::random::CounterRandom;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
 use crate::geometry::{Surface, Vector, fibonacci};
 use crate::parallel::Interrupt;
 use crate::point_clouds::{Bump, bump, relaxation};
+use crate::scene::Violation;
 use crate::schemes::surface_equation::SurfaceCloud;
+use serde_json::{Value, json};
 use std::f64::consts::{PI, TAU};
 
 /// A surface about the origin.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shape {
-    Circle { radius: f64 },
+    Circle {
+        radius: f64,
+    },
     Ellipsoid(Ellipsoid<3>),
     Torus(Torus),
     Bump(Bump),
+    /// Points from outside.
+    Points(Extent),
+}
+
+/// What lengths of points from outside are, about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Extent {
+    dimension: usize,
+    /// Length or area.
+    measure: f64,
+    /// The largest distance from the middle of their box.
+    reach: f64,
+    /// Where the cap begins.
+    cap: f64,
+    /// Whether these are lengths of the points. Before they are read those of the unit sphere or circle stand here.
+    pub is_known: bool,
+}
+
+/// The part of the points along their last axis (a curve's first) that is below the cap.
+const BELOW_CAP: f64 = 0.9;
+
+impl Extent {
+    /// Of points that are so far apart.
+    pub fn of<const D: usize>(points: &[Vector<D>], spacing: f64) -> Self {
+        let low = points.iter().fold(Vector::<D>::repeat(f64::INFINITY), |low, x| low.inf(x));
+        let high = points.iter().fold(Vector::<D>::repeat(f64::NEG_INFINITY), |high, x| high.sup(x));
+        let middle = 0.5 * (low + high);
+        let axis = if D == 3 { 2 } else { 0 };
+        Self {
+            dimension: D,
+            measure: points.len() as f64 * spacing.powi(D as i32 - 1),
+            reach: points.iter().map(|x| (x - middle).norm()).fold(0.0, f64::max),
+            cap: low[axis] + BELOW_CAP * (high[axis] - low[axis]),
+            is_known: true,
+        }
+    }
+
+    /// In the place of points that nobody has read yet.
+    pub fn unknown(dimension: usize) -> Self {
+        let measure = if dimension == 2 { TAU } else { 4.0 * PI };
+        Self { dimension, measure, reach: 1.0, cap: 2.0 * BELOW_CAP - 1.0, is_known: false }
+    }
 }
 
 /// How points are spread.
@@ -26,12 +73,30 @@ pub(super) enum Sampling {
     Fibonacci,
     /// At random, relaxed or not.
     Random { is_relaxed: bool },
+    /// As they came.
+    Given,
 }
+
+/// Points of a surface whose number is not given, and before points from outside are read.
+pub(super) const DEFAULT_COUNT: u64 = 4000;
 
 /// Places of a bump whose values go into the series (Surface DC-PSE paper, section 4.4).
 const BUMP_PROBES: [[f64; 2]; 2] = [[-0.5, 0.0], [-0.25 * std::f64::consts::SQRT_2, 0.25 * std::f64::consts::SQRT_2]];
 
 impl Shape {
+    pub fn is_curve(&self) -> bool {
+        self.dimension() == 2
+    }
+
+    /// Of the space that it lies in.
+    pub fn dimension(&self) -> usize {
+        match self {
+            Self::Circle { .. } => 2,
+            Self::Points(extent) => extent.dimension,
+            _ => 3,
+        }
+    }
+
     /// The length, or the area: of an ellipsoid by Knud Thomsen's formula to about one per cent (it sets a length alone), of
     /// a bump that of its square.
     fn measure(&self) -> f64 {
@@ -45,54 +110,60 @@ impl Shape {
             }
             Self::Torus(torus) => 4.0 * PI * PI * torus.major_radius * torus.minor_radius,
             Self::Bump(_) => (2.0 * bump::HALF_SIDE).powi(2),
+            Self::Points(extent) => extent.measure,
         }
     }
 
     /// δn: the arc, or the side of the square, that a point has for itself.
     pub fn spacing(&self, count: u64) -> f64 {
         match self {
-            Self::Circle { .. } => self.measure() / count as f64,
+            _ if self.is_curve() => self.measure() / count as f64,
             Self::Bump(bump) => 2.0 * bump::HALF_SIDE / bump.cells(count) as f64,
             _ => (self.measure() / count as f64).sqrt(),
         }
     }
 
-    /// The least eigenvalue of Δ_S that is not zero, about: of a sphere of the same area, or of a circle.
+    /// The least eigenvalue of Δ_S that is not zero, about: of a sphere of the same area, or a circle of the same length.
     pub fn least_eigenvalue(&self) -> f64 {
         match self {
             Self::Circle { radius } => -1.0 / (radius * radius),
+            _ if self.is_curve() => -(TAU / self.measure()).powi(2),
             _ => -8.0 * PI / self.measure(),
         }
     }
 
-    /// A length that all of the surface is within.
+    /// A length that all of the surface is within, about the origin or the middle of points.
     pub fn reach(&self) -> f64 {
         match self {
             Self::Circle { radius } => *radius,
             Self::Ellipsoid(ellipsoid) => ellipsoid.semi_axes.max(),
             Self::Torus(torus) => torus.major_radius + torus.minor_radius,
             Self::Bump(_) => bump::HALF_SIDE,
+            Self::Points(extent) => extent.reach,
         }
     }
 
-    /// The exact unit normal at a point of it, z = 0 of a circle.
-    pub fn normal(&self, x: &Vector<3>) -> Vector<3> {
-        match self {
+    /// The exact unit normal at a point of it, z = 0 of a circle; nothing is known of points.
+    pub fn normal(&self, x: &Vector<3>) -> Option<Vector<3>> {
+        Some(match self {
             Self::Circle { .. } => x.normalize(),
             Self::Ellipsoid(ellipsoid) => ellipsoid.normal_and_curvature(x).0,
             Self::Torus(torus) => torus.nearest(x).normal.unwrap_or_default(),
             Self::Bump(bump) => bump.above(x[0], x[1]).normal,
-        }
+            Self::Points(_) => return None,
+        })
     }
 
-    /// Its largest coordinate along z, of a circle along x.
-    pub fn top(&self) -> f64 {
-        match self {
+    /// Where a cap about the z axis begins, of a curve about the x axis: four fifths of the way from the origin to the top.
+    pub fn cap(&self) -> f64 {
+        let top = match self {
             Self::Circle { radius } => *radius,
             Self::Ellipsoid(ellipsoid) => ellipsoid.semi_axes[2],
             Self::Torus(torus) => torus.minor_radius,
             Self::Bump(bump) => bump.above(bump::CENTER[0], bump::CENTER[1]).point[2],
-        }
+            Self::Points(extent) => return extent.cap,
+        };
+        0.8 * top
     }
 
     /// The surface in space with its closest points, where it has them exactly.
@@ -100,8 +171,45 @@ impl Shape {
         match self {
             Self::Ellipsoid(ellipsoid) => Some(ellipsoid),
             Self::Torus(torus) => Some(torus),
-            Self::Circle { .. } | Self::Bump(_) => None,
+            Self::Circle { .. } | Self::Bump(_) | Self::Points(_) => None,
         }
+    }
+}
+
+/// How points are spread. Those from outside are what they are.
+pub(super) fn sampling(
+    written: &Written,
+    shape: &Shape,
+    resolved: &mut Value,
+    violations: &mut Vec<Violation>,
+) -> Sampling {
+    if let Shape::Points(_) = shape {
+        for (name, given) in [("count", json!(written.count)), ("sampling", json!(written.sampling))] {
+            if !given.is_null() {
+                let detail = "points from outside are as many as they are, where they are";
+                violations.push(Violation::new(format!("/{name}"), "conflict", detail, &given, Value::Null));
+            }
+        }
+        return Sampling::Given;
+    }
+    let has_lattice = matches!(shape, Shape::Circle { .. } | Shape::Bump(_));
+    let allowed: &[&str] = match shape {
+        Shape::Circle { .. } => &["regular", "random", "random_raw"],
+        Shape::Bump(_) => &["regular"],
+        _ => &["fibonacci", "random", "random_raw"],
+    };
+    let name = written.sampling.as_deref().unwrap_or(allowed[0]);
+    if !allowed.contains(&name) {
+        let detail = if has_lattice { "not on this surface" } else { "this surface has no lattice" };
+        violations.push(Violation::new("/sampling", "conflict", detail, &json!(name), json!(allowed)));
+    }
+    resolved["count"] = json!(written.count.unwrap_or(DEFAULT_COUNT));
+    resolved["sampling"] = json!(name);
+    match name {
+        "regular" => Sampling::Regular,
+        "random" => Sampling::Random { is_relaxed: true },
+        "random_raw" => Sampling::Random { is_relaxed: false },
+        _ => Sampling::Fibonacci,
     }
 }
 

@@ -15,9 +15,9 @@ pub struct SurfaceCloud<const D: usize> {
     pub scales: Vec<f64>,
     /// Unknowns.
     pub rows: usize,
-    /// ∇·n where it is known, else NaN.
+    /// ∇·n where it is known, else NaN; empty where nothing is known of the surface but its points.
     pub curvatures: Vec<f64>,
-    /// Gauss curvature where it is known, else NaN.
+    /// Gauss curvature, likewise.
     pub gauss: Vec<f64>,
     /// The share of the surface that each unknown stands for, where it is known.
     pub areas: Option<Vec<f64>>,

@@ -77,7 +77,8 @@ impl<const D: usize> Problem<D> for Curvature {
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
-        if clock.step == 0 || cloud.curvatures.iter().any(|kappa| kappa.is_nan()) {
+        let is_unknown = cloud.curvatures.is_empty() || cloud.curvatures.iter().any(|kappa| kappa.is_nan());
+        if clock.step == 0 || is_unknown {
             return Vec::new();
         }
         let exact: Vec<f64> = cloud.curvatures.iter().map(|kappa| share(D) * kappa).collect();

@@ -1,4 +1,4 @@
-//! Δ_S applied to a known field, again and again for its time: the error against the exact one.
+//! Δ_S applied to a known field, again and again for its time: the error against the exact one, where that is known.
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
@@ -9,18 +9,18 @@ use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError}
 use crate::time::Clock;
 use std::collections::BTreeMap;
 
-/// The field, Δ_S of it exactly, and as computed.
+/// The field, Δ_S of it exactly where that is known, and as computed.
 #[derive(Debug)]
 pub struct Pointwise {
     field: Vec<f64>,
-    reference: Vec<f64>,
+    reference: Option<Vec<f64>>,
     value: Vec<f64>,
 }
 
 impl Pointwise {
     /// At the start: nothing is computed yet.
     #[must_use]
-    pub fn new(field: Vec<f64>, reference: Vec<f64>) -> Self {
+    pub fn new(field: Vec<f64>, reference: Option<Vec<f64>>) -> Self {
         let value = vec![0.0; field.len()];
         Self { field, reference, value }
     }
@@ -40,7 +40,9 @@ impl<const D: usize> Problem<D> for Pointwise {
     fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
         // Nothing is computed before the first step.
         let value = if clock.step == 0 { vec![f64::NAN; self.value.len()] } else { self.value.clone() };
-        vec![("value", value), ("field", self.field.clone()), ("reference", self.reference.clone())]
+        let mut columns = vec![("value", value), ("field", self.field.clone())];
+        columns.extend(self.reference.iter().map(|reference| ("reference", reference.clone())));
+        columns
     }
 
     fn watched(&self) -> &[f64] {
@@ -48,13 +50,18 @@ impl<const D: usize> Problem<D> for Pointwise {
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
-        if clock.step == 0 {
-            return Vec::new();
+        match &self.reference {
+            Some(reference) if clock.step > 0 => {
+                against_exact("value", &self.value, reference, clock.time, "exact operator at the points")
+            }
+            _ => Vec::new(),
         }
-        against_exact("value", &self.value, &self.reference, clock.time, "exact operator at the points")
     }
 
     fn observables(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Observables {
+        if self.reference.is_none() {
+            return Vec::new();
+        }
         let errors = Problem::<D>::errors(self, cloud, clock);
         let of = |norm: &str| errors.iter().find(|e| e.norm == norm).map_or(f64::NAN, |e| e.value);
         vec![("error_relative", of("relative")), ("error_max", of("max"))]

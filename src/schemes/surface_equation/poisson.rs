@@ -33,9 +33,9 @@ pub enum Solver {
 /// What makes the solution one.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Condition {
-    /// These points hold their exact value.
-    Dirichlet(Vec<usize>),
-    /// Neither the solution nor the exact one has a mean; α of A + α 1 1ᵀ/n.
+    /// These points hold these values.
+    Dirichlet(Vec<(usize, f64)>),
+    /// Neither the solution nor the exact one has a mean over the points; α of A + α 1 1ᵀ/n.
     ZeroMean {
         /// α, of the size of the least eigenvalue that is not zero, with its sign.
         alpha: f64,
@@ -46,7 +46,8 @@ pub enum Condition {
 #[derive(Debug)]
 pub struct Poisson {
     right: Vec<f64>,
-    exact: Vec<f64>,
+    /// The solution, where it is known.
+    exact: Option<Vec<f64>>,
     value: Vec<f64>,
     condition: Condition,
     solver: Solver,
@@ -54,11 +55,11 @@ pub struct Poisson {
 }
 
 impl Poisson {
-    /// Δ_S u = `right` with the solution `exact`.
+    /// Δ_S u = `right` with the solution `exact`. Without a mean the system takes from `right` what no solution has.
     #[must_use]
-    pub fn new(right: Vec<f64>, mut exact: Vec<f64>, condition: Condition, solver: Solver) -> Self {
-        if let Condition::ZeroMean { .. } = condition {
-            subtract_mean(&mut exact);
+    pub fn new(right: Vec<f64>, mut exact: Option<Vec<f64>>, condition: Condition, solver: Solver) -> Self {
+        if let (Condition::ZeroMean { .. }, Some(exact)) = (&condition, &mut exact) {
+            subtract_mean(exact);
         }
         let value = vec![0.0; right.len()];
         Self { right, exact, value, condition, solver, convergence: Convergence::default() }
@@ -68,16 +69,16 @@ impl Poisson {
     fn system(&self, operator: &SparseRows) -> (SparseRows, Vec<f64>) {
         let (mut rows, mut right) = (operator.sorted(), self.right.clone());
         if let Condition::Dirichlet(held) = &self.condition {
-            let mut is_held = vec![false; right.len()];
-            held.iter().for_each(|i| is_held[*i] = true);
+            let mut held_at = vec![None; right.len()];
+            held.iter().for_each(|(i, value)| held_at[*i] = Some(*value));
             rows.change_rows(|i, columns, weights| {
-                if is_held[i] {
+                if let Some(value) = held_at[i] {
                     let diagonal = columns.iter().zip(weights.iter()).find(|(j, _)| **j as usize == i);
                     let size = diagonal.map_or(1.0, |(_, w)| *w);
                     for (j, w) in columns.iter().zip(weights.iter_mut()) {
                         *w = if *j as usize == i { size } else { 0.0 };
                     }
-                    right[i] = size * self.exact[i];
+                    right[i] = size * value;
                 }
             });
         }
@@ -150,7 +151,9 @@ impl<const D: usize> Problem<D> for Poisson {
 
     fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
         let value = if clock.step == 0 { vec![f64::NAN; self.value.len()] } else { self.value.clone() };
-        vec![("value", value), ("field", self.right.clone()), ("reference", self.exact.clone())]
+        let mut columns = vec![("value", value), ("field", self.right.clone())];
+        columns.extend(self.exact.iter().map(|exact| ("reference", exact.clone())));
+        columns
     }
 
     fn watched(&self) -> &[f64] {
@@ -161,7 +164,9 @@ impl<const D: usize> Problem<D> for Poisson {
         if clock.step == 0 {
             return Vec::new();
         }
-        let mut errors = against_exact("value", &self.value, &self.exact, clock.time, "exact solution at the points");
+        let reference = "exact solution at the points";
+        let against = |exact: &Vec<f64>| against_exact("value", &self.value, exact, clock.time, reference);
+        let mut errors = self.exact.as_ref().map_or_else(Vec::new, against);
         let Convergence { iterations, residual } = self.convergence;
         errors.push(entry("solver", "iterations", iterations as f64, clock.time, "none"));
         errors.push(entry("solver", "residual", residual, clock.time, "‖b − A x‖ by ‖b‖"));

@@ -25,6 +25,10 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     step: u64,
     interrupt: Interrupt,
     phases: Phases,
+    /// Of points from outside: what they are, for the report.
+    origin: Option<String>,
+    /// Of points from outside: what is wrong with them, until it was told.
+    findings: Vec<Finding>,
 }
 
 impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
@@ -40,7 +44,15 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
     ) -> Self {
         let soundness = Soundness::none();
         let phases = Phases::new(cpu_clock);
-        Self { cloud, method, problem, operators: None, soundness, fixed, step: 0, interrupt, phases }
+        let (origin, findings) = (None, Vec::new());
+        Self { cloud, method, problem, operators: None, soundness, fixed, step: 0, interrupt, phases, origin, findings }
+    }
+
+    /// The same on points from outside: what they are, and what is wrong with them.
+    #[must_use]
+    pub fn on_points(mut self, origin: String, findings: Vec<Finding>) -> Self {
+        (self.origin, self.findings) = (Some(origin), findings);
+        self
     }
 }
 
@@ -91,7 +103,9 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
             fields.scalar(name, values);
         }
         fields.vector("normal", self.cloud.normals[..rows].iter().copied());
-        fields.scalar("curvature", self.cloud.curvatures.clone());
+        if !self.cloud.curvatures.is_empty() {
+            fields.scalar("curvature", self.cloud.curvatures.clone());
+        }
         fields.id("particle_id", (0..rows as u64).collect());
         fields
     }
@@ -120,6 +134,10 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         self.soundness = Soundness { enlarged, low_rank, unresolved, failed: 0, least_pivot: pivot[0] };
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
+        if state.step > 0 {
+            // It was told at the start.
+            self.findings.clear();
+        }
         self.step = state.step;
         Ok(())
     }
@@ -142,6 +160,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         if entries > 0 {
             method.insert("entries", format!("{:.1} a point", entries as f64 / self.cloud.rows as f64));
         }
+        method.extend(self.origin.iter().map(|origin| ("points", origin.clone())));
         self.problem.describe(&mut method);
         Report {
             errors: self.problem.errors(&self.cloud, self.clock()),
@@ -168,6 +187,6 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
     }
 
     fn take_findings(&mut self) -> Vec<Finding> {
-        Vec::new()
+        std::mem::take(&mut self.findings)
     }
 }

@@ -1,0 +1,75 @@
+//! A surface that is known by points from outside alone: read, examined, given normals where it has none. Nothing is known
+//! of it exactly, so that no error is reported and what wants an exact answer was refused before.
+
+use super::setup::{Normals, Scheme, SurfaceScene, choices};
+use super::surfaces::{Extent, Shape};
+use crate::geometry::Vector;
+use crate::point_clouds::Examined;
+use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
+use crate::point_clouds::normals;
+use crate::scene::cloud::{self, Clouds};
+use crate::scene::{BuildContext, Violation};
+use crate::schemes::surface_equation::{SurfaceCloud, SurfaceEquation};
+use crate::simulation::{Finding, Simulation};
+use serde_json::Value;
+
+/// Where a scene names them.
+const PLACE: &str = "/surface";
+
+/// 1. Points and the normals that came with them are read. 2. The points are examined; their spacing is known now.
+/// 3. Method and problem are understood again, by it. 4. Normals are estimated where none came. 5. What is wrong with both
+///    becomes findings.
+pub(super) fn build<const D: usize, const M: usize>(
+    scene: &SurfaceScene,
+    context: BuildContext,
+) -> Result<Box<dyn Simulation>, Vec<Violation>> {
+    let BuildContext { clouds, interrupt, cpu_clock, .. } = context;
+    let points = cloud::points::<D>(&clouds, PLACE).map_err(|refused| vec![refused])?;
+    let given = given_normals::<D>(&clouds, scene.normals)?;
+    drop(clouds);
+    let examined = Examined::new(&points).map_err(|reason| refuse(reason.to_string()))?;
+    let shape = Shape::Points(Extent::of(&points, examined.spacing));
+    let mut violations = Vec::new();
+    let (scheme, problem) =
+        choices(&scene.written, &shape, points.len() as u64, &mut scene.resolved.clone(), &mut violations);
+    let (Some(Scheme::Dcpse(method)), Some(problem), true) = (scheme, problem, violations.is_empty()) else {
+        return Err(violations);
+    };
+    let (mut normals, source) = match given {
+        Some(given) => (given, NormalSource::Given),
+        None => {
+            let found = normals::estimate(&points, examined.radius_of_normals());
+            (found.map_err(|reason| refuse(reason.to_string()))?, NormalSource::Estimated)
+        }
+    };
+    let flaws = examined.flaws(&mut normals, source, method.support.radius);
+    let finding = |flaw: Flaw| Finding { name: flaw.name(), message: flaw.to_string(), time: 0.0 };
+    let origin = format!(
+        "{} of them, {:.4e} apart, {} normals{}",
+        points.len(),
+        examined.spacing,
+        if source == NormalSource::Given { "their own" } else { "estimated" },
+        flaws.iter().map(|flaw| format!("; {flaw}")).collect::<String>()
+    );
+    let findings = flaws.into_iter().map(finding).collect();
+    let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
+    let problem = problem.build(&shape, &cloud, scene.written.seed, scene.fixed.time_step);
+    let equation = SurfaceEquation::<D, M>::new(cloud, method, problem, scene.fixed, interrupt, cpu_clock);
+    Ok(Box::new(equation.on_points(origin, findings)))
+}
+
+/// Unit normals that came with the points, where they are wanted.
+fn given_normals<const D: usize>(clouds: &Clouds, wanted: Normals) -> Result<Option<Vec<Vector<D>>>, Vec<Violation>> {
+    let Normals::Given { must_be_there } = wanted else { return Ok(None) };
+    match cloud::normals::<D>(clouds, PLACE).map_err(|refused| vec![refused])? {
+        Some(given) => unit_normals(&given).map(Some).map_err(|reason| refuse(reason.to_string())),
+        None if must_be_there => {
+            Err(refuse("the points have no normals that could be taken as exact (/normals/metric)".to_owned()))
+        }
+        None => Ok(None),
+    }
+}
+
+fn refuse(detail: String) -> Vec<Violation> {
+    vec![Violation::new(PLACE, "data", detail, &Value::Null, Value::Null)]
+}

@@ -1,0 +1,279 @@
+//! Surfaces made of points from outside: what they give, what is said of them before a run, and what is refused.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+#[path = "support/mod.rs"]
+#[expect(dead_code, reason = "each test target uses a part")]
+mod support;
+
+use meniscus::geometry::{Vector, fibonacci};
+use meniscus::parallel::Interrupt;
+use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds, Violation};
+use meniscus::scenes::SCENES;
+use meniscus::simulation::{CpuClock, FieldValues, OutputPlan, Simulation, State};
+use serde_json::{Value, json};
+use support::{pool, scene};
+
+const PLAN: OutputPlan = OutputPlan { every_time: None, series_every_steps: 1 };
+
+fn body(more: &Value) -> Value {
+    let points = json!({"type": "points", "upload": "upl_x"});
+    let mut body = json!({"kind": "surface_pde", "surface": points, "problem": "curvature"});
+    body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    body
+}
+
+/// A sphere about a point, with its normals.
+fn sphere(count: usize, radius: f64, center: [f64; 3]) -> Cloud {
+    let directions = fibonacci::sphere(count);
+    let at = |n: &Vector<3>| std::array::from_fn(|d| center[d] + radius * n[d]);
+    let normals = directions.iter().map(|n| [n[0], n[1], n[2]]).collect();
+    Cloud { positions: directions.iter().map(at).collect(), level: None, normals: Some(normals) }
+}
+
+fn bare(cloud: Cloud) -> Cloud {
+    Cloud { normals: None, ..cloud }
+}
+
+fn build(body: &Value, cloud: &Cloud) -> Result<Box<dyn Simulation>, Vec<Violation>> {
+    let clouds = Clouds::from([("/surface", cloud.clone())]);
+    let context = BuildContext { plan: PLAN, interrupt: Interrupt::default(), cpu_clock: CpuClock::still(), clouds };
+    scene(body).build(context)
+}
+
+fn finished(body: &Value, cloud: &Cloud) -> Box<dyn Simulation> {
+    pool(2).install(|| {
+        let mut simulation = build(body, cloud).unwrap();
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+        }
+        simulation
+    })
+}
+
+fn column(simulation: &dyn Simulation, name: &str) -> Vec<f64> {
+    let fields = simulation.fields();
+    let FieldValues::Scalar(values) = &fields.columns.iter().find(|c| c.name == name).unwrap().values else {
+        panic!("{name} is no number a point")
+    };
+    values.clone()
+}
+
+/// The sentence that a build is refused with.
+fn refusal(body: &Value, cloud: &Cloud) -> String {
+    let found = build(body, cloud).err().unwrap();
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].pointer, "/surface");
+    found[0].detail.clone()
+}
+
+#[test]
+fn curvatures_of_a_sphere_are_those_of_its_radius() {
+    let cloud = sphere(3000, 0.5, [10.0, 0.0, -3.0]);
+    for (cloud, normals, most) in [
+        (cloud.clone(), json!("given"), 1e-2),
+        (cloud.clone(), json!({"type": "given", "metric": "normals"}), 1e-3),
+        (cloud.clone(), json!("estimated"), 1e-2),
+        (bare(cloud), json!("given"), 1e-2),
+    ] {
+        let mut simulation = finished(&body(&json!({"normals": normals})), &cloud);
+        let off = |name: &str, exact: f64| {
+            column(simulation.as_ref(), name).iter().map(|k| (k / exact - 1.0).abs()).fold(0.0, f64::max)
+        };
+        assert!(off("mean_curvature", 2.0) < most, "{normals}: {}", off("mean_curvature", 2.0));
+        assert!(off("gauss_curvature", 4.0) < 3.0 * most, "{normals}: {}", off("gauss_curvature", 4.0));
+        assert!(simulation.report().errors.is_empty(), "nobody knows the exact surface");
+        assert_eq!(simulation.take_findings(), []);
+    }
+}
+
+#[test]
+fn operators_are_those_of_the_surface_and_no_error_is_made_up() {
+    let cloud = sphere(4000, 1.0, [0.0; 3]);
+    let (field, order) = (json!({"type": "plane_wave", "k": [2, -1, 3]}), json!({"type": "surface_dcpse", "order": 4}));
+    let given = body(&json!({"problem": {"type": "laplace_beltrami", "field": field}, "method": order, "repeat": 2}));
+    for cloud in [cloud.clone(), bare(cloud.clone())] {
+        let simulation = finished(&given, &cloud);
+        let wave = Vector::<3>::new(2.0, -1.0, 3.0);
+        let exact = |x: &[f64; 3]| {
+            let along = wave.dot(&Vector::<3>::from(*x));
+            -(wave.norm_squared() - along * along) * along.sin() - 2.0 * along * along.cos()
+        };
+        let value = column(simulation.as_ref(), "value");
+        let off = value.iter().zip(&cloud.positions).map(|(value, x)| (value - exact(x)).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-2, "{off}");
+        assert!(simulation.report().errors.is_empty());
+    }
+    let poisson = body(&json!({"problem": {"type": "poisson", "field": field}, "method": order}));
+    let simulation = finished(&poisson, &cloud);
+    let errors = simulation.report().errors;
+    assert!(errors.iter().all(|error| error.quantity == "solver") && !errors.is_empty(), "{errors:?}");
+    let again = json!({"type": "laplace_beltrami", "field": field});
+    assert!(scene(&body(&json!({"problem": again}))).resolved()["count"].is_null());
+    // A wave that is not given is one by the size of the points, which is known only when they are read.
+    let own = finished(&body(&json!({"problem": "laplace_beltrami"})), &sphere(1000, 1e-3, [0.0; 3]));
+    let field = column(own.as_ref(), "field");
+    assert!(field.iter().any(|f| *f > 0.9) && field.iter().any(|f| *f < -0.9));
+}
+
+fn bodies() -> Vec<(Value, Cloud)> {
+    let ball = sphere(500, 1.0, [0.3, 0.0, 0.0]);
+    let circle = (0..200).map(|i| 0.031_415_926 * f64::from(i)).map(|a| [a.cos(), a.sin(), 0.0]);
+    let circle = Cloud { positions: circle.collect(), ..Cloud::default() };
+    let evolving = |more: Value| {
+        let mut problem = json!({"end_time": 0.02, "time_step": 0.005});
+        problem.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        json!({"problem": problem})
+    };
+    let gray_scott = evolving(json!({"type": "reaction_diffusion", "model": "gray_scott"}));
+    let gaussian = json!({"type": "truncated_gaussian", "center": [0.3, 0, 1], "sigma": 1});
+    let mut on_circle = evolving(json!({"type": "diffusion", "integrator": "bdf2"}));
+    on_circle["dimension"] = json!(2);
+    vec![
+        (body(&json!({"problem": "laplace_beltrami", "repeat": 4})), ball.clone()),
+        (body(&json!({"problem": "laplace_beltrami", "repeat": 4})), bare(ball.clone())),
+        (body(&json!({})), bare(ball.clone())),
+        (body(&json!({"problem": "poisson"})), ball.clone()),
+        (body(&json!({"problem": "poisson", "solver": "sparse_lu"})), bare(ball.clone())),
+        (body(&evolving(json!({"type": "diffusion", "initial": gaussian}))), bare(ball.clone())),
+        (body(&gray_scott), ball),
+        (body(&on_circle), circle.clone()),
+        (body(&json!({"dimension": 2})), circle),
+    ]
+}
+
+fn same(a: &State, b: &State) -> bool {
+    let bits = |state: &State| -> Vec<(String, Vec<u64>)> {
+        state.reals.iter().map(|c| (c.name.clone(), c.values.iter().map(|x| x.to_bits()).collect())).collect()
+    };
+    a.step == b.step && a.counts == b.counts && bits(a) == bits(b)
+}
+
+#[test]
+fn runs_on_points_go_on_bit_for_bit_on_any_number_of_threads() {
+    for (body, cloud) in bodies() {
+        assert_eq!(scene(&scene(&body).resolved()).resolved(), scene(&body).resolved());
+        let states = |threads: usize| -> Vec<State> {
+            pool(threads).install(|| {
+                let mut simulation = build(&body, &cloud).unwrap();
+                let mut states = vec![simulation.state()];
+                while !simulation.is_finished() {
+                    simulation.step().unwrap();
+                    states.push(simulation.state());
+                }
+                states
+            })
+        };
+        let unbroken = states(1);
+        for threads in [2, 3] {
+            assert!(states(threads).iter().zip(&unbroken).all(|(a, b)| same(a, b)), "{threads} threads, {body}");
+        }
+        let last = unbroken.len() - 1;
+        for k in [0, last / 2, last] {
+            pool(1 + k % 3).install(|| {
+                let mut simulation = build(&body, &cloud).unwrap();
+                simulation.restore(&unbroken[k]).unwrap();
+                while !simulation.is_finished() {
+                    simulation.step().unwrap();
+                }
+                assert!(same(&simulation.state(), &unbroken[last]), "restart at {k}, {body}");
+                let mut shown: Vec<&str> = simulation.fields().columns.iter().map(|c| c.name).collect();
+                let mut promised = scene(&body).field_names();
+                shown.sort_unstable();
+                promised.sort_unstable();
+                assert_eq!(shown, promised, "{body}");
+            });
+        }
+    }
+}
+
+#[test]
+fn what_is_wrong_with_points_is_said_before_the_first_step() {
+    let cloud = sphere(2000, 1.0, [0.0; 3]);
+    let mut holed = cloud.clone();
+    holed.positions.truncate(1950);
+    holed.normals.as_mut().unwrap().truncate(1950);
+    holed.normals.as_mut().unwrap()[70] = [0.0, 0.0, -1.0];
+    let mut simulation = build(&body(&json!({})), &holed).unwrap();
+    let described = simulation.report().method["points"].clone();
+    assert!(described.starts_with("1950 of them") && described.contains("normals; point"), "{described}");
+    let findings = simulation.take_findings();
+    let names: Vec<_> = findings.iter().map(|finding| finding.name).collect();
+    assert_eq!(names, ["holes", "inconsistent_normals"]);
+    assert!(findings[0].message.contains("more: neighbours on one side alone"), "{}", findings[0].message);
+    assert!(findings[1].message.starts_with("point 70:"), "{}", findings[1].message);
+    assert_eq!(simulation.take_findings(), []);
+    // A wrong normal is replaced.
+    pool(2).install(|| simulation.step()).unwrap();
+    let mean = column(simulation.as_ref(), "mean_curvature");
+    assert!((mean[70] - 1.0).abs() < 1e-2 && mean.iter().all(|h| (h - 1.0).abs() < 0.2), "{}", mean[70]);
+
+    let mut twins = cloud.clone();
+    twins.positions[7] = twins.positions[1999];
+    assert!(refusal(&body(&json!({})), &twins).starts_with("points 7, 1999:"));
+    let mut without_length = cloud.clone();
+    without_length.normals.as_mut().unwrap()[11] = [0.0; 3];
+    assert!(refusal(&body(&json!({})), &without_length).starts_with("point 11:"));
+    // Normals that nobody uses are not looked at.
+    assert!(build(&body(&json!({"normals": "estimated"})), &without_length).is_ok());
+    let exact = body(&json!({"normals": {"type": "given", "metric": "normals"}}));
+    assert!(refusal(&exact, &bare(cloud.clone())).contains("no normals"));
+    let mut fewer = cloud.clone();
+    fewer.normals.as_mut().unwrap().pop();
+    assert!(refusal(&body(&json!({})), &fewer).contains("1999 normals for 2000 points"));
+    let order = body(&json!({"method": {"type": "surface_dcpse", "order": 6}}));
+    assert!(refusal(&order, &sphere(200, 1.0, [0.0; 3])).contains("280 points at least"));
+    assert!(refusal(&body(&json!({"dimension": 2})), &cloud).contains("z ="));
+}
+
+#[test]
+fn odd_clouds_end_in_words_never_in_a_panic() {
+    let of = |positions: Vec<[f64; 3]>| Cloud { positions, ..Cloud::default() };
+    let line = |step: f64| (0..300).map(|i| [step * f64::from(i), 0.0, 0.0]).collect::<Vec<_>>();
+    let mut broken = sphere(500, 1.0, [0.0; 3]);
+    broken.positions[3][1] = f64::NAN;
+    let clouds = [
+        of(Vec::new()),
+        of(vec![[1.0, 2.0, 3.0]]),
+        of(vec![[1.0, 2.0, 3.0]; 500]),
+        of(line(1.0)),
+        of(line(1e300)),
+        of(line(1e-200)),
+        broken,
+        sphere(500, 1e200, [0.0; 3]),
+        sphere(500, 1.0, [1e14, 0.0, 0.0]),
+    ];
+    for (k, cloud) in clouds.iter().enumerate() {
+        for more in [json!({}), json!({"problem": "laplace_beltrami"})] {
+            let said = match build(&body(&more), cloud) {
+                Ok(mut simulation) => simulation.step().map_err(|error| error.to_string()),
+                Err(found) => Err(found[0].detail.clone()),
+            };
+            assert!(said.is_err(), "cloud {k}, {more}");
+        }
+    }
+}
+
+#[test]
+fn what_points_cannot_do_is_refused_at_its_place() {
+    for (more, place) in [
+        (json!({"count": 500}), "/count"),
+        (json!({"sampling": "random"}), "/sampling"),
+        (json!({"normals": "exact"}), "/normals"),
+        (json!({"normals": "perturbed"}), "/normals"),
+        (json!({"method": "closest_point", "problem": "laplace_beltrami"}), "/method"),
+        (json!({"method": {"type": "surface_dcpse", "form": "copies"}}), "/method/form"),
+        (json!({"problem": {"type": "poisson", "condition": "dirichlet"}}), "/problem/condition"),
+        (json!({"problem": {"type": "poisson", "field": "sin_plus_cos"}}), "/problem/field"),
+        (json!({"problem": {"type": "laplace_beltrami", "field": "spherical_harmonic"}}), "/problem/field"),
+        (json!({"problem": {"type": "diffusion", "initial": "spherical_harmonic"}}), "/problem/initial"),
+        (json!({"problem": {"type": "reaction_diffusion", "manufactured": "plane_wave"}}), "/problem/manufactured"),
+        (json!({"surface": "points"}), "/surface"),
+        (json!({"surface": {"type": "points", "upload": "a", "file": "b"}}), "/surface"),
+        (json!({"surface": "sphere", "normals": "given"}), "/normals"),
+    ] {
+        let found = meniscus::scene::understand(&body(&more), SCENES).err().unwrap();
+        assert!(found.iter().any(|v| v.pointer == place), "{more}: {found:?}");
+    }
+    let sizes = CloudSizes::from([("/surface", 123_456)]);
+    assert_eq!(scene(&body(&json!({}))).estimate(&sizes).particles, 123_456);
+}
