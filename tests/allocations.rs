@@ -63,6 +63,12 @@ fn steps_allocate_nothing_after_warm_up() {
             "problem": {"type": "diffusion", "end_time": 0.012, "time_step": 1e-3, "integrator": "bdf2"}
         }),
         json!({"kind": "surface_pde", "count": 500, "problem": {"type": "reaction_diffusion", "end_time": 0.12, "time_step": 0.01}}),
+        // A front that grows would outgrow its storage.
+        json!({"kind": "front", "spacing": 0.02, "end_time": 0.12, "time_step": 0.01, "law": {"type": "normal", "speed": -1}}),
+        json!({
+            "kind": "front", "spacing": 0.02, "end_time": 0.0024, "time_step": 2e-4, "law": "mean_curvature",
+            "shape": {"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25}
+        }),
     ];
     let plan = meniscus::simulation::OutputPlan { every_time: None, series_every_steps: 1000 };
     for body in bodies {

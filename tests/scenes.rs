@@ -72,6 +72,7 @@ fn bodies() -> Vec<Value> {
         "shape": {"type": "sphere", "radius": 0.7}, "discretization": {"type": "dcpse", "order": 4, "cutoff_h": 4}
     }));
     bodies.extend(surface_bodies());
+    bodies.extend(front_bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
         "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,
@@ -79,6 +80,34 @@ fn bodies() -> Vec<Value> {
         "field": "overwrite", "method": {"type": "pcp", "degree": 2}
     }));
     bodies
+}
+
+/// Every law, topology, segment test and integrator of `front` in both dimensions, and grid-based particles in a vortex.
+fn front_bodies() -> Vec<Value> {
+    let front = |more: Value| {
+        let mut body = json!({"kind": "front", "spacing": 0.04, "end_time": 0.1, "time_step": 0.01});
+        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        body
+    };
+    let square = json!({"type": "box", "center": [0.5, 0.5], "size": [0.5, 0.4]});
+    let sphere = |c: f64| json!({"type": "sphere", "center": [c, c, c], "radius": 0.12});
+    let spheres = json!({"type": "union", "of": [sphere(0.4), sphere(0.6)]});
+    let vortex = json!({"type": "flow", "flow": {"type": "vortex_3d", "period": 0.4}});
+    vec![
+        front(json!({"shape": square, "law": {"type": "normal", "speed": -1}, "preset": "paper"})),
+        front(json!({"law": "mean_curvature", "time_step": 8e-4, "end_time": 0.008, "shape": square})),
+        front(
+            json!({"law": "mean_curvature", "integrator": "tvd_rk2", "time_step": 8e-4, "end_time": 0.008, "shape": sphere(0.5)}),
+        ),
+        front(json!({"shape": spheres, "topology": "cross"})),
+        front(json!({"shape": spheres, "segment_test": {"type": "parameter", "cosine": 0.4}})),
+        front(json!({"shape": sphere(0.35), "law": vortex, "end_time": 0.4, "degree": 4, "time_step": 0.04})),
+        json!({
+            "kind": "vortex", "spacing": 0.02, "end_time": 2, "steps": 20, "flow": {"type": "single_vortex", "period": 2},
+            "method": {"type": "gbpm", "degree": 3, "tube_radius_h": 1.4}, "integrator": "dopri5"
+        }),
+        json!({"kind": "vortex", "spacing": 0.03, "method": {"type": "gbpm", "cfl": 6}, "end_time": 3}),
+    ]
 }
 
 /// Every problem, form, surface, sampling, solver and integrator of `surface_pde` once.

@@ -16,7 +16,7 @@ pub const DEGREE: Parameter = Parameter::new(
 /// Particles of a reconstruction.
 pub const NEIGHBORS: Parameter = Parameter::new(
     "neighbors",
-    "particles of a reconstruction; when not given, 8 (6 of degree 2) in the plane, 24 (10) in space",
+    "particles of a reconstruction; when not given, 8 (6 of degree 2, 14 of degree 4 under mean_curvature) in the plane, 24 (16 of degree 2) in space",
     Kind::Integer { least: 3, most: 60 },
     DefaultValue::Absent,
 );
@@ -146,7 +146,7 @@ pub fn understand(
         (2, 2) => 6,
         (2, 3) => 7,
         (2, _) => 8,
-        (_, 2) => 10,
+        (_, 2) => 16,
         (_, 3) => 16,
         _ => 24,
     });

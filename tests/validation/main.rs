@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod droplets;
+mod fronts;
 mod hard_cases;
 mod surfaces;
 #[path = "../support/mod.rs"]

@@ -1,15 +1,257 @@
 //! The rows of `front`, and of `vortex` with grid-based particles: GBPM paper, section 4.
 
-use crate::scene::rows::Rows;
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
 use serde_json::{Value, json};
+use std::f64::consts::PI;
+
+/// A scene with something else laid over it.
+fn with(mut scene: Value, more: &Value) -> Value {
+    if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
+        scene.extend(more.clone());
+    }
+    scene
+}
+
+fn front(cells: u32, more: &Value) -> Value {
+    with(json!({"kind": "front", "spacing": 1.0 / f64::from(cells)}), more)
+}
+
+/// One resampling without motion.
+fn still(cells: u32, more: &Value) -> Value {
+    let rest = json!({"type": "flow", "flow": {"type": "translation", "velocity": [0, 0]}});
+    with(front(cells, &json!({"law": rest, "end_time": 0.01, "time_step": 0.01})), more)
+}
+
+fn still_sphere(cells: u32, more: &Value) -> Value {
+    let rest = json!({"type": "flow", "flow": {"type": "translation", "velocity": [0, 0, 0]}});
+    let sphere = json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25});
+    with(still(cells, &json!({"law": rest, "shape": sphere})), more)
+}
+
+fn translated(cells: u32, more: &Value) -> Value {
+    let law = json!({"type": "flow", "flow": {"type": "translation", "velocity": [1, 1]}});
+    let shape = json!({"type": "circle", "center": [0.25, 0.25], "radius": 0.2});
+    with(front(cells, &json!({"law": law, "shape": shape, "end_time": 0.5})), more)
+}
+
+fn rotated(cells: u32, shape: &Value, turns: f64, more: &Value) -> Value {
+    let law = json!({"type": "flow", "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 2}});
+    with(front(cells, &json!({"law": law, "shape": shape, "end_time": PI * turns})), more)
+}
+
+fn disk() -> Value {
+    json!({"type": "zalesak_disk", "center": [0.5, 0.75], "radius": 0.15, "slot_width": 0.05, "slot_depth": 0.25})
+}
+
+/// The vortex that turns back, by grid-based particles.
+fn vortex(cells: u32, period: f64, method: &Value) -> Value {
+    let method = with(json!({"type": "gbpm"}), method);
+    json!({
+        "kind": "vortex", "spacing": 1.0 / f64::from(cells), "flow": {"type": "single_vortex", "period": period},
+        "end_time": period, "method": method
+    })
+}
+
+fn vortex_in_space(cells: u32) -> Value {
+    json!({
+        "kind": "vortex", "spacing": 1.0 / f64::from(cells), "flow": "vortex_3d", "end_time": 2, "method": "gbpm",
+        "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15}
+    })
+}
+
+fn by_curvature(cells: u32, end_time: f64, more: &Value) -> Value {
+    let circle = json!({"type": "circle", "center": [0.5, 0.5], "radius": 0.4});
+    with(front(cells, &json!({"law": "mean_curvature", "shape": circle, "end_time": end_time})), more)
+}
+
+fn balls(cells: u32, kind: &str, end_time: f64, more: &Value) -> Value {
+    let ball = |c: f64| {
+        let center = if kind == "circle" { json!([c, c]) } else { json!([c, c, c]) };
+        json!({"type": kind, "center": center, "radius": 0.1})
+    };
+    let shape = json!({"type": "union", "of": [ball(0.4), ball(0.6)]});
+    with(front(cells, &json!({"shape": shape, "end_time": end_time})), more)
+}
+
+fn square(size: f64, speed: f64) -> Value {
+    let shape = json!({"type": "box", "center": [0.5, 0.5], "size": [size, size]});
+    front(256, &json!({"shape": shape, "end_time": 0.3, "law": {"type": "normal", "speed": speed}}))
+}
+
+fn end(name: &'static str, norm: &'static str) -> Measure {
+    Measure::Error(Quantity::at_end(name, norm))
+}
+
+fn slope(name: &'static str, norm: &'static str) -> Measure {
+    Measure::Order { of: Quantity::at_end(name, norm), floor: 2e-15 }
+}
 
 /// All rows.
 #[must_use]
 pub fn rows() -> Rows {
-    Rows { document: "front", rows: Vec::new(), figures: Vec::new() }
+    let mut rows = Vec::new();
+    let mut row =
+        |case: String, paper: &'static str, runs: Vec<Value>, measure: Measure, reach: Reach, is_long: bool| {
+            rows.push(Row { case, paper, runs, measure, reach, is_long });
+        };
+    let quadratic = json!({"degree": 2});
+    let most = Reach::AtMost;
+    for (cells, figure) in [(128, 3e-7), (1024, 7e-11)] {
+        let case = format!("circle, quadratic, {}²: L2 of one resampling", cells + 1);
+        row(case, "–", vec![still(cells, &quadratic)], end("front", "l2"), most(figure), false);
+    }
+    let quartic = vec![still(512, &json!({}))];
+    row("circle, quartic, 513²: L2 of one resampling".into(), "–", quartic, end("front", "l2"), most(4e-13), false);
+    let circles = |more: &Value| [64, 96, 128, 192, 256, 384].map(|cells| still(cells, more)).to_vec();
+    for (name, paper, quantity, norm, more, least) in [
+        ("circle, quadratic: order of the L2 error", "4.56", "front", "l2", &quadratic, 3.7),
+        ("circle, quadratic: order of the curvature", "2.32", "curvature", "rms", &quadratic, 1.7),
+        ("circle, quartic: order of the L2 error", "–", "front", "l2", &json!({}), 5.4),
+        ("circle, quartic: order of the curvature", "–", "curvature", "rms", &json!({}), 3.6),
+    ] {
+        row(name.into(), paper, circles(more), slope(quantity, norm), Reach::AtLeast(least), false);
+    }
+    for (degree, paper, least) in [(2, "4.10", 3.7), (4, "–", 5.4)] {
+        let runs = [24, 32, 48, 64].map(|cells| still_sphere(cells, &json!({"degree": degree}))).to_vec();
+        let case = format!("sphere, degree {degree}: order of the error");
+        row(case, paper, runs, slope("front", "rms"), Reach::AtLeast(least), false);
+    }
+    let paper = json!({"degree": 2, "integrator": "tvd_rk2", "cfl": 0.95});
+    let runs = vec![translated(512, &paper)];
+    row("translation, quadratic, 513²: L2".into(), "order 2.98", runs, end("front", "l2"), most(6e-7), false);
+    let runs = vec![translated(512, &json!({}))];
+    row("translation, quartic, 513²: L2".into(), "–", runs, end("front", "l2"), most(3e-10), false);
+    let circle = json!({"type": "circle", "center": [0.5, 0.75], "radius": 0.25});
+    let paper = json!({"degree": 2, "integrator": "tvd_rk2", "cfl": 0.75});
+    let runs = vec![rotated(512, &circle, 1.0, &paper)];
+    row("rotation, quadratic, 513²: L2".into(), "order 1.87", runs, end("front", "l2"), most(5e-6), false);
+    let runs = vec![rotated(512, &circle, 1.0, &json!({"cfl": 3}))];
+    row("rotation, quartic, 513²: L2".into(), "–", runs, end("front", "l2"), most(3.5e-10), false);
+    let runs = vec![by_curvature(128, 0.05, &json!({}))];
+    row(
+        "mean curvature, circle, 129²: L2 at t = .05".into(),
+        "order 1.89",
+        runs,
+        end("front", "l2"),
+        most(5e-5),
+        false,
+    );
+    let runs = vec![by_curvature(128, 0.0805, &json!({}))];
+    row("mean curvature, circle: extinction".into(), ".08", runs, end("extinction", "absolute"), most(2e-4), false);
+    for (cells, figure, seconds) in [(256, 2e-4, 0.6), (512, 1e-5, 2.0)] {
+        let run = || vec![vortex(cells, 2.0, &json!({}))];
+        let case = |what: &str| format!("single vortex, T = 2, {}²: {what}", cells + 1);
+        row(case("deviation of the radius"), "7.05e-4", run(), end("radius", "deviation"), most(figure), false);
+        row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), false);
+        row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(seconds), false);
+    }
+    for (cells, is_long) in [(512, true), (256, true)] {
+        for cfl in [8, 10, 12, 14, 16] {
+            let run = || vec![vortex(cells, 8.0, &json!({"cfl": cfl}))];
+            let case = |what: &str| format!("single vortex, T = 8, {}², step factor {cfl}: {what}", cells + 1);
+            let mean = Reach::Within { of: 0.15, by: 3e-4 };
+            row(case("mean radius"), ".1512", run(), end("radius", "mean"), mean, is_long);
+            let reach = most(if cells == 512 { 1.2e-3 } else { 1e-3 });
+            row(case("deviation"), "3.0e-3", run(), end("radius", "deviation"), reach, is_long);
+            row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), is_long);
+            row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(9.0), is_long);
+        }
+    }
+    for (name, scene, mean, largest) in [
+        ("square inward", square(0.8, -1.0), 1e-12, 1e-12),
+        ("square outward", square(0.2, 1.0), 5e-4, 0.25 / 256.0),
+        ("two circles merge", balls(256, "circle", 0.4, &json!({})), 0.15 / 256.0, 0.15 / 256.0),
+        ("two circles cross", balls(256, "circle", 0.2, &json!({"topology": "cross"})), 2e-8, 2e-8),
+    ] {
+        let run = || vec![scene.clone()];
+        row(format!("{name}, 257²: mean distance"), "picture", run(), end("front", "mean"), most(mean), false);
+        row(format!("{name}, 257²: largest distance"), "picture", run(), end("front", "max"), most(largest), false);
+        row(format!("{name}, 257²: coverage"), "–", run(), end("front", "coverage_h"), most(1.5), false);
+    }
+    for (turns, figure, largest) in [(1.0, 2e-4, Some(0.8 / 256.0)), (10.0, 1e-3, None)] {
+        let run = || vec![rotated(256, &disk(), turns, &json!({"cfl": 20}))];
+        let case = |what: &str| format!("Zalesak disk, 257², {turns} revolution(s): {what}");
+        row(case("mean distance"), "picture", run(), end("front", "mean"), most(figure), turns > 1.0);
+        if let Some(largest) = largest {
+            row(case("largest distance"), "picture", run(), end("front", "max"), most(largest), false);
+            row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(0.4), false);
+        }
+    }
+    for (degree, figure) in [(2, 7e-6), (4, 1.5e-7)] {
+        let law = json!({"type": "flow", "flow": {"type": "translation", "velocity": [0.5, 0.5, 0.5]}});
+        let sphere = json!({"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15});
+        let run = front(80, &json!({"law": law, "shape": sphere, "end_time": 0.6, "degree": degree}));
+        let case = format!("3D translation, degree {degree}, 81³: RMS");
+        row(case, "order 3.22", vec![run], end("front", "rms"), most(figure), false);
+    }
+    for (cells, figure, seconds) in [(90, 5e-4, 6.0), (180, 3e-4, 30.0)] {
+        let run = || vec![vortex_in_space(cells)];
+        let case = |what: &str| format!("3D vortex, T = 2, {}³: {what}", cells + 1);
+        row(case("deviation"), "6.4e-3", run(), end("radius", "deviation"), most(figure), cells > 90);
+        row(case("coverage"), "–", run(), end("front", "coverage_h"), most(1.5), cells > 90);
+        row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(seconds), cells > 90);
+    }
+    for (name, more) in [("merge", json!({})), ("cross", json!({"topology": "cross"}))] {
+        let run = || vec![balls(50, "sphere", 0.125, &more)];
+        let figure = 0.15 / 50.0;
+        row(
+            format!("two spheres {name}, 51³: largest distance"),
+            "picture",
+            run(),
+            end("front", "max"),
+            most(figure),
+            false,
+        );
+        row(format!("two spheres {name}, 51³: coverage"), "–", run(), end("front", "coverage_h"), most(1.5), false);
+    }
+    Rows { document: "front", rows, figures: figures() }
+}
+
+fn figures() -> Vec<Figure> {
+    let frames = |name, title, scene, every_time, chosen: &[usize]| Figure {
+        name,
+        title,
+        plot: Plot::Frames { scene, every_time, chosen: chosen.to_vec() },
+    };
+    let radius = Quantity::at_end("radius", "deviation");
+    let quartic = |cells| vortex(cells, 8.0, &json!({}));
+    let lines = vec![("quartic, step factor 10".to_owned(), [128, 192, 256, 384, 512].map(quartic).to_vec())];
+    let histories =
+        vec![("257²".to_owned(), vortex(256, 8.0, &json!({}))), ("513²".to_owned(), vortex(512, 8.0, &json!({})))];
+    let disk = rotated(256, &disk(), 1.0, &json!({"cfl": 20}));
+    vec![
+        Figure {
+            name: "front-vortex",
+            title: "Single vortex, T = 8: deviation of the radius",
+            plot: Plot::SpeedAgainstError { quantity: radius, phases: "front/", lines },
+        },
+        Figure {
+            name: "front-count",
+            title: "Single vortex, T = 8: foot-points over time (fig. 11)",
+            plot: Plot::History { column: "foot_points", is_log: false, lines: histories, marks: Vec::new() },
+        },
+        frames(
+            "front-spiral",
+            "Single vortex, T = 8, 513² (fig. 12)",
+            vortex(512, 8.0, &json!({})),
+            2.0,
+            &[0, 1, 2, 4],
+        ),
+        frames("front-merge", "Two circles merge (fig. 16)", balls(256, "circle", 0.4, &json!({})), 0.1, &[0, 1, 2, 4]),
+        frames("front-square", "Square inward (fig. 14)", square(0.8, -1.0), 0.1, &[0, 1, 2, 3]),
+        frames("front-zalesak", "Zalesak's disk, one revolution (fig. 7)", disk, PI / 2.0, &[0, 1, 2]),
+    ]
 }
 
 /// Short scenes by which a machine is measured.
 pub(super) fn calibration() -> Vec<Value> {
-    vec![json!({"kind": "front"})]
+    vec![
+        front(128, &json!({"end_time": 0.2})),
+        by_curvature(32, 0.02, &json!({})),
+        rotated(128, &disk(), 1.0, &json!({"cfl": 2})),
+        balls(40, "sphere", 0.1, &json!({})),
+        with(still_sphere(40, &json!({})), &json!({"end_time": 0.1})),
+        still_sphere(20, &json!({"law": "mean_curvature", "end_time": 0.01, "time_step": 0.001})),
+        still(64, &json!({"degree": 2, "end_time": 0.2})),
+    ]
 }

@@ -75,6 +75,8 @@ impl FrontErrors {
     }
 }
 
+/// Spacing of the lattice from which points of an exact surface come, by that of the front.
+const SAMPLE: f64 = 0.53;
 /// Points of the exact curve per spacing.
 const POINTS_PER_SPACING: f64 = 20.0;
 
@@ -129,7 +131,7 @@ impl<const D: usize> ExactFrontMotion<D> {
         let distances: Vec<f64> = if let Some(ball) = &ball {
             chains = ball.outline(spacing / POINTS_PER_SPACING);
             if chains.is_empty() {
-                for_each_near(ball, 0.7 * spacing, grid, |_, x| loose.push(ball.nearest(&x).point));
+                sample(ball, grid, |x| loose.push(x));
             }
             feet.positions.iter().map(|x| (x - ball.center).norm() - ball.radius).collect()
         } else {
@@ -138,9 +140,7 @@ impl<const D: usize> ExactFrontMotion<D> {
                     let Some(front) = motion.front(time, spacing, interrupt)? else { return Ok(None) };
                     chains = front.chains(spacing / POINTS_PER_SPACING);
                     if let (true, Some(surface)) = (chains.is_empty(), motion.surface()) {
-                        for_each_near(surface, 0.7 * spacing, grid, |_, x| {
-                            loose.extend(front.place_by_formula(&surface.nearest(&x).point));
-                        });
+                        sample(surface, grid, |x| loose.extend(front.place_by_formula(&x)));
                     }
                     feet.positions.par_iter().map(|x| front.signed_distance(x)).collect()
                 }
@@ -219,7 +219,13 @@ fn offset_distance<const D: usize>(
     }
 }
 
-/// Points of that front: grid points near it, moved along the ray from the start that passes through them.
+/// Points of a surface about half a spacing apart, from a lattice of its own: that of the foot-points would find these again.
+fn sample<const D: usize>(surface: &dyn Surface<D>, grid: &Grid, mut visit: impl FnMut(Vector<D>)) {
+    let fine = Grid { spacing: SAMPLE * grid.spacing };
+    for_each_near(surface, 0.5 * fine.spacing * (D as f64).sqrt(), &fine, |_, x| visit(surface.nearest(&x).point));
+}
+
+/// Points of that front: points of a lattice near it, moved along the ray from the start that passes through them.
 fn offset_points<const D: usize>(
     surfaces: &[Box<dyn Surface<D>>],
     topology: Topology,
@@ -227,10 +233,11 @@ fn offset_points<const D: usize>(
     way: f64,
 ) -> Vec<Vector<D>> {
     let mut points = Vec::new();
+    let fine = Grid { spacing: SAMPLE * grid.spacing };
     for surface in surfaces {
-        for_each_near(surface.as_ref(), way.abs() + grid.spacing, grid, |_, x| {
+        for_each_near(surface.as_ref(), way.abs() + fine.spacing, &fine, |_, x| {
             let exact = surface.nearest(&x);
-            if (exact.distance - way).abs() > 0.7 * grid.spacing || exact.distance == 0.0 {
+            if (exact.distance - way).abs() > fine.spacing || exact.distance == 0.0 {
                 return;
             }
             let point = exact.point + (x - exact.point) * (way / exact.distance);

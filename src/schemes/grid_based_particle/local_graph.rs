@@ -12,6 +12,8 @@ const MOST_TERMS: usize = 15;
 const MOST_ITERATIONS: usize = 30;
 /// The longest of them.
 const LONGEST_STEP: f64 = 0.5;
+/// The largest condition of a fit, its columns scaled: points spread evenly have 10 to 100.
+const WORST_CONDITION: f64 = 1e3;
 /// A step that changes nothing.
 const STILL: f64 = 1e-15;
 /// The last step of an answer that counts as found.
@@ -67,7 +69,7 @@ impl<const M: usize> Terms<M> {
             room.set_row(j, &row[..n], root * z);
         }
         let (found, solution) = room.solve();
-        if found.rank < n {
+        if found.rank < n || found.condition > WORST_CONDITION {
             return None;
         }
         let mut coefficients = [0.0; MOST_TERMS];

@@ -32,6 +32,8 @@ const FARTHEST: f64 = 6.0;
 pub enum Failure {
     /// Too few particles of one segment are near.
     Starved,
+    /// The particles near do not determine a polynomial.
+    Undetermined,
     /// The closest point lies beyond the particles.
     Extrapolated,
     /// The front turns too sharply for the spacing.
@@ -123,12 +125,12 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
     }
 
     /// Particles of the segment of a base, nearest first, each some way from those taken before.
-    fn choose(&self, base: usize, room: &mut Room<D, M>) {
+    fn choose(&self, base: usize, number: usize, room: &mut Room<D, M>) {
         let least = (self.method.min_separation * self.spacing).powi(2);
         room.chosen.clear();
         room.chosen.push(base);
         for near in &room.near {
-            if room.chosen.len() >= self.method.neighbors {
+            if room.chosen.len() >= number {
                 return;
             }
             let x = &self.feet.positions[near.index];
@@ -139,6 +141,8 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
     }
 
+    /// The closest point of one segment: with more particles where those taken do not determine the polynomial well, as on
+    /// two rows of a lattice.
     fn of_segment(
         &self,
         p: &Vector<D>,
@@ -146,9 +150,27 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         reach: &mut f64,
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
+        let mut number = self.method.neighbors;
         loop {
-            self.choose(base, room);
-            if room.chosen.len() >= self.method.neighbors || *reach * GROWTH > FARTHEST {
+            let found = self.with_particles(p, base, number, reach, room);
+            if found != Err(Failure::Undetermined) || number > 2 * self.method.neighbors {
+                return found;
+            }
+            number += self.method.neighbors.div_ceil(2);
+        }
+    }
+
+    fn with_particles(
+        &self,
+        p: &Vector<D>,
+        base: usize,
+        number: usize,
+        reach: &mut f64,
+        room: &mut Room<D, M>,
+    ) -> Result<FootPoint<D>, Failure> {
+        loop {
+            self.choose(base, number, room);
+            if room.chosen.len() >= number || *reach * GROWTH > FARTHEST {
                 break;
             }
             *reach *= GROWTH;
@@ -162,7 +184,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let mut first = Err(Failure::Unresolved);
         if straightest > TURNED {
             first = self.fit(p, base, &normals[base], self.terms, room);
-            if first.is_ok() {
+            if first.is_ok() || first == Err(Failure::Undetermined) {
                 return first;
             }
         }
@@ -190,7 +212,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         };
         room.points.clear();
         room.points.extend(room.chosen.iter().map(|j| local(&self.feet.positions[*j])));
-        let graph = terms.fit(&room.points, self.method.weight, &mut room.squares).ok_or(Failure::Starved)?;
+        let graph = terms.fit(&room.points, self.method.weight, &mut room.squares).ok_or(Failure::Undetermined)?;
         let (across, height) = local(p);
         let start = inside(&across, &room.points);
         let (s, jet) = graph.closest(&across, height, start).ok_or(Failure::Unresolved)?;

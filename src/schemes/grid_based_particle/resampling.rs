@@ -18,8 +18,9 @@ use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, P
 const ALONG: f64 = 1.4;
 /// How much farther than γ across the front, in spacings: for the bend of the front.
 const MARGIN: f64 = 0.35;
-/// A moved particle with a new foot-point of its segment within so many spacings needs not stay.
-const COVERED: f64 = 0.55;
+/// A moved particle with a new foot-point of its segment within so many spacings needs not stay: half the largest distance between
+/// neighbours, on a curve and on a surface. Less would keep particles that nothing misses, which distort reconstructions.
+const COVERED: [f64; 2] = [0.55, 1.0];
 
 /// How many particles were removed, and why; and what was done to keep the front whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -145,7 +146,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                         self.fresh.push(*node, foot);
                     }
                 }
-                Err(Failure::Starved) => self.removals.starved += 1,
+                Err(Failure::Starved | Failure::Undetermined) => self.removals.starved += 1,
                 Err(Failure::Extrapolated) => self.removals.extrapolated += 1,
                 Err(Failure::Unresolved) => self.removals.unresolved += 1,
             }
@@ -155,9 +156,9 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// Moved particles without a new foot-point of their segment close by stay as they are.
     fn keep_unreplaced(&mut self) {
         let grid = self.parts.grid;
-        let reach = COVERED * grid.spacing;
         self.fresh_cells.rebuild(self.fresh.positions.iter().copied(), grid.spacing);
         let order = self.fresh_cells.order();
+        let reach = COVERED[M - 1] * grid.spacing;
         for i in 0..self.feet.len() {
             let foot = self.feet.get(i);
             let is_replaced = self.fresh_cells.any_within(&foot.position, reach, |place| {

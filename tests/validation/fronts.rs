@@ -1,0 +1,119 @@
+//! Fronts by grid-based particles against exact motions, with coverage beside every error, and the hard cases that must neither
+//! panic nor leave stray particles.
+
+use crate::support::{build, error, run};
+use meniscus::simulation::{FieldValues, OutputPlan, Simulation};
+use serde_json::{Value, json};
+
+fn front(more: &Value) -> Value {
+    let mut body = json!({"kind": "front", "spacing": 1.0 / 128.0});
+    body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    body
+}
+
+fn balls(kind: &str) -> Value {
+    let ball = |c: f64| {
+        let center = if kind == "circle" { json!([c, c]) } else { json!([c, c, c]) };
+        json!({"type": kind, "center": center, "radius": 0.1})
+    };
+    json!({"type": "union", "of": [ball(0.4), ball(0.6)]})
+}
+
+fn at_end(body: &Value) -> Box<dyn Simulation> {
+    let mut simulation = build(body, OutputPlan { every_time: None, series_every_steps: 1000 });
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+    }
+    simulation
+}
+
+/// Rows of GBPM 4.4: straight sides are exact to round-off until they meet; merged circles leave nothing inside.
+#[test]
+fn fronts_of_given_speed_merge_cross_and_keep_corners() {
+    let square = |size: f64| json!({"type": "box", "center": [0.5, 0.5], "size": [size, size]});
+    let inward = json!({"shape": square(0.8), "law": {"type": "normal", "speed": -1}, "end_time": 0.3});
+    for (more, largest) in [
+        (inward, 1e-12),
+        (json!({"shape": square(0.2), "end_time": 0.3}), 0.25 / 128.0),
+        (json!({"shape": balls("circle"), "end_time": 0.4}), 0.15 / 128.0),
+        (json!({"shape": balls("circle"), "end_time": 0.2, "topology": "cross"}), 2e-6),
+        (json!({"shape": balls("sphere"), "end_time": 0.125, "spacing": 0.02}), 0.15 * 0.02),
+        (json!({"shape": balls("sphere"), "end_time": 0.125, "spacing": 0.02, "topology": "cross"}), 0.15 * 0.02),
+    ] {
+        let report = run(&front(&more));
+        let (far, coverage) = (error(&report, "front", "max", None), error(&report, "front", "coverage_h", None));
+        assert!(far <= largest, "{more}: {far:e}");
+        assert!(coverage <= 1.0, "{more}: coverage {coverage}");
+    }
+}
+
+/// The rows' bounds for 257², at 129² by what order 4 makes of it; and no gap.
+#[test]
+fn the_vortex_that_turns_back_is_closed_and_round() {
+    let flow = json!({"type": "single_vortex", "period": 2});
+    let report = run(&json!({"kind": "vortex", "spacing": 1.0 / 128.0, "flow": flow, "end_time": 2, "method": "gbpm"}));
+    assert!(error(&report, "radius", "deviation", None) < 3e-4);
+    assert!(error(&report, "front", "gap_h", None) < 1.5);
+    let sphere = json!({"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15});
+    let report = run(&json!({
+        "kind": "vortex", "spacing": 1.0 / 50.0, "flow": "vortex_3d", "end_time": 2, "method": "gbpm", "shape": sphere
+    }));
+    assert!(error(&report, "front", "max", None) < 0.02, "a stray sheet");
+    assert!(error(&report, "front", "coverage_h", None) < 1.5);
+}
+
+/// r² = R² − 2 (D − 1) t, down to the last cell: within a few h² of the time, and the front is gone.
+#[test]
+fn balls_shrink_by_their_curvature_until_they_vanish() {
+    for (shape, spacing, extinction) in [
+        (json!({"type": "circle", "center": [0.5, 0.5], "radius": 0.25}), 1.0 / 64.0, 0.03125),
+        (json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25}), 1.0 / 24.0, 0.015625),
+    ] {
+        let body = front(&json!({
+            "shape": shape, "spacing": spacing, "law": "mean_curvature", "end_time": 1.3 * extinction
+        }));
+        let mut simulation = at_end(&body);
+        assert_eq!(simulation.particle_count(), 0, "{body}");
+        let findings = simulation.take_findings();
+        assert!(findings.iter().any(|finding| finding.name == "front_vanished"), "{findings:?}");
+        let report = simulation.report();
+        let off = error(&report, "extinction", "absolute", None);
+        assert!(off < 2.0 * spacing * spacing, "{body}: {off:e}");
+    }
+}
+
+/// A thin filament below the grid, a corner that collapses to a point, circles that touch, a front that leaves any box.
+#[test]
+fn hard_cases_neither_panic_nor_leave_stray_particles() {
+    let filament = json!({"kind": "vortex", "spacing": 1.0 / 128.0, "end_time": 8, "method": "gbpm"});
+    let report = run(&filament);
+    assert!(error(&report, "front", "max", None) < 4.0 / 128.0, "stray particles");
+    let thin = json!({"type": "box", "center": [0.5, 0.5], "size": [0.6, 0.06]});
+    let mut collapsed =
+        at_end(&front(&json!({"shape": thin, "law": {"type": "normal", "speed": -1}, "end_time": 0.06})));
+    assert_eq!(collapsed.particle_count(), 0);
+    assert!(collapsed.take_findings().iter().any(|finding| finding.message.contains("swept")));
+    let circle = |x: f64| json!({"type": "circle", "center": [x, 0.5], "radius": 0.1});
+    let touching = json!({"type": "union", "of": [circle(0.4), circle(0.6 + 1e-9)]});
+    let report = run(&front(&json!({"shape": touching, "end_time": 0.05})));
+    assert!(error(&report, "front", "max", None) < 0.25 / 128.0);
+    let far = json!({"type": "flow", "flow": {"type": "translation", "velocity": [3e5, 0]}});
+    let gone = at_end(&front(&json!({"law": far, "end_time": 0.1, "time_step": 0.05})));
+    let report = gone.report();
+    assert!(gone.particle_count() == 0 && report.rescued_fits["particles.outside"] > 0, "{:?}", report.rescued_fits);
+}
+
+/// Every foot-point is within γ of its own grid point, and no grid point has two.
+#[test]
+fn foot_points_and_grid_points_are_one_to_one() {
+    let simulation = at_end(&front(&json!({"end_time": 0.1})));
+    let fields = simulation.fields();
+    let column = fields.columns.iter().find(|column| column.name == "grid_point").unwrap();
+    let FieldValues::Vector(nodes) = &column.values else { panic!("a vector") };
+    let mut seen = std::collections::BTreeSet::new();
+    for (y, p) in fields.points.iter().zip(nodes) {
+        let distance = (0..3).map(|d| (y[d] - p[d]).powi(2)).sum::<f64>().sqrt();
+        assert!(distance <= 1.1 / 128.0 * (1.0 + 1e-12));
+        assert!(seen.insert(p.map(f64::to_bits)), "twice: {p:?}");
+    }
+}
