@@ -43,8 +43,8 @@ impl<const D: usize> Problem<D> for Pointwise {
         vec![("value", value), ("field", self.field.clone()), ("reference", self.reference.clone())]
     }
 
-    fn watched(&self) -> &[f64] {
-        &self.value
+    fn watched(&self) -> Vec<(&'static str, &[f64])> {
+        vec![("value", &self.value)]
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
