@@ -1,9 +1,9 @@
 //! Bodies of `surface_pde`, and how its runs fail.
 
 use super::PLAN;
-use super::support::{build, pool, scene};
+use super::support::{build, error, pool, run, scene};
 use meniscus::parallel::Interrupt;
-use meniscus::scene::{BuildContext, Clouds};
+use meniscus::scene::{BuildContext, CloudSizes, Clouds};
 use meniscus::simulation::CpuClock;
 use serde_json::{Value, json};
 
@@ -95,4 +95,61 @@ fn a_flat_bump_is_sown_too() {
     let fields = simulation.fields();
     let second = fields.columns.iter().find(|column| column.name == "second_value").unwrap();
     assert!(format!("{:?}", second.values).contains("0.2"), "nothing is sown");
+}
+
+/// Second differences of so many points round off to more than the solvers' tolerance, whichever solves.
+#[test]
+fn poisson_on_a_fine_circle_is_solved_up_to_rounding() {
+    for condition in ["dirichlet", "zero_mean"] {
+        for solver in ["bicgstab", "gmres", "sparse_lu"] {
+            let problem = json!({"type": "poisson", "condition": condition, "field": {"type": "sin_plus_cos", "m": 2}});
+            let body = json!({
+                "kind": "surface_pde", "surface": "circle", "count": 30_000, "problem": problem, "solver": solver
+            });
+            let found = error(&run(&body), "value", "relative", None);
+            // Rounding by the condition number (N/2)².
+            assert!(found < 1e-6, "{condition}, {solver}: {found:e}");
+        }
+    }
+}
+
+#[test]
+fn what_is_not_given_follows_from_what_is() {
+    let chosen = |body: &Value, place: &str| scene(body).resolved().pointer(place).and_then(Value::as_f64);
+    for (order, cutoff) in [(2, 3.5), (4, 4.0), (6, 4.5)] {
+        let method = json!({"type": "surface_dcpse", "order": order});
+        let body = json!({"kind": "surface_pde", "sampling": "random_raw", "method": method});
+        assert_eq!(chosen(&body, "/method/cutoff_dn"), Some(cutoff));
+    }
+    let copies = json!({"type": "surface_dcpse", "form": "copies"});
+    let circle = json!({"type": "circle", "radius": 2});
+    let body = json!({"kind": "surface_pde", "surface": circle, "count": 401, "method": copies});
+    assert_eq!(chosen(&body, "/method/normal_spacing"), Some(0.015));
+    for (order, cutoff) in [(2, 3.5), (4, 5.5)] {
+        let body = json!({"kind": "droplet", "discretization": {"type": "dcpse", "order": order}});
+        assert_eq!(chosen(&body, "/discretization/cutoff_h"), Some(cutoff));
+    }
+}
+
+#[test]
+fn memory_is_estimated_as_measured() {
+    let memory = |body: &Value| scene(body).estimate(&CloudSizes::new()).memory_bytes as f64;
+    for (spacing, measured) in [(0.01, 375e6), (0.007, 775e6)] {
+        let method = json!({"type": "closest_point", "spacing": spacing});
+        let estimated = memory(&json!({"kind": "surface_pde", "count": 2000, "method": method}));
+        assert!((estimated / measured - 1.0).abs() < 0.1, "{spacing}: {estimated:e} for {measured:e}");
+    }
+    let poisson = |restart: u64| {
+        let solver = json!({"type": "gmres", "restart": restart});
+        memory(&json!({"kind": "surface_pde", "problem": "poisson", "solver": solver}))
+    };
+    assert!((poisson(160) - poisson(60) - 100.0 * 4000.0 * 8.0).abs() < 10.0);
+}
+
+#[test]
+fn supports_that_see_a_bend_are_counted() {
+    let coarse =
+        |count: u64| run(&json!({"kind": "surface_pde", "count": count})).rescued_fits.get("supports.coarse").copied();
+    // |κ| r_c is 2 · 2.4 √(4π/N).
+    assert_eq!((coarse(400), coarse(4000)), (Some(400), None));
 }

@@ -258,7 +258,7 @@ mod tests {
         // Of few points of a high bump most are more than were asked for: the lattice has four cells a side at least.
         for (height, count) in [(0.0, 18_400), (1.0, 18_400), (2.0, 18_400), (10.0, 18_400), (10.0, 60), (0.0, 20)] {
             let shape = Shape::Bump(Bump { height });
-            let cloud = in_space(&shape, count, Sampling::Regular, 1, 0.09, &Interrupt::default());
+            let cloud = in_space(&shape, count, Sampling::Regular, 1, shape.spacing(count), &Interrupt::default());
             if count > 100 {
                 assert!((18_000..18_800).contains(&cloud.rows), "α = {height}: {}", cloud.rows);
             }
