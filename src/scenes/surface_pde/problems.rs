@@ -223,8 +223,9 @@ impl ProblemChoice {
     /// How its systems of equations are solved, where it has any.
     pub fn solver(&self) -> Option<Solver> {
         match self {
-            Self::Poisson { solver, .. } => Some(*solver),
-            Self::Evolution { integrator: EvolutionIntegrator::Bdf2(solver), .. } => Some(*solver),
+            Self::Poisson { solver, .. } | Self::Evolution { integrator: EvolutionIntegrator::Bdf2(solver), .. } => {
+                Some(*solver)
+            }
             _ => None,
         }
     }

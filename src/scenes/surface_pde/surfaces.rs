@@ -263,7 +263,9 @@ mod tests {
                 assert!((18_000..18_800).contains(&cloud.rows), "α = {height}: {}", cloud.rows);
             }
             let estimated = shape.points(count) as f64;
-            assert!((estimated / cloud.rows as f64 - 1.0).abs() < 0.05, "α = {height}: {estimated} for {}", cloud.rows);
+            // Of a lattice of four cells a side the circle that is left out takes nodes by ones.
+            let off = (estimated - cloud.rows as f64).abs();
+            assert!(off < 2.5 + 0.02 * estimated, "α = {height}: {estimated} for {}", cloud.rows);
             assert_eq!(cloud.probes.len(), 2);
             assert!(cloud.points.len() > cloud.rows && cloud.source.len() == cloud.points.len());
         }

@@ -24,7 +24,7 @@ pub enum Solver {
 #[derive(Debug)]
 pub(super) enum Factors {
     Incomplete(IncompleteFactors),
-    Complete(SparseLu),
+    Complete(Box<SparseLu>),
 }
 
 /// Vectors of solutions, to be used again.
@@ -42,7 +42,9 @@ impl Solver {
     /// Factors of A; a direct solver's are those of A + α 1 1ᵀ/n.
     pub(super) fn factors(&self, rows: &SparseRows, alpha: Option<f64>) -> Result<Factors, String> {
         match self {
-            Self::SparseLu => SparseLu::of(rows, alpha).map(Factors::Complete).map_err(|failed| failed.to_string()),
+            Self::SparseLu => {
+                SparseLu::of(rows, alpha).map(|lu| Factors::Complete(Box::new(lu))).map_err(|failed| failed.to_string())
+            }
             _ => IncompleteFactors::of(rows).map(Factors::Incomplete).map_err(|failed| failed.to_string()),
         }
     }
