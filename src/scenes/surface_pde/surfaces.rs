@@ -261,12 +261,13 @@ mod tests {
             let cloud = in_space(&shape, count, Sampling::Regular, 1, shape.spacing(count), &Interrupt::default());
             if count > 100 {
                 assert!((18_000..18_800).contains(&cloud.rows), "α = {height}: {}", cloud.rows);
+                // Of a few points both probes may ask for the place of one.
+                assert_eq!(cloud.probes.len(), 2);
             }
             let estimated = shape.points(count) as f64;
             // Of a lattice of four cells a side the circle that is left out takes nodes by ones.
             let off = (estimated - cloud.rows as f64).abs();
             assert!(off < 2.5 + 0.02 * estimated, "α = {height}: {estimated} for {}", cloud.rows);
-            assert_eq!(cloud.probes.len(), 2);
             assert!(cloud.points.len() > cloud.rows && cloud.source.len() == cloud.points.len());
         }
     }
