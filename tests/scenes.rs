@@ -5,6 +5,8 @@
 #[path = "support/mod.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
+#[path = "scenes/surfaces.rs"]
+mod surfaces;
 
 use meniscus::parallel::Interrupt;
 use meniscus::scene::schema::{Default, Kind, Parameter};
@@ -71,7 +73,7 @@ fn bodies() -> Vec<Value> {
         "kind": "droplet", "dimension": 3, "case": "static", "spacing": 0.16, "steps": 3, "end_time": 2e-3,
         "shape": {"type": "sphere", "radius": 0.7}, "discretization": {"type": "dcpse", "order": 4, "cutoff_h": 4}
     }));
-    bodies.extend(surface_bodies());
+    bodies.extend(surfaces::bodies());
     bodies.extend(front_bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
@@ -107,42 +109,6 @@ fn front_bodies() -> Vec<Value> {
             "method": {"type": "gbpm", "degree": 3, "tube_radius_h": 1.4}, "integrator": "dopri5"
         }),
         json!({"kind": "vortex", "spacing": 0.03, "method": {"type": "gbpm", "cfl": 6}, "end_time": 3}),
-    ]
-}
-
-/// Every problem, form, surface, sampling, solver and integrator of `surface_pde` once.
-fn surface_bodies() -> Vec<Value> {
-    let dopri5 = json!({"type": "dopri5", "tolerance": 1e-6});
-    let scene = |more: Value| {
-        let mut body = json!({"kind": "surface_pde", "count": 400});
-        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        body
-    };
-    let evolving = |more: Value| {
-        let mut problem = json!({"type": "diffusion", "end_time": 0.02, "time_step": 0.005});
-        problem.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        problem
-    };
-    vec![
-        scene(json!({"repeat": 3, "method": {"type": "surface_dcpse", "form": "copies"}, "sampling": "random"})),
-        scene(json!({"repeat": 3, "method": {"type": "closest_point", "order": 4}, "surface": {"type": "torus"}})),
-        scene(json!({"repeat": 3, "surface": "circle", "method": {"type": "surface_dcpse", "form": "copies"}})),
-        scene(
-            json!({"problem": {"type": "poisson", "condition": "dirichlet"}, "solver": "gmres", "sampling": "random"}),
-        ),
-        scene(json!({"problem": "poisson", "method": {"type": "surface_dcpse", "order": 4}})),
-        scene(json!({"problem": "poisson", "solver": "sparse_lu", "surface": "torus", "normals": "perturbed"})),
-        scene(json!({"problem": "curvature", "surface": "ellipsoid"})),
-        scene(json!({"problem": "curvature", "surface": "circle", "normals": "estimated"})),
-        scene(json!({"problem": evolving(json!({}))})),
-        scene(json!({"problem": evolving(json!({"integrator": "bdf2"}))})),
-        scene(json!({"problem": evolving(json!({"integrator": dopri5})), "surface": {"type": "bump"}, "count": 1500})),
-        scene(json!({"problem": {
-            "type": "reaction_diffusion", "end_time": 0.4, "time_step": 0.1, "tolerance": 1e-6, "manufactured": "plane_wave"
-        }})),
-        scene(
-            json!({"problem": {"type": "reaction_diffusion", "model": "gray_scott", "end_time": 0.4, "time_step": 0.1}}),
-        ),
     ]
 }
 
@@ -296,9 +262,22 @@ fn declared_defaults_are_valid() {
     }
 }
 
-/// A restart takes its scene from what was resolved before: the same must come out again.
+/// A worker, and a restart, take their scene from what was resolved before: the same must come out again, and do the same.
 #[test]
 fn what_is_resolved_resolves_to_itself() {
+    for body in bodies() {
+        pool(2).install(|| {
+            let [mut written, mut resolved] = [&body, &scene(&body).resolved()].map(|body| build(body, PLAN));
+            for _ in 0..3 {
+                assert_eq!(resolved.is_finished(), written.is_finished(), "{body}");
+                if !written.is_finished() {
+                    written.step().unwrap();
+                    resolved.step().unwrap();
+                }
+                assert_same(&resolved.state(), &written.state(), &format!("as resolved, {body}"));
+            }
+        });
+    }
     let mut bodies = bodies();
     bodies.push(json!({"kind": "vortex", "preset": "paper"}));
     bodies.push(json!({"kind": "redistance", "preset": "paper", "dimension": 3}));
@@ -382,6 +361,14 @@ fn nonsense_is_refused_at_its_place() {
             json!({"kind": "surface_pde", "problem": {"type": "laplace_beltrami", "field": {"type": "plane_wave", "k": [1, 2]}}}),
             "/problem/field/k",
         ),
+        (
+            json!({"kind": "surface_pde", "surface": "circle", "count": 99, "problem": {"type": "poisson", "field": {"type": "sin_plus_cos", "m": 50}}}),
+            "/problem/field/m",
+        ),
+        (json!({"kind": "surface_pde", "surface": {"type": "bump", "height": 10.1}}), "/surface/height"),
+        (json!({"kind": "surface_pde", "surface": {"type": "sphere", "radius": 1e-60}}), "/surface"),
+        (json!({"kind": "surface_pde", "solver": {"type": "bicgstab", "tolerance": 1e-9}}), "/solver"),
+        (json!({"kind": "surface_pde", "problem": "diffusion", "solver": "sparse_lu"}), "/solver"),
     ] {
         let found = meniscus::scene::understand(&body, SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == place), "{body}: {found:?}");

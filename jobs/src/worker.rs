@@ -129,13 +129,15 @@ fn attempt(
             interrupt: control.interrupt().clone(),
             cpu_clock: CpuClock(process::cpu_seconds),
         };
-        let mut simulation = scene.build(context).map_err(|found| {
-            let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
-            Failure::Known(Reason::InputDamaged, cause)
-        })?;
+        let built = scene.build(context);
+        // What was dropped on the way says nothing of the input.
         if control.interrupt().is_raised() {
             return Err(Failure::Canceled);
         }
+        let mut simulation = built.map_err(|found| {
+            let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
+            Failure::Known(Reason::InputDamaged, cause)
+        })?;
         let start = restore(order, simulation.as_mut(), sink, log)?;
         progress.continue_phases(start.counters.phases.clone());
         let mut observers = prepare(order, directory, &wishes, control, sink, &start, progress)?;

@@ -16,6 +16,8 @@ pub trait LinearMap: Sync {
     fn size(&self) -> usize;
     /// out = A x.
     fn apply(&self, x: &[f64], out: &mut [f64]);
+    /// ‖A‖∞, or a bound of it.
+    fn largest_row(&self) -> f64;
     /// Whether somebody asks to give the solution up.
     fn is_given_up(&self) -> bool {
         false
@@ -39,6 +41,10 @@ impl LinearMap for Interruptible<'_> {
         self.map.apply(x, out);
     }
 
+    fn largest_row(&self) -> f64 {
+        self.map.largest_row()
+    }
+
     fn is_given_up(&self) -> bool {
         self.interrupt.is_raised()
     }
@@ -51,6 +57,10 @@ impl LinearMap for SparseRows {
 
     fn apply(&self, x: &[f64], out: &mut [f64]) {
         Self::apply(self, x, out);
+    }
+
+    fn largest_row(&self) -> f64 {
+        Self::largest_row(self)
     }
 }
 
@@ -73,6 +83,10 @@ impl LinearMap for WithMean<'_> {
         let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
         out.iter_mut().for_each(|value| *value += self.alpha * mean);
     }
+
+    fn largest_row(&self) -> f64 {
+        self.rows.largest_row() + self.alpha.abs()
+    }
 }
 
 /// When to stop.
@@ -91,13 +105,28 @@ pub struct Convergence {
     pub iterations: u64,
     /// ‖b − A x‖ by ‖b‖ at the end, computed anew.
     pub residual: f64,
+    /// The residual that the rounding of x and of A x leaves, whatever the solver.
+    pub floor: f64,
 }
 
+/// Residuals by ε ‖A‖∞ ‖x‖/‖b‖ that are rounding: direct and iterative solutions on lines and circles of 20,000 and 30,000 points come
+/// to rest at 0.2 to 0.6 of it; one that only the recurrence took for done was 1,000 away.
+const ROUNDING: f64 = 4.0;
+/// A true residual above this share of the one a start before stagnates.
+const STAGNATION: f64 = 0.5;
+
 impl Convergence {
-    /// Whether the goal was reached, up to the rounding between the residual of the recurrence and the true one.
+    /// Whether the goal was reached, up to the rounding between the residual of the recurrence and the true one, and up to what
+    /// no solver reaches: the residual cannot fall below the rounding of A x.
     #[must_use]
     pub fn is_within(&self, stopping: Stopping) -> bool {
-        self.residual <= 10.0 * stopping.tolerance
+        self.residual <= 10.0 * stopping.tolerance + self.floor
+    }
+
+    /// Whether another start from the true residual, where the recurrence has come to its goal, is of no use any more.
+    fn is_final(&self, stopping: Stopping, last: &mut f64) -> bool {
+        let is_better = self.residual <= STAGNATION * std::mem::replace(last, self.residual);
+        self.is_within(stopping) || !is_better
     }
 
     /// Of a solution: its residual anew, with room for a vector.
@@ -106,8 +135,12 @@ impl Convergence {
         room.resize(b.len(), 0.0);
         map.apply(x, room);
         room.iter_mut().zip(b).for_each(|(a, b)| *a = b - *a);
-        let size = norm(b);
-        Self { iterations, residual: if size > 0.0 { norm(room) / size } else { norm(room) } }
+        let by = match norm(b) {
+            size if size > 0.0 => 1.0 / size,
+            _ => 1.0,
+        };
+        let floor = ROUNDING * f64::EPSILON * map.largest_row() * norm(x) * by;
+        Self { iterations, residual: norm(room) * by, floor }
     }
 }
 
@@ -176,6 +209,36 @@ mod tests {
         assert!(found.residual < 1e-10, "{found:?}");
         assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-7));
         assert_eq!(map.size(), 200);
+    }
+
+    /// Second differences of a line: the rounding of a solution leaves a residual far above the tolerance, which is not the
+    /// solver's fault.
+    #[test]
+    fn what_rounding_leaves_is_no_failure() {
+        let n = 20_000;
+        let size = (n as f64).powi(2);
+        let mut a = SparseRows::default();
+        for i in 0..n {
+            let columns: Vec<u32> = (i.max(1) - 1..(i + 2).min(n)).map(|j| j as u32).collect();
+            let weights: Vec<f64> = columns.iter().map(|j| if *j as usize == i { -2.0 * size } else { size }).collect();
+            a.push_row(&columns, &weights);
+        }
+        let b: Vec<f64> = (0..n).map(|i| (std::f64::consts::PI * i as f64 / n as f64).sin()).collect();
+        let factors = IncompleteFactors::of(&a).unwrap();
+        for tolerance in [1e-10, 1e-14] {
+            let stopping = Stopping { tolerance, most_iterations: 500 };
+            let mut x = vec![0.0; n];
+            let found = bicgstab::solve(&a, &factors, &b, &mut x, stopping, &mut bicgstab::Storage::default());
+            assert!(found.residual > 10.0 * tolerance && found.is_within(stopping), "{found:?}");
+            assert!(found.iterations < 20, "{found:?}");
+            let mut x = vec![0.0; n];
+            let found = gmres::solve(&a, &factors, &b, &mut x, 40, stopping, &mut gmres::Storage::default());
+            assert!(found.residual > 10.0 * tolerance && found.is_within(stopping), "{found:?}");
+            assert!(found.iterations < 20, "{found:?}");
+        }
+        // What is wrong is not taken for rounding.
+        let wrong = super::Convergence::of(&a, &b, &vec![0.0; n], 0, &mut Vec::new());
+        assert!(!wrong.is_within(STOPPING), "{wrong:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A linear operator as sparse rows: each point its neighbours and their weights (compressed sparse rows).
 
-use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
+use rayon::prelude::{IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
 /// Rows of (column, weight); compressed.
 #[derive(Debug, Clone)]
@@ -101,6 +101,14 @@ impl SparseRows {
         }
     }
 
+    /// max_i Σ_j |w_ij|.
+    #[must_use]
+    pub fn largest_row(&self) -> f64 {
+        let sum = |i: usize| self.row(i).1.iter().map(|weight| weight.abs()).sum::<f64>();
+        // A maximum does not depend on the order.
+        (0..self.rows()).into_par_iter().with_min_len(ROWS).map(sum).reduce(|| 0.0, f64::max)
+    }
+
     /// out_i = Σ_j w_ij f_j, each sum in the order of its row.
     pub fn apply(&self, field: &[f64], out: &mut [f64]) {
         out.par_iter_mut().with_min_len(ROWS).enumerate().for_each(|(i, out)| {
@@ -126,6 +134,7 @@ mod tests {
         let mut out = [7.0; 3];
         operator.apply(&[1.0, 2.0, 3.0], &mut out);
         assert_eq!((out, operator.rows(), operator.entries()), ([-5.0, 0.0, 6.0], 3, 3));
+        assert!((operator.largest_row() - 3.0).abs() < f64::EPSILON);
     }
 
     #[test]

@@ -154,6 +154,23 @@ mod tests {
         }
     }
 
+    /// Nine points in three rows: x³ is 3 x there about any of them, so that slopes are not known, but ∂xx + ∂yy is. A metric of fitted
+    /// heights has no slopes to be made of; exact normals need none.
+    #[test]
+    fn heights_that_cannot_be_fitted_make_no_row() {
+        let points: Vec<_> = (0..9).map(|k| Vector::<3>::new(f64::from(k % 3), f64::from(k / 3), 0.0)).collect();
+        let normals = vec![Vector::<3>::z(); 9];
+        let support = Support { degree: 3, radius: 2.9 };
+        let soundness = |metric: Metric| {
+            let chart = TangentChart::new(&points, &normals, metric, support.radius);
+            construct::<2>(&chart, support, &[Functional::LaplaceBeltrami], &Interrupt::default()).unwrap().soundness
+        };
+        let known = soundness(Metric::OfNormals);
+        assert_eq!((known.low_rank, known.failed, known.first_failed), (1, 8, Some(0)), "{known:?}");
+        let fitted = soundness(Metric::OfHeights);
+        assert_eq!((fitted.low_rank, fitted.failed, fitted.first_failed), (0, 9, Some(0)), "{fitted:?}");
+    }
+
     #[test]
     fn fitted_heights_make_up_for_normals_that_are_off() {
         let exact = error(4000, 5, 3.3, Metric::OfHeights, 0.0);

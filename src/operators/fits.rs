@@ -30,6 +30,8 @@ pub struct Soundness {
     pub unresolved: u64,
     /// Points whose moment conditions cannot be met: their rows give no number.
     pub failed: u64,
+    /// The first of them.
+    pub first_failed: Option<usize>,
     /// The least share of a pivot in its diagonal, of all points that were solved directly.
     pub least_pivot: f64,
 }
@@ -38,7 +40,25 @@ impl Soundness {
     /// Of no points.
     #[must_use]
     pub fn none() -> Self {
-        Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, least_pivot: 1.0 }
+        Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, first_failed: None, least_pivot: 1.0 }
+    }
+
+    /// Supports that were rescued, in one way or another.
+    #[must_use]
+    pub fn rescued(&self) -> u64 {
+        self.enlarged + self.low_rank + self.unresolved
+    }
+
+    /// What a checkpoint keeps: the counts in their order, and the least pivot.
+    #[must_use]
+    pub fn to_numbers(&self) -> ([u64; 4], f64) {
+        ([self.enlarged, self.low_rank, self.unresolved, self.failed], self.least_pivot)
+    }
+
+    /// Takes it back; which point failed first is not kept.
+    #[must_use]
+    pub fn from_numbers([enlarged, low_rank, unresolved, failed]: [u64; 4], least_pivot: f64) -> Self {
+        Self { enlarged, low_rank, unresolved, failed, first_failed: None, least_pivot }
     }
 
     /// With others.
@@ -47,6 +67,7 @@ impl Soundness {
         self.low_rank += other.low_rank;
         self.unresolved += other.unresolved;
         self.failed += other.failed;
+        self.first_failed = [self.first_failed, other.first_failed].into_iter().flatten().min();
         self.least_pivot = self.least_pivot.min(other.least_pivot);
     }
 }
@@ -184,8 +205,9 @@ impl<const M: usize> Fits<'_, M> {
         sink: &mut dyn RowSink<M>,
         outcome: &mut Outcome<M>,
     ) {
-        let heights = self.chart.needs_heights().then(|| self.heights(reach, work));
-        let mut holds = [true; LANES];
+        let heights = self.chart.needs_heights().then(|| self.heights(reach, sound, work));
+        // Where the moments are singular, so are those of the heights: a metric of what comes out would be a metric of nothing.
+        let mut holds = sound.map(|is_sound| is_sound || heights.is_none());
         for (k, functional) in self.functionals.iter().enumerate() {
             work.values.clear();
             work.values.resize(self.basis.size(), [0.0; LANES]);
@@ -209,20 +231,22 @@ impl<const M: usize> Fits<'_, M> {
             work.fit.solution.extend(work.values.iter().map(|values| Lanes::new(*values)));
             work.fit.solve();
             for (lane, i) in points.clone().enumerate() {
-                if !sound[lane] {
+                if !sound[lane] && holds[lane] {
                     work.functional.clear();
                     work.functional.extend(work.values.iter().map(|values| values[lane]));
-                    holds[lane] &= work.fit.solve_low_rank(lane, &work.functional) <= OPEN_MOMENTS;
+                    holds[lane] = work.fit.solve_low_rank(lane, &work.functional) <= OPEN_MOMENTS;
                 }
                 let weights = holds[lane].then_some((work.fit.weights.as_slice(), lane));
                 sink.take(k, i, &work.fit.near[lane], weights);
             }
         }
-        for lane in (0..points.len()).filter(|lane| !sound[*lane]) {
+        let Soundness { low_rank, failed, first_failed, .. } = &mut outcome.soundness;
+        for (lane, i) in points.clone().enumerate().filter(|(lane, _)| !sound[*lane]) {
             if holds[lane] {
-                outcome.soundness.low_rank += 1;
+                *low_rank += 1;
             } else {
-                outcome.soundness.failed += 1;
+                *failed += 1;
+                first_failed.get_or_insert(i);
             }
         }
         if let Some(heights) = heights {
@@ -230,10 +254,13 @@ impl<const M: usize> Fits<'_, M> {
         }
     }
 
-    /// Slopes and second derivatives of the surface over the plane of each lane.
-    fn heights(&self, reach: [f64; LANES], work: &mut Work<M>) -> [Heights<M>; LANES] {
+    /// Slopes and second derivatives of the surface over the plane of each lane, no numbers where it is not sound.
+    fn heights(&self, reach: [f64; LANES], sound: [bool; LANES], work: &mut Work<M>) -> [Heights<M>; LANES] {
         work.fit.solve_heights(self.basis.size());
         let derivative = |alpha: [u8; M], lane: usize| -> f64 {
+            if !sound[lane] {
+                return f64::NAN;
+            }
             let values = self.basis.derivative(&alpha).unwrap_or(&[]);
             values.iter().zip(&work.fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
         };

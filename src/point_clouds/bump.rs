@@ -26,6 +26,8 @@ const LEAST_RATIO: f64 = 0.1;
 const GRADE: f64 = 0.1;
 /// How far graded points reach: spacings are those of the lattice again there, and no initial field about the origin is cut.
 const OUTER: f64 = 0.7;
+/// What is left free between them and the nodes of the lattice, in spacings.
+const GAP: f64 = 0.35;
 /// Annuli by which the area of a bump is added up.
 const RINGS: usize = 4000;
 /// Parts of a cell along an axis by which areas next to the graded points are added up.
@@ -127,6 +129,16 @@ impl Bump {
         ((cells - 1.0).round() as usize).max(4)
     }
 
+    /// Points of so many cells a side: graded ones, and nodes where it is flat.
+    #[must_use]
+    pub fn count(&self, cells: usize) -> u64 {
+        let spacing = 2.0 * HALF_SIDE / cells as f64;
+        let grading = self.grading();
+        let clear = OUTER + GAP * spacing * grading.ratio(1.0);
+        let nodes = ((cells + 1) as f64).powi(2) - std::f64::consts::PI * (clear / spacing).powi(2);
+        (nodes + grading.squares() / (spacing * spacing)).round() as u64
+    }
+
     /// Points with the area and the share of the lattice's spacing of each: nodes of a lattice of `cells` a side where it is flat,
     /// graded Fibonacci points on the bump, and the `probes`, which are points themselves.
     #[must_use]
@@ -143,7 +155,7 @@ impl Bump {
         }
         let scale = grading.area / found.areas.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         found.areas.iter_mut().for_each(|area| *area *= scale);
-        let gap = 0.35 * spacing * grading.ratio(1.0);
+        let gap = GAP * spacing * grading.ratio(1.0);
         let is_clear = |x: f64, y: f64| (x - CENTER[0]).hypot(y - CENTER[1]) >= OUTER + gap;
         let edge = |k: usize| if k == 0 || k == cells { 0.5 } else { 1.0 };
         let mut nodes = Vec::with_capacity((cells + 1) * (cells + 1));

@@ -7,15 +7,16 @@ use crate::parallel::Interrupt;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
 /// Points of a surface in space that are uniform by its area, to a good approximation: uniform points of a thin shell about it,
-/// moved to their closest points; `layer` is the half width of the shell, well below the radii of curvature.
+/// moved to their closest points; `layer` is the half width of the shell, well below the radii of curvature. Ends with fewer
+/// when interrupted.
 #[must_use]
-pub fn random(surface: &dyn Surface<3>, count: usize, layer: f64, seed: u64) -> Vec<Vector<3>> {
+pub fn random(surface: &dyn Surface<3>, count: usize, layer: f64, seed: u64, interrupt: &Interrupt) -> Vec<Vector<3>> {
     let random = CounterRandom::new(seed);
     let (low, high) = surface.bounding_box();
     let (low, high) = (low.add_scalar(-layer), high.add_scalar(layer));
     let mut found = Vec::with_capacity(count);
     let mut draw = 0_i64;
-    while found.len() < count {
+    while found.len() < count && !interrupt.is_raised() {
         let x = Vector::<3>::from_fn(|d, _| {
             let unit = 0.5 + 0.5 * random.symmetric(&[draw, d as i64]);
             low[d] + unit * (high[d] - low[d])
@@ -78,7 +79,7 @@ mod tests {
     fn relaxed_points_keep_their_distance_and_their_surface() {
         let torus = Torus { center: Vector::<3>::zeros(), major_radius: 1.0, minor_radius: 0.4 };
         let count = 1500;
-        let mut points = random(&torus, count, 0.02, 7);
+        let mut points = random(&torus, count, 0.02, 7, &Interrupt::default());
         let area = 4.0 * std::f64::consts::PI.powi(2) * 0.4;
         let spacing = (area / count as f64).sqrt();
         relax(&mut points, spacing, |x| torus.nearest(x).point, &Interrupt::default());
@@ -88,5 +89,13 @@ mod tests {
             least = points[..i].iter().map(|y| (x - y).norm()).fold(least, f64::min);
         }
         assert!(least > 0.6 * spacing, "{}", least / spacing);
+    }
+
+    #[test]
+    fn drawing_ends_when_asked() {
+        let torus = Torus { center: Vector::<3>::zeros(), major_radius: 1.0, minor_radius: 0.4 };
+        let interrupt = Interrupt::default();
+        interrupt.raise();
+        assert!(random(&torus, 1_000_000, 0.02, 7, &interrupt).is_empty());
     }
 }

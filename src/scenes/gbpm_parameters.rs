@@ -146,8 +146,7 @@ pub fn understand(
         (2, 2) => 6,
         (2, 3) => 7,
         (2, _) => 8,
-        (_, 2) => 16,
-        (_, 3) => 16,
+        (_, 2 | 3) => 16,
         _ => 24,
     });
     let weight = written.weight.unwrap_or(if degree == 4 && dimension == 2 { 1.0 } else { 0.0 });

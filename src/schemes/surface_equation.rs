@@ -13,6 +13,7 @@ mod poisson;
 mod problem;
 mod reactions;
 mod simulation;
+mod solver;
 
 pub use cloud::SurfaceCloud;
 pub use curvature::Curvature;
@@ -20,7 +21,8 @@ pub use evolution::{Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse}
 pub use fields::ExactField;
 pub use method::{Form, Method};
 pub use pointwise::Pointwise;
-pub use poisson::{Condition, Poisson, Solver};
+pub use poisson::{Condition, Poisson};
 pub use problem::Problem;
 pub use reactions::{Model, Reaction};
 pub use simulation::SurfaceEquation;
+pub use solver::Solver;

@@ -8,7 +8,8 @@ pub struct Storage {
     vectors: [Vec<f64>; 8],
 }
 
-/// Goes on from `x` to the solution of A x = b. A breakdown (a scalar that vanishes) begins anew from where it is.
+/// Goes on from `x` to the solution of A x = b. A breakdown (a scalar that vanishes) begins anew from where it is; so does a
+/// residual of the recurrence that is small where the true one is not, as long as that helps.
 pub fn solve(
     map: &dyn LinearMap,
     factors: &IncompleteFactors,
@@ -22,7 +23,8 @@ pub fn solve(
     let [r, shadow, p, v, s, t, hat, room] = &mut storage.vectors;
     let goal = stopping.tolerance * norm(b);
     let mut iterations = 0;
-    'begin: while iterations < stopping.most_iterations && !map.is_given_up() {
+    let mut last = f64::INFINITY;
+    while iterations < stopping.most_iterations && !map.is_given_up() {
         map.apply(x, r);
         r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
         // Also where b is nothing.
@@ -32,20 +34,22 @@ pub fn solve(
         shadow.copy_from_slice(r);
         p.copy_from_slice(r);
         let mut rho = dot(shadow, r);
-        while iterations < stopping.most_iterations && !map.is_given_up() {
+        let mut is_done = false;
+        while !is_done && iterations < stopping.most_iterations && !map.is_given_up() {
             iterations += 1;
             factors.solve(p, hat);
             map.apply(hat, v);
             let across = dot(shadow, v);
             if across.is_nan() || across.abs() <= f64::MIN_POSITIVE {
-                continue 'begin;
+                break;
             }
             let alpha = rho / across;
             add(x, alpha, hat);
             s.copy_from_slice(r);
             add(s, -alpha, v);
             if norm(s) <= goal {
-                break 'begin;
+                is_done = true;
+                break;
             }
             factors.solve(s, hat);
             map.apply(hat, t);
@@ -54,17 +58,21 @@ pub fn solve(
             add(x, omega, hat);
             r.copy_from_slice(s);
             add(r, -omega, t);
-            if norm(r) <= goal {
-                break 'begin;
-            }
+            is_done = norm(r) <= goal;
             let next = dot(shadow, r);
             let beta = next / rho * (alpha / omega);
             if !(beta.is_finite() && next.abs() > f64::MIN_POSITIVE) {
-                continue 'begin;
+                break;
             }
             rho = next;
             for ((p, v), r) in p.iter_mut().zip(v.iter()).zip(r.iter()) {
                 *p = r + beta * (*p - omega * v);
+            }
+        }
+        if is_done {
+            let found = Convergence::of(map, b, x, iterations, room);
+            if found.is_final(stopping, &mut last) {
+                return found;
             }
         }
     }

@@ -27,12 +27,20 @@ pub fn solve(
     let n = b.len();
     let Storage { basis, triangle, rotations, right, hat, room } = storage;
     basis.resize_with(restart + 1, Vec::new);
-    basis.iter_mut().for_each(|vector| vector.resize(n, 0.0));
+    // The others when they are needed: most solutions take fewer vectors than they may.
+    basis[0].resize(n, 0.0);
     hat.resize(n, 0.0);
     room.resize(n, 0.0);
     let goal = stopping.tolerance * norm(b);
     let mut iterations = 0;
+    let (mut is_done, mut last) = (false, f64::INFINITY);
     loop {
+        if is_done {
+            let found = Convergence::of(map, b, x, iterations, room);
+            if found.is_final(stopping, &mut last) {
+                return found;
+            }
+        }
         let first = &mut basis[0];
         map.apply(x, first);
         first.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
@@ -50,6 +58,7 @@ pub fn solve(
             factors.solve(&basis[k], hat);
             let (known, next) = basis.split_at_mut(k + 1);
             let w = &mut next[0];
+            w.resize(n, 0.0);
             map.apply(hat, w);
             let mut column = Vec::with_capacity(k + 2);
             for v in known.iter() {
@@ -73,7 +82,8 @@ pub fn solve(
             right[k] = c * rest;
             right.push(-s * rest);
             let is_over = iterations >= stopping.most_iterations || map.is_given_up();
-            if right[k + 1].abs() <= goal || below == 0.0 || is_over {
+            is_done = right[k + 1].abs() <= goal || below == 0.0;
+            if is_done || is_over {
                 break;
             }
         }

@@ -62,6 +62,8 @@ impl Flow {
             WrittenFlow::Dcpse { order, cutoff_h, smoothing_h } => {
                 check_fits(written, *order, violations);
                 let smoothing_h = smoothing_h.unwrap_or(case.smoothing_h);
+                // Less, and particles crowd.
+                let cutoff_h = cutoff_h.unwrap_or(if *order == 4 { 5.5 } else { 3.5 });
                 let support = Support { degree: *order as usize + 1, radius: cutoff_h * spacing };
                 let diffusion = match written.density_method {
                     Some(Density::Continuity { diffusion }) => diffusion,

@@ -170,9 +170,9 @@ static DISCRETIZATIONS: &[Variant] = &[
             ),
             Parameter::new(
                 "cutoff_h",
-                "r_c/h of the fits; 3 is the paper's, with which particles crowd here",
+                "r_c/h of the fits; 3.5, of order 4 5.5, when not given; 3 is the paper's, with which particles crowd here",
                 Kind::Number { above: None, least: Some(2.0), below: None, most: Some(8.0) },
-                DefaultValue::Json("3.5"),
+                DefaultValue::Absent,
             ),
             SMOOTHING,
         ],
@@ -289,7 +289,7 @@ pub(super) struct WrittenFluid {
 #[serde(tag = "type", rename_all = "snake_case")]
 pub(super) enum Discretization {
     Sph { kernel: String, smoothing_h: Option<f64> },
-    Dcpse { order: u64, cutoff_h: f64, smoothing_h: Option<f64> },
+    Dcpse { order: u64, cutoff_h: Option<f64>, smoothing_h: Option<f64> },
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]

@@ -65,11 +65,9 @@ fn laws() -> &'static [Variant] {
 
 /// What section 4 states.
 pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Value> {
-    let is_in_space = given
-        .get("dimension")
-        .and_then(Value::as_u64)
-        .map(|d| d == 3)
-        .unwrap_or_else(|| given.get("shape").and_then(shapes::implied_dimension).unwrap_or(2) == 3);
+    let implied = || given.get("shape").and_then(shapes::implied_dimension);
+    let is_in_space =
+        given.get("dimension").and_then(Value::as_u64).map_or_else(|| implied() == Some(3), |dimension| dimension == 3);
     let mut preset = Map::new();
     preset.insert("degree".into(), json!(2));
     preset.insert("neighbors".into(), json!(if is_in_space { 10 } else { 6 }));

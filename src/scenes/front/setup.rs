@@ -1,6 +1,7 @@
 //! From parameters to a front and what moves it.
 
 use super::parameters::{Law, Written};
+use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
@@ -26,6 +27,8 @@ const CURVATURE_STEP: f64 = 0.5;
 const DRAWN_OUT: u64 = 4;
 /// Resident bytes a foot-point: its columns twice, its outcome, cells, a frame and a checkpoint in the making.
 const BYTES: u64 = 1200;
+/// Foot-points up to which an estimate counts them.
+const COUNTED: u64 = 20_000;
 /// Steps at most.
 const MOST_STEPS: u64 = 1_000_000_000;
 
@@ -172,6 +175,20 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
         })
     }
 
+    /// The front at the start.
+    fn system(&self, interrupt: Interrupt) -> Result<FrontSystem<D, M>, Vec<Violation>> {
+        let parts = FrontParts {
+            grid: Grid { spacing: self.choice.spacing },
+            method: self.chosen.method,
+            law: self.law()?,
+            integrator: self.choice.integrator,
+            topology: self.chosen.topology,
+            by_part: self.chosen.by_part,
+            interrupt,
+        };
+        Ok(FrontSystem::about(&shapes::parts::<D>(&self.choice.shape, "/shape")?, parts))
+    }
+
     fn exact(&self) -> Result<ExactFrontMotion<D>, Vec<Violation>> {
         let shape = &self.choice.shape;
         Ok(match &self.choice.law {
@@ -206,8 +223,11 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
         let reach = self.chosen.method.tube_radius * self.choice.spacing;
-        let at_start = shapes::surface::<D>(&self.choice.shape, "/shape")
+        let about = shapes::surface::<D>(&self.choice.shape, "/shape")
             .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.choice.spacing));
+        // Corners without foot-points matter where there are few.
+        let counted = if about < COUNTED { self.system(Interrupt::default()).ok() } else { None };
+        let at_start = counted.map_or(about, |system| system.particle_count() as u64);
         let is_drawn_out =
             matches!(self.choice.law, Law::Flow { flow: Flow::SingleVortex { .. } | Flow::Vortex3d { .. } });
         let most = if is_drawn_out { DRAWN_OUT * at_start } else { at_start };
@@ -243,17 +263,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let parts = FrontParts {
-            grid: Grid { spacing: self.choice.spacing },
-            method: self.chosen.method,
-            law: self.law()?,
-            integrator: self.choice.integrator,
-            topology: self.chosen.topology,
-            by_part: self.chosen.by_part,
-            interrupt: context.interrupt,
-        };
-        let surfaces = shapes::parts::<D>(&self.choice.shape, "/shape")?;
-        let system = FrontSystem::<D, M>::about(&surfaces, parts);
+        let system = self.system(context.interrupt)?;
         let method = &self.chosen.method;
         let chosen = format!(
             "degree {}, {} particles, weight {}, normals to {}",

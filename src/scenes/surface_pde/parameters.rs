@@ -49,7 +49,7 @@ pub(super) static PARAMETERS: &[Parameter] = &[
     ),
     Parameter::new(
         "solver",
-        "how systems of equations are solved",
+        "how systems of equations are solved: those of `poisson` and of `bdf2`",
         Kind::Choice(|| SOLVERS),
         DefaultValue::Json("\"bicgstab\""),
     ),
@@ -91,7 +91,12 @@ static SURFACES: &[Variant] = &[
     Variant {
         name: "bump",
         doc: "the square [−2, 2]² with a bump α ζ(|x − p|/r) of r = 0.25 at p = (−0.5, 0), edges without flux",
-        parameters: &[Parameter::new("height", "α", NOT_NEGATIVE, DefaultValue::Json("1"))],
+        parameters: &[Parameter::new(
+            "height",
+            "α",
+            Kind::Number { above: None, least: Some(0.0), below: None, most: Some(10.0) },
+            DefaultValue::Json("1"),
+        )],
     },
     Variant {
         name: "points",
@@ -194,7 +199,7 @@ static FIELDS: &[Variant] = &[
     Variant {
         name: "sin_plus_cos",
         doc: "sin mθ + cos mθ, on a circle",
-        parameters: &[Parameter::new("m", "m", WHOLE, DefaultValue::Json("1"))],
+        parameters: &[Parameter::new("m", "m, half the count at most", WHOLE, DefaultValue::Json("1"))],
     },
 ];
 
@@ -203,7 +208,7 @@ static INITIALS: &[Variant] = &[
     Variant {
         name: "sin_plus_cos",
         doc: "sin mθ + cos mθ, on a circle",
-        parameters: &[Parameter::new("m", "m", WHOLE, DefaultValue::Json("1"))],
+        parameters: &[Parameter::new("m", "m, half the count at most", WHOLE, DefaultValue::Json("1"))],
     },
     Variant {
         name: "plane_wave",
@@ -235,7 +240,7 @@ static INTEGRATORS: &[Variant] = &[
     Variant { name: "dopri5", doc: "Dormand and Prince's pair, explicit", parameters: &[TOLERANCE] },
     Variant {
         name: "bdf2",
-        doc: "the second backward differentiation formula, implicit, solved by BiCGSTAB with ILU(0)",
+        doc: "the second backward differentiation formula, implicit; `solver` solves it",
         parameters: &[],
     },
 ];
@@ -278,7 +283,7 @@ static METHODS: &[Variant] = &[
             ),
             Parameter::new(
                 "cutoff_dn",
-                "r_c by δn; 2.4, 3.3, 4.2 (copies 2.9, on circles 4.1) when not given",
+                "r_c by δn; 2.4, 3.3, 4.2 (of `random_raw` 3.5, 4, 4.5; copies 2.9, on circles 4.1) when not given",
                 Kind::Number { above: Some(1.0), least: None, below: None, most: Some(20.0) },
                 DefaultValue::Absent,
             ),
@@ -290,7 +295,7 @@ static METHODS: &[Variant] = &[
             ),
             Parameter::new(
                 "normal_spacing",
-                "δn of the copies; √(area/N), on circles 3/(N − 1), when not given",
+                "δn of the copies; √(area/N), on circles 3 R/(N − 1), when not given",
                 POSITIVE,
                 DefaultValue::Absent,
             ),

@@ -2,7 +2,7 @@
 //! of it exactly, so that no error is reported and what wants an exact answer was refused before.
 
 use super::setup::{Normals, Scheme, SurfaceScene, choices};
-use super::surfaces::{Extent, Shape};
+use super::surfaces::{Extent, Sampling, Shape};
 use crate::geometry::Vector;
 use crate::point_clouds::Examined;
 use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
@@ -30,8 +30,12 @@ pub(super) fn build<const D: usize, const M: usize>(
     let examined = Examined::new(&points).map_err(|reason| refuse(reason.to_string()))?;
     let shape = Shape::Points(Extent::of(&points, examined.spacing));
     let mut violations = Vec::new();
-    let (scheme, problem) =
-        choices(&scene.written, &shape, points.len() as u64, &mut scene.resolved.clone(), &mut violations);
+    let (scheme, problem) = choices(
+        &scene.written,
+        (&shape, Sampling::Fibonacci, points.len() as u64),
+        &mut scene.resolved.clone(),
+        &mut violations,
+    );
     let (Some(Scheme::Dcpse(method)), Some(problem), true) = (scheme, problem, violations.is_empty()) else {
         return Err(violations);
     };
@@ -53,7 +57,7 @@ pub(super) fn build<const D: usize, const M: usize>(
     );
     let findings = flaws.into_iter().map(finding).collect();
     let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
-    let problem = problem.build(&shape, &cloud, scene.written.seed, scene.fixed.time_step);
+    let problem = problem.build(&shape, &cloud, scene.written.seed, scene.fixed.time_step)?;
     let equation = SurfaceEquation::<D, M>::new(cloud, method, problem, scene.fixed, interrupt, cpu_clock);
     Ok(Box::new(equation.on_points(origin, findings)))
 }

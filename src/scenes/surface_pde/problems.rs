@@ -1,7 +1,7 @@
 //! The problem of a scene: what it was understood as, what it is made of, what it costs.
 
 use super::parameters::Written;
-use super::surfaces::Shape;
+use super::surfaces::{DEFAULT_COUNT, Shape};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::linear_algebra::krylov::Stopping;
@@ -54,6 +54,7 @@ fn field(
     written: &Value,
     pointer: &str,
     shape: &Shape,
+    count: u64,
     full: &mut Value,
     violations: &mut Vec<Violation>,
 ) -> Option<ExactField> {
@@ -82,7 +83,13 @@ fn field(
         }
         Some("sin_plus_cos") => {
             belongs(matches!(shape, Shape::Circle { .. }), "sin mθ + cos mθ belongs to a circle", violations);
-            ExactField::SinPlusCos { m: chosen["m"].as_u64().unwrap_or(1) as u32 }
+            let m = chosen["m"].as_u64().unwrap_or(1);
+            if m > count / 2 {
+                let detail = format!("a wave has two points at least, and there are {count}");
+                let (place, allowed) = (format!("{pointer}/m"), json!({"most": count / 2}));
+                violations.push(Violation::new(place, "range", detail, &json!(m), allowed));
+            }
+            ExactField::SinPlusCos { m: m as u32 }
         }
         Some("truncated_gaussian") => {
             let center = in_space(&chosen["center"], &format!("{pointer}/center"), violations);
@@ -128,7 +135,14 @@ pub(super) fn understand(
     let problem = &written.problem;
     let mut field_of = |name: &str, violations: &mut Vec<Violation>| {
         let pointer = format!("/problem/{name}");
-        field(&problem[name], &pointer, shape, &mut resolved["problem"][name], violations)
+        field(
+            &problem[name],
+            &pointer,
+            shape,
+            written.count.unwrap_or(DEFAULT_COUNT),
+            &mut resolved["problem"][name],
+            violations,
+        )
     };
     let end_time = problem["end_time"].as_f64().unwrap_or(1.0);
     let time_step = problem["time_step"].as_f64();
@@ -158,12 +172,19 @@ pub(super) fn understand(
             let name = "initial";
             let start = if problem[name].is_null() && matches!(shape, Shape::Bump(_)) {
                 let chosen = json!({"type": "truncated_gaussian", "center": [0.0, 0.0, 0.0], "sigma": 0.2});
-                field(&chosen, "/problem/initial", shape, &mut resolved["problem"][name], violations)?
+                field(
+                    &chosen,
+                    "/problem/initial",
+                    shape,
+                    written.count.unwrap_or(DEFAULT_COUNT),
+                    &mut resolved["problem"][name],
+                    violations,
+                )?
             } else {
                 field_of(name, violations)?
             };
             let integrator = match problem["integrator"]["type"].as_str() {
-                Some("bdf2") => EvolutionIntegrator::Bdf2(Stopping { tolerance: 1e-10, most_iterations: 1000 }),
+                Some("bdf2") => EvolutionIntegrator::Bdf2(solver(&written.solver)),
                 _ => explicit(&problem["integrator"]["tolerance"]),
             };
             ProblemChoice::Evolution { start: Start::Field(start), end_time, time_step, integrator }
@@ -226,12 +247,23 @@ fn operated<const D: usize>(field: &ExactField, shape: &Shape, cloud: &SurfaceCl
 }
 
 impl ProblemChoice {
+    /// How its systems of equations are solved, where it has any.
+    pub fn solver(&self) -> Option<Solver> {
+        match self {
+            Self::Poisson { solver, .. } | Self::Evolution { integrator: EvolutionIntegrator::Bdf2(solver), .. } => {
+                Some(*solver)
+            }
+            _ => None,
+        }
+    }
+
     pub fn name(&self) -> &'static str {
         match self {
             Self::LaplaceBeltrami { .. } => "applied",
             Self::Poisson { solver: Solver::SparseLu, .. } => "poisson_lu",
             Self::Poisson { .. } => "poisson",
             Self::Curvature { .. } => "curvature",
+            Self::Evolution { integrator: EvolutionIntegrator::Bdf2(Solver::SparseLu), .. } => "implicit_lu",
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => "implicit",
             Self::Evolution { .. } => "explicit",
         }
@@ -284,6 +316,11 @@ impl ProblemChoice {
                 // Iterations grow with the number of points along a line.
                 PhaseWork::every_step("solver/solution", application * points.sqrt()),
             ],
+            Self::Evolution { integrator: EvolutionIntegrator::Bdf2(Solver::SparseLu), .. } => {
+                // Factors of the first step and of all others.
+                let factors = 2.0 * points.powf(1.5);
+                vec![PhaseWork::every_step("solver/solution", factors + points * wide * steps)]
+            }
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => {
                 vec![PhaseWork::every_step("solver/solution", 20.0 * application * steps)]
             }
@@ -303,10 +340,16 @@ impl ProblemChoice {
         }
     }
 
-    /// Bytes a point that a direct decomposition fills, for rows of so many entries: n ln n of them on a surface (measured: 23 kB at
-    /// 35 entries and 16,000 points).
+    /// Bytes a point that a solver fills beside its system, for rows of so many entries: the basis of GMRES, or a direct decomposition,
+    /// n ln n entries of it on a surface (measured: 23 kB at 35 entries and 16,000 points).
     pub fn fill(&self, entries: f64, points: f64) -> f64 {
-        if let Self::Poisson { solver: Solver::SparseLu, .. } = self { 70.0 * entries * points.ln() } else { 0.0 }
+        match self.solver() {
+            Some(Solver::SparseLu) => 70.0 * entries * points.ln(),
+            Some(Solver::Gmres { restart, stopping }) => {
+                8.0 * (stopping.most_iterations.min(restart as u64) + 1) as f64
+            }
+            _ => 0.0,
+        }
     }
 
     /// The field that is operated on, its values and its exact operator.
@@ -321,8 +364,8 @@ impl ProblemChoice {
         cloud: &SurfaceCloud<D>,
         seed: u64,
         time_step: f64,
-    ) -> Box<dyn Problem<D>> {
-        match self {
+    ) -> Result<Box<dyn Problem<D>>, Vec<Violation>> {
+        Ok(match self {
             Self::LaplaceBeltrami { field } => {
                 Box::new(Pointwise::new(values(field, cloud), operated(field, shape, cloud)))
             }
@@ -342,10 +385,14 @@ impl ProblemChoice {
             }
             Self::Evolution { start, integrator, .. } => {
                 let (initial, reaction, exact) = begin(start, shape, cloud, seed);
+                if initial.iter().all(|value| *value == 0.0) {
+                    let detail = format!("the field is zero at all of the {} points", cloud.rows);
+                    return Err(vec![Violation::new("/problem/initial", "data", detail, &Value::Null, Value::Null)]);
+                }
                 let parts = EvolutionParts { initial, reaction, time_step, integrator: *integrator, exact };
                 Box::new(Evolution::new(parts, cloud))
             }
-        }
+        })
     }
 }
 
@@ -382,10 +429,8 @@ fn begin<const D: usize>(
             let at = |i: usize| match (&reaction.manufactured, model) {
                 (Some((field, _)), _) => reaction.exact(field[i], 0.0),
                 (None, Model::GrayScott { .. }) => {
-                    // A cap where the second substance is sown.
-                    let axis = if D == 3 { 2 } else { 0 };
-                    let is_sown = cloud.points[i][axis] > shape.cap();
-                    let [u, v] = if is_sown { [0.5, 0.25] } else { rest };
+                    // The second substance is sown on a cap.
+                    let [u, v] = if shape.is_on_cap(&raised(&cloud.points[i])) { [0.5, 0.25] } else { rest };
                     let off = noise * random.symmetric(&[i as i64]);
                     [u, v * (1.0 + off)]
                 }

@@ -2,11 +2,11 @@
 
 use super::parameters::Written;
 use super::points;
-use super::problems::{self, ProblemChoice};
+use super::problems::{self, ProblemChoice, Start};
 use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
-use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
+use crate::geometry::{Surface, Vector};
 use crate::operators::Support;
 use crate::operators::charts::tangent::Metric;
 use crate::point_clouds::{Bump, normals};
@@ -15,7 +15,7 @@ use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::work_estimate;
 use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
-use crate::schemes::surface_equation::{Form, Method, SurfaceCloud, SurfaceEquation};
+use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method, SurfaceCloud, SurfaceEquation};
 use crate::simulation::{OutputPlan, Simulation};
 use crate::time::FixedStep;
 use serde_json::{Value, json};
@@ -54,13 +54,17 @@ pub(super) struct SurfaceScene {
     points: Option<CloudReference>,
 }
 
+/// Distances of points.
+const LENGTHS: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+
 /// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbours as there are functions, about; larger
-/// ones have larger errors (measured on plane waves).
-fn support(order: u64, is_curve: bool, is_copies: bool) -> Option<(usize, f64)> {
+/// ones have larger errors (measured on plane waves). Points as drawn at random want more: with less, operators have growing modes.
+fn support(order: u64, is_curve: bool, is_copies: bool, sampling: Sampling) -> Option<(usize, f64)> {
     let degree = match order {
         2 | 4 | 6 => order as usize + 1,
         _ => return None,
     };
+    let is_raw = sampling == Sampling::Random { is_relaxed: false };
     let cutoff = match (is_copies, is_curve, order) {
         (true, true, _) => 4.1,
         (true, false, _) => 2.9,
@@ -68,6 +72,7 @@ fn support(order: u64, is_curve: bool, is_copies: bool) -> Option<(usize, f64)> 
         (false, true, 2) => 3.4,
         (false, true, 4) => 5.4,
         (false, true, _) => 7.4,
+        (false, false, _) if is_raw => 3.0 + 0.25 * order as f64,
         (false, false, 2) => 2.4,
         (false, false, 4) => 3.3,
         (false, false, _) => 4.2,
@@ -91,7 +96,13 @@ pub(super) fn understand(parameters: &Value) -> Understood {
     let count = written.count.unwrap_or(DEFAULT_COUNT);
     let sampling = surfaces::sampling(&written, &shape, &mut resolved, &mut violations);
     let normals = normals(&written, &shape, &mut resolved, &mut violations);
-    let (scheme, problem) = choices(&written, &shape, count, &mut resolved, &mut violations);
+    let spacing = shape.spacing(count);
+    if !matches!(shape, Shape::Points(_)) && !LENGTHS.contains(&spacing) {
+        let detail = "squares of the distance of points and of its inverse must be numbers";
+        let allowed = json!({"least": LENGTHS.start(), "most": LENGTHS.end()});
+        violations.push(Violation::new("/surface", "range", detail, &json!(spacing), allowed));
+    }
+    let (scheme, problem) = choices(&written, (&shape, sampling, count), &mut resolved, &mut violations);
     if let (Some(Scheme::Embedding { .. }), Some(problem)) = (&scheme, &problem) {
         if shape.in_space().is_none() {
             let (detail, got) = ("the embedding method is for spheres, ellipsoids and tori", json!("closest_point"));
@@ -102,6 +113,11 @@ pub(super) fn understand(parameters: &Value) -> Understood {
             let allowed = json!(["laplace_beltrami"]);
             violations.push(Violation::new("/problem", "conflict", detail, &written.problem["type"], allowed));
         }
+    }
+    let default_solver = json!({"type": "bicgstab", "tolerance": 1e-10, "max_iterations": 5000});
+    if problem.as_ref().is_some_and(|problem| problem.solver().is_none()) && written.solver != default_solver {
+        let detail = "nothing is solved here: systems of equations are those of `poisson` and of `bdf2`";
+        violations.push(Violation::new("/solver", "conflict", detail, &written.solver, default_solver));
     }
     let is_applied = matches!(problem, Some(ProblemChoice::LaplaceBeltrami { .. }) | None);
     if written.repeat > 1 && !is_applied {
@@ -116,8 +132,16 @@ pub(super) fn understand(parameters: &Value) -> Understood {
         ProblemChoice::Poisson { .. } | ProblemChoice::Curvature { .. } => FixedStep { time_step: 1.0, steps: 1 },
         ProblemChoice::Evolution { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
     };
-    if let ProblemChoice::Evolution { .. } = problem {
-        resolved["problem"]["time_step"] = json!(fixed.time_step);
+    if let ProblemChoice::Evolution { start, integrator, .. } = &problem {
+        let evolving = &mut resolved["problem"];
+        evolving["time_step"] = json!(fixed.time_step);
+        // A time step alone asks for steps of that length: that steps are controlled must be said.
+        if let EvolutionIntegrator::Controlled { tolerance } = integrator {
+            match start {
+                Start::Field(_) => evolving["integrator"]["tolerance"] = json!(tolerance),
+                Start::Reaction { .. } => evolving["tolerance"] = json!(tolerance),
+            }
+        }
     }
     Ok(Box::new(SurfaceScene { written, resolved, shape, count, sampling, normals, scheme, problem, fixed, points }))
 }
@@ -125,8 +149,7 @@ pub(super) fn understand(parameters: &Value) -> Understood {
 /// Method and problem for a shape and a number of points; again for points from outside, once they are read.
 pub(super) fn choices(
     written: &Written,
-    shape: &Shape,
-    count: u64,
+    (shape, sampling, count): (&Shape, Sampling, u64),
     resolved: &mut Value,
     violations: &mut Vec<Violation>,
 ) -> (Option<Scheme>, Option<ProblemChoice>) {
@@ -136,7 +159,7 @@ pub(super) fn choices(
         Some("perturbed" | "given") if normals["metric"] == "normals" => Metric::OfNormals,
         _ => Metric::OfHeights,
     };
-    let scheme = scheme(written, shape, count, metric, resolved, violations);
+    let scheme = scheme(written, shape, count, metric, sampling, resolved, violations);
     (scheme, problems::understand(written, shape, metric, resolved, violations))
 }
 
@@ -199,6 +222,7 @@ fn scheme(
     shape: &Shape,
     count: u64,
     metric: Metric,
+    sampling: Sampling,
     resolved: &mut Value,
     violations: &mut Vec<Violation>,
 ) -> Option<Scheme> {
@@ -222,7 +246,7 @@ fn scheme(
     }
     let is_curve = shape.is_curve();
     let is_copies = method["form"] == "copies";
-    let Some((degree, default_cutoff)) = support(order, is_curve, is_copies) else {
+    let Some((degree, default_cutoff)) = support(order, is_curve, is_copies, sampling) else {
         violations.push(wrong_order(json!([2, 4, 6])));
         return None;
     };
@@ -230,7 +254,7 @@ fn scheme(
     resolved["method"]["cutoff_dn"] = json!(cutoff_dn);
     if is_copies {
         let n = count as f64;
-        let apart = if is_curve { 3.0 / (n - 1.0) } else { spacing };
+        let apart = if let Shape::Circle { radius } = shape { 3.0 * radius / (n - 1.0) } else { spacing };
         let apart = method["normal_spacing"].as_f64().unwrap_or(apart);
         let layers = method["layers"].as_u64().unwrap_or(if is_curve { 4 } else { 2 }) as u32;
         resolved["method"]["normal_spacing"] = json!(apart);
@@ -351,25 +375,26 @@ impl Scene for SurfaceScene {
     }
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
-        let count = sizes.get("/surface").copied().unwrap_or(self.count);
-        // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
-        let a_point = match &self.scheme {
+        let particles = sizes.get("/surface").copied().unwrap_or_else(|| self.shape.points(self.count));
+        let points = particles as f64;
+        let memory = match &self.scheme {
+            // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
             Scheme::Dcpse(method) => {
                 let entries = self.entries(method);
-                250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, count as f64)
+                points * (250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, points))
             }
             Scheme::Embedding { order, spacing } => {
-                let nodes =
-                    2.0 * EmbeddingParts::half_band(*order) * (self.shape.spacing(self.count) / spacing).powi(2);
-                200.0 + nodes * (60.0 + 30.0 * *order as f64)
+                let area = points * self.shape.spacing(self.count).powi(2);
+                let bounds = self.shape.in_space().map(Surface::bounding_box);
+                points * 250.0 + bounds.map_or(0.0, |bounds| EmbeddingParts::memory(*order, *spacing, area, bounds))
             }
         };
         Estimate {
-            particles: count,
+            particles,
             steps: self.fixed.steps,
             time_step: self.fixed.time_step,
             end_time: self.fixed.clock(self.fixed.steps).time,
-            memory_bytes: (a_point * count as f64) as u64,
+            memory_bytes: memory as u64,
         }
     }
 
@@ -425,20 +450,20 @@ impl Scene for SurfaceScene {
             (Scheme::Dcpse(method), Shape::Circle { radius }) => {
                 let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.written.seed);
                 let cloud = self.cloud(cloud, method.support.radius)?;
-                let problem = self.problem.build(&self.shape, &cloud, self.written.seed, self.fixed.time_step);
+                let problem = self.problem.build(&self.shape, &cloud, self.written.seed, self.fixed.time_step)?;
                 Ok(Box::new(SurfaceEquation::<2, 1>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
             }
             (Scheme::Dcpse(method), shape) => {
                 let reach = method.support.radius;
                 let cloud = surfaces::in_space(shape, self.count, self.sampling, self.written.seed, reach, &interrupt);
                 let cloud = self.cloud(cloud, reach)?;
-                let problem = self.problem.build(shape, &cloud, self.written.seed, self.fixed.time_step);
+                let problem = self.problem.build(shape, &cloud, self.written.seed, self.fixed.time_step)?;
                 Ok(Box::new(SurfaceEquation::<3, 2>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
             }
             (Scheme::Embedding { order, spacing }, shape) => {
                 let cloud = surfaces::in_space(shape, self.count, self.sampling, self.written.seed, 0.0, &interrupt);
                 let Some((field, values, operated)) = self.problem.known(shape, &cloud) else { return Err(Vec::new()) };
-                let surface: Box<dyn crate::geometry::Surface<3>> = match shape {
+                let surface: Box<dyn Surface<3>> = match shape {
                     Shape::Torus(torus) => Box::new(torus.clone()),
                     Shape::Ellipsoid(ellipsoid) => Box::new(ellipsoid.clone()),
                     Shape::Circle { .. } | Shape::Bump(_) | Shape::Points(_) => return Err(Vec::new()),

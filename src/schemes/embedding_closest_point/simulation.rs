@@ -30,6 +30,16 @@ impl EmbeddingParts {
     pub fn half_band(order: usize) -> f64 {
         inner_half_width(order) + (order / 2) as f64
     }
+
+    /// Bytes of a band about a surface of an area between two corners: those of the nodes (closest points, places, neighbours, three
+    /// fields, and what lists of them take until the band stands; measured: 300), and the index of every cell of the box.
+    #[must_use]
+    pub fn memory(order: usize, spacing: f64, area: f64, (low, high): (Vector<3>, Vector<3>)) -> f64 {
+        let half = Self::half_band(order);
+        let nodes = 2.0 * half * area / (spacing * spacing);
+        let cells: f64 = (high - low).iter().map(|side| side / spacing + 2.0 * half + 3.0).product();
+        300.0 * nodes + 4.0 * cells
+    }
 }
 
 /// The points of a surface and what is known there.

@@ -102,6 +102,12 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         }
     }
 
+    /// How many foot-points there are.
+    #[must_use]
+    pub fn particle_count(&self) -> usize {
+        self.feet.len()
+    }
+
     /// Reconstruction through the particles as they stand and were sorted.
     pub(super) fn reconstruction(&self) -> Reconstruction<'_, D, M> {
         Reconstruction {

@@ -72,8 +72,8 @@ impl<const D: usize> Problem<D> for Curvature {
         vec![("mean_curvature", shown(&self.mean)), ("gauss_curvature", shown(&self.gauss))]
     }
 
-    fn watched(&self) -> &[f64] {
-        &self.mean
+    fn watched(&self) -> Vec<(&'static str, &[f64])> {
+        vec![("mean_curvature", &self.mean), ("gauss_curvature", &self.gauss)]
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -1,12 +1,14 @@
 //! du/dt = d Δ_S u, with reactions of two substances or without: explicit by Dormand and Prince's pair in fixed or
-//! controlled steps, or implicit by the second backward differentiation formula.
+//! controlled steps, or implicit by the second backward differentiation formula. Diffusion alone makes nothing larger: what grows
+//! all the same is a mode of the operator, and ends the run.
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
 use super::problem::{Problem, Tools};
 use super::reactions::Reaction;
+use super::solver::{Factors, Solver, Storage};
 use crate::linear_algebra::SparseRows;
-use crate::linear_algebra::krylov::{IncompleteFactors, Interruptible, Stopping, bicgstab};
+use crate::linear_algebra::krylov::Interruptible;
 use crate::parallel::Interrupt;
 use crate::schemes::measured_errors::{against_exact, entry};
 use crate::simulation::state::check_length;
@@ -27,7 +29,7 @@ pub enum EvolutionIntegrator {
         tolerance: f64,
     },
     /// (3 u⁺ − 4 u + u⁻)/2Δt = Δ_S u⁺, begun with a backward Euler step.
-    Bdf2(Stopping),
+    Bdf2(Solver),
 }
 
 /// What is known exactly of a course.
@@ -66,8 +68,8 @@ pub struct Evolution {
     /// Step of the controlled integrator.
     inner_step: f64,
     pair: EmbeddedPair,
-    implicit: Option<(f64, SparseRows, IncompleteFactors)>,
-    storage: bicgstab::Storage,
+    implicit: Option<(f64, SparseRows, Factors)>,
+    storage: Storage,
     right: Vec<f64>,
     /// Steps of the pair that were tried.
     attempts: u64,
@@ -89,7 +91,7 @@ impl Evolution {
             inner_step: 0.0,
             pair: EmbeddedPair::default(),
             implicit: None,
-            storage: bicgstab::Storage::default(),
+            storage: Storage::default(),
             right: Vec::new(),
             attempts: 0,
             iterations: 0,
@@ -132,7 +134,8 @@ impl Evolution {
             let length = end - time;
             let error = pair.attempt(values, time, end, &mut slope);
             *attempts += 1;
-            let factor = SAFETY * (tolerance / error.max(1e-300)).powf(0.2);
+            // What is no number may become one in a shorter step.
+            let factor = if error.is_nan() { 0.2 } else { SAFETY * (tolerance / error.max(1e-300)).powf(0.2) };
             if error <= tolerance {
                 pair.accept(values);
                 time = end;
@@ -143,10 +146,14 @@ impl Evolution {
                     return Ok(());
                 }
             } else {
-                // Also of what is no number.
-                *inner_step = length * if factor > 0.2 { factor.min(0.9) } else { 0.2 };
+                *inner_step = length * factor.clamp(0.2, 0.9);
                 if *inner_step < LEAST_STEP * whole {
                     let Clock { step, time } = to;
+                    if let Some(place) = pair.result().iter().position(|value| !value.is_finite()) {
+                        let rows = operator.rows();
+                        let field = if place < rows { "value" } else { "second_value" };
+                        return Err(StepError::NonFinite { field, particle: place % rows, step, time });
+                    }
                     let reason = format!("the tolerance {tolerance:.1e} cannot be kept: the error is {error:.1e}");
                     return Err(StepError::Unsolved { reason, step, time });
                 }
@@ -158,7 +165,7 @@ impl Evolution {
     fn implicit(
         &mut self,
         operator: &SparseRows,
-        stopping: Stopping,
+        solver: Solver,
         interrupt: &Interrupt,
         from: Clock,
         to: Clock,
@@ -175,7 +182,7 @@ impl Evolution {
                     *w = f64::from(u8::from(*j as usize == i)) - share * whole * *w;
                 }
             });
-            let factors = IncompleteFactors::of(&system).map_err(|failed| unsolved(failed.to_string()))?;
+            let factors = solver.factors(&system, None).map_err(unsolved)?;
             self.implicit = Some((share, system, factors));
         }
         let Self { implicit: Some((_, system, factors)), values, previous, right, storage, .. } = self else {
@@ -187,14 +194,24 @@ impl Evolution {
         }
         previous.copy_from_slice(values);
         let map = Interruptible { map: system, interrupt };
-        let found = bicgstab::solve(&map, factors, right, values, stopping, storage);
+        let found = solver.solve(&map, factors, right, values, storage);
         interrupt.check()?;
         self.iterations += found.iterations;
-        if !found.is_within(stopping) {
-            let reason = format!("{} iterations leave a residual of {:.3e}", found.iterations, found.residual);
-            return Err(unsolved(reason));
+        solver.failure(found).map_or(Ok(()), |reason| Err(unsolved(reason)))
+    }
+
+    /// Refuses what diffusion cannot do.
+    fn check_growth(&self, to: Clock) -> Result<(), StepError> {
+        let largest = largest_of(&self.values);
+        let bound = MOST_GROWTH * largest_of(&self.parts.initial);
+        if self.parts.reaction.is_some() || !largest.is_finite() || largest <= bound {
+            return Ok(());
         }
-        Ok(())
+        let reason = format!(
+            "max|u| = {largest:.3e} is above {bound:.3e}, {MOST_GROWTH} times that at the start: the operator has growing \
+             modes, or Δt is too long for steps without a tolerance; a larger cutoff_dn or relaxed sampling helps"
+        );
+        Err(StepError::Unsolved { reason, step: to.step, time: to.time })
     }
 
     fn reference(&self, time: f64) -> Option<Vec<f64>> {
@@ -222,8 +239,14 @@ const FIRST_STEP: f64 = 1e-3;
 /// Inner steps below this share of a step end the run.
 const LEAST_STEP: f64 = 1e-9;
 const SAFETY: f64 = 0.9;
+/// Of max|u| by that at the start, without reactions: a sound operator of high order overshoots by far less.
+const MOST_GROWTH: f64 = 10.0;
 /// Points that a task works on at least.
 const POINTS: usize = 1024;
+
+fn largest_of(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
+}
 
 /// d Δ_S u and the terms of a reaction.
 fn slopes(operator: &SparseRows, reaction: Option<&Reaction>, u: &[f64], time: f64, out: &mut [f64]) {
@@ -256,11 +279,12 @@ impl<const D: usize> Problem<D> for Evolution {
         let Tools { cloud, operators, interrupt, phases, from, to } = tools;
         let operator = &operators.rows[0];
         match self.parts.integrator {
-            EvolutionIntegrator::Bdf2(stopping) => {
-                phases.measure("solver/solution", || self.implicit(operator, stopping, interrupt, from, to))?;
+            EvolutionIntegrator::Bdf2(solver) => {
+                phases.measure("solver/solution", || self.implicit(operator, solver, interrupt, from, to))?;
             }
             _ => phases.measure("evolution", || self.explicit(operator, interrupt, from, to))?,
         }
+        self.check_growth(to)?;
         if self.parts.reaction.is_some() {
             let slope = self.pair.slope();
             self.rate = (slope.iter().map(|s| s * s).sum::<f64>() / slope.len().max(1) as f64).sqrt();
@@ -284,8 +308,9 @@ impl<const D: usize> Problem<D> for Evolution {
         columns
     }
 
-    fn watched(&self) -> &[f64] {
-        &self.values
+    fn watched(&self) -> Vec<(&'static str, &[f64])> {
+        let rows = self.values.len() / self.fields();
+        ["value", "second_value"].into_iter().zip(self.values.chunks(rows.max(1))).collect()
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
@@ -367,7 +392,7 @@ impl<const D: usize> Problem<D> for Evolution {
             EvolutionIntegrator::Controlled { tolerance } => {
                 format!("Dormand–Prince, tolerance {tolerance:.1e}, {} steps tried", self.attempts)
             }
-            EvolutionIntegrator::Bdf2(_) => format!("BDF2, BiCGSTAB with ILU(0), {} iterations", self.iterations),
+            EvolutionIntegrator::Bdf2(solver) => format!("BDF2, {}, {} iterations", solver.name(), self.iterations),
         };
         method.insert("integrator", integrator);
     }

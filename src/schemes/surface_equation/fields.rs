@@ -72,7 +72,7 @@ impl ExactField {
     pub fn decay(&self, radius: f64) -> Option<f64> {
         match self {
             Self::SphericalHarmonic { l, .. } => Some(f64::from(l * (l + 1)) / (radius * radius)),
-            Self::SinPlusCos { m } => Some(f64::from(m * m) / (radius * radius)),
+            Self::SinPlusCos { m } => Some(f64::from(*m).powi(2) / (radius * radius)),
             Self::PlaneWave { .. } | Self::TruncatedGaussian { .. } => None,
         }
     }
@@ -135,6 +135,11 @@ mod tests {
         let expected = (5.0 / (16.0 * PI)).sqrt() * (3.0 * x[2] * x[2] - 1.0);
         assert!((spherical_harmonic(2, 0, &x) - expected).abs() < 1e-14);
         assert!((spherical_harmonic(1, -1, &(3.0 * x)) - (3.0 / (4.0 * PI)).sqrt() * x[1]).abs() < 1e-14);
+    }
+
+    #[test]
+    fn decay_of_the_shortest_waves_is_a_number() {
+        assert_eq!(ExactField::SinPlusCos { m: 100_000 }.decay(2.0), Some(2.5e9));
     }
 
     /// On a sphere of radius R the plane wave's formula against differences along great circles.

@@ -45,8 +45,8 @@ impl<const D: usize> Problem<D> for Pointwise {
         columns
     }
 
-    fn watched(&self) -> &[f64] {
-        &self.value
+    fn watched(&self) -> Vec<(&'static str, &[f64])> {
+        vec![("value", &self.value)]
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

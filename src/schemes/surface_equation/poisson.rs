@@ -3,32 +3,14 @@
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
 use super::problem::{Problem, Tools};
+use super::solver::{Solver, Storage};
 use crate::linear_algebra::SparseRows;
-use crate::linear_algebra::krylov::{
-    Convergence, IncompleteFactors, Interruptible, LinearMap, Stopping, WithMean, bicgstab, gmres,
-};
-use crate::linear_algebra::sparse_lu::SparseLu;
+use crate::linear_algebra::krylov::{Convergence, Interruptible, LinearMap, WithMean};
 use crate::schemes::measured_errors::{against_exact, entry};
 use crate::simulation::state::check_length;
 use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
-
-/// How sparse systems are solved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Solver {
-    /// BiCGSTAB with ILU(0).
-    BiCgStab(Stopping),
-    /// GMRES, begun anew so often, with ILU(0).
-    Gmres {
-        /// Vectors.
-        restart: usize,
-        /// When to stop.
-        stopping: Stopping,
-    },
-    /// Sparse LU decomposition.
-    SparseLu,
-}
 
 /// What makes the solution one.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,38 +92,14 @@ impl<const D: usize> Problem<D> for Poisson {
             }
         };
         let map = &Interruptible { map, interrupt };
+        let alpha = if let Condition::ZeroMean { alpha } = self.condition { Some(alpha) } else { None };
+        let factors = phases.measure("solver/factors", || self.solver.factors(&rows, alpha)).map_err(unsolved)?;
         let value = &mut self.value;
-        self.convergence = match self.solver {
-            Solver::SparseLu => {
-                let alpha = if let Condition::ZeroMean { alpha } = self.condition { Some(alpha) } else { None };
-                let factors = phases.measure("solver/factors", || SparseLu::of(&rows, alpha));
-                let factors = factors.map_err(|failed| unsolved(failed.to_string()))?;
-                phases.measure("solver/solution", || {
-                    factors.solve(&right, value);
-                    Convergence::of(map, &right, value, 1, &mut Vec::new())
-                })
-            }
-            Solver::BiCgStab(stopping) => {
-                let factors = phases.measure("solver/factors", || IncompleteFactors::of(&rows));
-                let factors = factors.map_err(|failed| unsolved(failed.to_string()))?;
-                phases.measure("solver/solution", || {
-                    bicgstab::solve(map, &factors, &right, value, stopping, &mut bicgstab::Storage::default())
-                })
-            }
-            Solver::Gmres { restart, stopping } => {
-                let factors = phases.measure("solver/factors", || IncompleteFactors::of(&rows));
-                let factors = factors.map_err(|failed| unsolved(failed.to_string()))?;
-                phases.measure("solver/solution", || {
-                    gmres::solve(map, &factors, &right, value, restart, stopping, &mut gmres::Storage::default())
-                })
-            }
-        };
+        self.convergence = phases
+            .measure("solver/solution", || self.solver.solve(map, &factors, &right, value, &mut Storage::default()));
         interrupt.check()?;
-        if let Solver::BiCgStab(stopping) | Solver::Gmres { stopping, .. } = self.solver
-            && !self.convergence.is_within(stopping)
-        {
-            let Convergence { iterations, residual } = self.convergence;
-            return Err(unsolved(format!("{iterations} iterations leave a residual of {residual:.3e}")));
+        if let Some(reason) = self.solver.failure(self.convergence) {
+            return Err(unsolved(reason));
         }
         if let Condition::ZeroMean { .. } = self.condition {
             subtract_mean(value);
@@ -156,8 +114,8 @@ impl<const D: usize> Problem<D> for Poisson {
         columns
     }
 
-    fn watched(&self) -> &[f64] {
-        &self.value
+    fn watched(&self) -> Vec<(&'static str, &[f64])> {
+        vec![("value", &self.value)]
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
@@ -167,7 +125,7 @@ impl<const D: usize> Problem<D> for Poisson {
         let reference = "exact solution at the points";
         let against = |exact: &Vec<f64>| against_exact("value", &self.value, exact, clock.time, reference);
         let mut errors = self.exact.as_ref().map_or_else(Vec::new, against);
-        let Convergence { iterations, residual } = self.convergence;
+        let Convergence { iterations, residual, .. } = self.convergence;
         errors.push(entry("solver", "iterations", iterations as f64, clock.time, "none"));
         errors.push(entry("solver", "residual", residual, clock.time, "‖b − A x‖ by ‖b‖"));
         errors
@@ -190,21 +148,16 @@ impl<const D: usize> Problem<D> for Poisson {
         check_length("iterations", iterations.len(), 1)?;
         check_length("residual", residual.len(), 1)?;
         self.value.copy_from_slice(value);
-        self.convergence = Convergence { iterations: iterations[0], residual: residual[0] };
+        self.convergence = Convergence { iterations: iterations[0], residual: residual[0], ..Convergence::default() };
         Ok(())
     }
 
     fn describe(&self, method: &mut BTreeMap<&'static str, String>) {
-        let solver = match self.solver {
-            Solver::BiCgStab(_) => "BiCGSTAB with ILU(0)".to_owned(),
-            Solver::Gmres { restart, .. } => format!("GMRES({restart}) with ILU(0)"),
-            Solver::SparseLu => "sparse LU".to_owned(),
-        };
         let condition = match &self.condition {
             Condition::Dirichlet(held) => format!("{} points hold their value", held.len()),
             Condition::ZeroMean { alpha } => format!("no mean, A + {alpha:.4} 1 1ᵀ/n"),
         };
-        method.insert("solver", solver);
+        method.insert("solver", self.solver.name());
         method.insert("condition", condition);
     }
 }

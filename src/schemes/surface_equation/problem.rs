@@ -34,11 +34,11 @@ pub trait Problem<const D: usize>: Send {
     /// [`StepError`].
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError>;
 
-    /// What frames show beside the surface. The first is the unknown whose finiteness is watched.
+    /// What frames show beside the surface.
     fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)>;
 
-    /// The unknown whose finiteness is watched.
-    fn watched(&self) -> &[f64];
+    /// The unknowns whose finiteness is watched, by name.
+    fn watched(&self) -> Vec<(&'static str, &[f64])>;
 
     /// Errors against what is known exactly.
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry>;

@@ -21,6 +21,8 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     problem: Box<dyn Problem<D>>,
     operators: Option<Operators>,
     soundness: Soundness,
+    /// Points whose curvature is too large for their support.
+    coarse: u64,
     fixed: FixedStep,
     step: u64,
     interrupt: Interrupt,
@@ -29,6 +31,22 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     origin: Option<String>,
     /// Of points from outside: what is wrong with them, until it was told.
     findings: Vec<Finding>,
+}
+
+/// |κ| r_c beyond which a fit does not see the surface as nearly flat.
+const COARSE: f64 = 0.5;
+
+/// Points of a curvature, exact or else fitted, that is large for their support.
+fn coarse_points<const D: usize>(cloud: &SurfaceCloud<D>, method: &Method, built: &Operators) -> u64 {
+    let fitted = |i: usize| built.curvatures.as_ref().map_or(f64::NAN, |curvatures| curvatures[i][0]);
+    let is_coarse = |i: &usize| {
+        // Of points from outside no exact one is known.
+        let known = cloud.curvatures.get(*i).copied().unwrap_or(f64::NAN);
+        let kappa = if known.is_nan() { fitted(*i) } else { known };
+        let scale = cloud.scales.get(*i).copied().unwrap_or(1.0);
+        kappa.abs() * scale * method.support.radius > COARSE
+    };
+    (0..cloud.rows).filter(is_coarse).count() as u64
 }
 
 impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
@@ -44,8 +62,20 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
     ) -> Self {
         let soundness = Soundness::none();
         let phases = Phases::new(cpu_clock);
-        let (origin, findings) = (None, Vec::new());
-        Self { cloud, method, problem, operators: None, soundness, fixed, step: 0, interrupt, phases, origin, findings }
+        Self {
+            cloud,
+            method,
+            problem,
+            operators: None,
+            soundness,
+            coarse: 0,
+            fixed,
+            step: 0,
+            interrupt,
+            phases,
+            origin: None,
+            findings: Vec::new(),
+        }
     }
 
     /// The same on points from outside: what they are, and what is wrong with them.
@@ -65,9 +95,9 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         self.fixed.clock(self.fixed.steps)
     }
 
-    /// 1. Operators, where there are none yet. 2. The problem's step. 3. A look at the numbers.
+    /// 1. Operators, where there are none yet: a row for every point. 2. The problem's step. 3. A look at the numbers.
     fn step(&mut self) -> Result<(), StepError> {
-        let Self { cloud, method, problem, operators, phases, interrupt, soundness, fixed, .. } = self;
+        let Self { cloud, method, problem, operators, phases, interrupt, soundness, coarse, fixed, .. } = self;
         let (from, to) = (fixed.clock(self.step), fixed.clock(self.step + 1));
         let operators = match operators {
             Some(operators) => operators,
@@ -75,15 +105,25 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
                 let wanted = problem.wanted();
                 let build = || method.build::<D, M>(cloud, &wanted, interrupt);
                 let built = phases.measure("operators/construction", build)?;
-                *soundness = built.soundness;
+                (*soundness, *coarse) = (built.soundness, coarse_points(cloud, method, &built));
+                if let Some(first) = soundness.first_failed {
+                    let (failed, Clock { step, time }) = (soundness.failed, to);
+                    let reason = format!(
+                        "the moment conditions of {failed} of {} points cannot be met, the first is point {first}; a larger \
+                         cutoff_dn or relaxed sampling helps",
+                        cloud.rows
+                    );
+                    return Err(StepError::Unsolved { reason, step, time });
+                }
                 operators.insert(built)
             }
         };
         problem.step(Tools { cloud, operators, interrupt, phases, from, to })?;
         interrupt.check()?;
-        if let Some(place) = problem.watched().iter().position(|value| !value.is_finite()) {
-            let particle = place % cloud.rows.max(1);
-            return Err(StepError::NonFinite { field: "value", particle, step: to.step, time: to.time });
+        for (field, values) in problem.watched() {
+            if let Some(particle) = values.iter().position(|value| !value.is_finite()) {
+                return Err(StepError::NonFinite { field, particle, step: to.step, time: to.time });
+            }
         }
         self.step += 1;
         Ok(())
@@ -114,11 +154,10 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         let Clock { step, time } = self.clock();
         let mut state = State { step, time, ..State::default() };
         self.problem.save(&mut state);
-        state.push_counts(
-            "soundness",
-            vec![self.soundness.enlarged, self.soundness.low_rank, self.soundness.unresolved],
-        );
-        state.push_reals("least_pivot", &[self.soundness.least_pivot]);
+        let (counts, least_pivot) = self.soundness.to_numbers();
+        state.push_counts("soundness", counts.to_vec());
+        state.push_counts("coarse", vec![self.coarse]);
+        state.push_reals("least_pivot", &[least_pivot]);
         state
     }
 
@@ -126,12 +165,14 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         if state.step > self.fixed.steps {
             return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
         }
-        let (counts, pivot) = (state.counts("soundness")?, state.reals("least_pivot")?);
-        check_length("soundness", counts.len(), 3)?;
+        let (counts, coarse, pivot) =
+            (state.counts("soundness")?, state.counts("coarse")?, state.reals("least_pivot")?);
+        check_length("soundness", counts.len(), 4)?;
+        check_length("coarse", coarse.len(), 1)?;
         check_length("least_pivot", pivot.len(), 1)?;
         self.problem.load(state)?;
-        let (enlarged, low_rank, unresolved) = (counts[0], counts[1], counts[2]);
-        self.soundness = Soundness { enlarged, low_rank, unresolved, failed: 0, least_pivot: pivot[0] };
+        self.soundness = Soundness::from_numbers([counts[0], counts[1], counts[2], counts[3]], pivot[0]);
+        self.coarse = coarse[0];
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
         if state.step > 0 {
@@ -148,11 +189,12 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
             Form::Intrinsic { .. } => "tangent planes".to_owned(),
             Form::Copies { layers, spacing } => format!("{layers} copies to either side, {spacing:.6} apart"),
         };
-        let Soundness { enlarged, low_rank, unresolved, failed, least_pivot } = self.soundness;
+        let Soundness { enlarged, low_rank, unresolved, failed, least_pivot, .. } = self.soundness;
         let rescued = [
             ("supports.larger_radius", enlarged),
             ("supports.low_rank", low_rank),
             ("supports.unresolved", unresolved),
+            ("supports.coarse", self.coarse),
             ("rows.failed", failed),
         ];
         let entries = self.operators.iter().flat_map(|o| &o.rows).map(SparseRows::entries).sum::<usize>();
@@ -177,9 +219,8 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
     }
 
     fn health(&self) -> Health {
-        let finite = self.problem.watched().iter().all(|value| value.is_finite());
-        let rescued_fits = self.soundness.enlarged + self.soundness.low_rank + self.soundness.unresolved;
-        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits }
+        let finite = self.problem.watched().iter().all(|(_, values)| values.iter().all(|value| value.is_finite()));
+        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits: self.soundness.rescued() }
     }
 
     fn particle_count(&self) -> usize {

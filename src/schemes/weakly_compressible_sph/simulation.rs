@@ -7,6 +7,7 @@ use super::system::{EvaluationError, SphSystem};
 use super::time_step::longest_step;
 use crate::closest_point::Soundness;
 use crate::geometry::Vector;
+use crate::operators::Soundness as FitSoundness;
 use crate::schemes::measured_errors::{closest_point_report, rescued};
 use crate::simulation::state::check_length;
 use crate::simulation::{
@@ -227,6 +228,15 @@ fn failed(error: EvaluationError, at: Clock) -> StepError {
     }
 }
 
+/// What was counted of the fits of the flow.
+fn fits_of(state: &State) -> Result<FitSoundness, RestoreError> {
+    let (counts, pivot) = (state.counts("flow")?, state.reals("flow_pivot")?);
+    check_length("flow_pivot", pivot.len(), 1)?;
+    let of_length: Result<[u64; 4], _> = counts.try_into();
+    let length = |_| RestoreError::Length { name: "flow".to_owned(), got: counts.len(), expected: 4 };
+    Ok(FitSoundness::from_numbers(of_length.map_err(length)?, pivot[0]))
+}
+
 impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     fn clock(&self) -> Clock {
         self.pace.clock(self.step)
@@ -327,6 +337,11 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         state.push_reals("origin", &[time, self.pace.time_step]);
         // What is not known is no number, which a checkpoint's arrays of numbers would not hold: their bits are kept.
         state.push_counts("row", self.row.iter().map(|v| v.to_bits()).collect());
+        if let Some(flow) = &system.dcpse {
+            let (counts, least_pivot) = flow.soundness.to_numbers();
+            state.push_counts("flow", counts.to_vec());
+            state.push_reals("flow_pivot", &[least_pivot]);
+        }
         let summary = self.summary.to_numbers(self.pace.end_time);
         state.push_counts("summary", summary.iter().map(|v| v.to_bits()).collect());
         state
@@ -362,6 +377,10 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         check_length("counters", counters.len(), 4)?;
         check_length("monitors", monitors.len(), 3)?;
         check_length("row", state.counts("row")?.len(), self.row.len())?;
+        let flow = match &self.system.dcpse {
+            Some(_) => Some(fits_of(state)?),
+            None => None,
+        };
         let numbers = |name| -> Result<Vec<f64>, RestoreError> {
             Ok(state.counts(name)?.iter().map(|bits| f64::from_bits(*bits)).collect())
         };
@@ -401,6 +420,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             soundness.worst_condition = monitors[1];
             interface.bounded = counters[2];
         }
+        if let (Some(known), Some(flow)) = (flow, &mut system.dcpse) {
+            flow.soundness = known;
+        }
         // An interrupt ends the run before its next step.
         let _ = system.derive();
         self.failure = None;
@@ -427,6 +449,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         }
         if let Some(flow) = &self.system.dcpse {
             let found = &flow.soundness;
+            report.worst_condition = report.worst_condition.max(1.0 / found.least_pivot);
             let counts = [
                 ("flow.larger_radius", found.enlarged),
                 ("flow.low_rank", found.low_rank),
@@ -447,11 +470,12 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 
     fn health(&self) -> Health {
         let soundness = self.system.interface.as_ref().map(|interface| interface.surface.soundness());
+        let fits = self.system.dcpse.as_ref().map_or(0, |flow| flow.soundness.rescued());
         Health {
             finite: self.system.velocity.iter().all(|u| u.iter().all(|c| c.is_finite())),
             max_cfl: self.max_cfl,
             volume_drift: self.summary.last_measure().map(|measure| measure / self.system.initial_measure - 1.0),
-            rescued_fits: soundness.map_or(0, |soundness| rescued(&soundness.counts)),
+            rescued_fits: fits + soundness.map_or(0, |soundness| rescued(&soundness.counts)),
         }
     }
 
