@@ -56,9 +56,10 @@ fn the_vortex_that_turns_back_is_closed_and_round() {
     assert!(error(&report, "front", "gap_h", None) < 1.5);
     let sphere = json!({"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15});
     let report = run(&json!({
-        "kind": "vortex", "spacing": 1.0 / 50.0, "flow": "vortex_3d", "end_time": 2, "method": "gbpm", "shape": sphere
+        "kind": "vortex", "spacing": 1.0 / 64.0, "flow": "vortex_3d", "end_time": 2, "method": "gbpm", "shape": sphere
     }));
-    assert!(error(&report, "front", "max", None) < 0.02, "a stray sheet");
+    // At 1/50 the sheet half way is thinner than the grid resolves, and stray sheets are left.
+    assert!(error(&report, "front", "max", None) < 0.01, "a stray sheet");
     assert!(error(&report, "front", "coverage_h", None) < 1.5);
 }
 

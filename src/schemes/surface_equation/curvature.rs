@@ -3,7 +3,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools};
+use super::problem::{Problem, Tools, Watched};
 use crate::schemes::measured_errors::against_exact;
 use crate::simulation::state::check_length;
 use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
@@ -72,8 +72,8 @@ impl<const D: usize> Problem<D> for Curvature {
         vec![("mean_curvature", shown(&self.mean)), ("gauss_curvature", shown(&self.gauss))]
     }
 
-    fn watched(&self) -> Vec<(&'static str, &[f64])> {
-        vec![("mean_curvature", &self.mean), ("gauss_curvature", &self.gauss)]
+    fn watched(&self) -> Watched<'_> {
+        [("mean_curvature", &self.mean), ("gauss_curvature", &self.gauss)]
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -4,7 +4,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools};
+use super::problem::{Problem, Tools, Watched};
 use super::reactions::Reaction;
 use super::solver::{Factors, Solver, Storage};
 use crate::linear_algebra::SparseRows;
@@ -308,9 +308,9 @@ impl<const D: usize> Problem<D> for Evolution {
         columns
     }
 
-    fn watched(&self) -> Vec<(&'static str, &[f64])> {
-        let rows = self.values.len() / self.fields();
-        ["value", "second_value"].into_iter().zip(self.values.chunks(rows.max(1))).collect()
+    fn watched(&self) -> Watched<'_> {
+        let (first, second) = self.values.split_at(self.values.len() / self.fields());
+        [("value", first), ("second_value", second)]
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

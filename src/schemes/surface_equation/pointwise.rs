@@ -2,7 +2,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools};
+use super::problem::{Problem, Tools, Watched};
 use crate::schemes::measured_errors::against_exact;
 use crate::simulation::state::check_length;
 use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
@@ -45,8 +45,8 @@ impl<const D: usize> Problem<D> for Pointwise {
         columns
     }
 
-    fn watched(&self) -> Vec<(&'static str, &[f64])> {
-        vec![("value", &self.value)]
+    fn watched(&self) -> Watched<'_> {
+        [("value", &self.value), ("", &[])]
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -2,7 +2,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools};
+use super::problem::{Problem, Tools, Watched};
 use super::solver::{Solver, Storage};
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::{Convergence, Interruptible, LinearMap, WithMean};
@@ -114,8 +114,8 @@ impl<const D: usize> Problem<D> for Poisson {
         columns
     }
 
-    fn watched(&self) -> Vec<(&'static str, &[f64])> {
-        vec![("value", &self.value)]
+    fn watched(&self) -> Watched<'_> {
+        [("value", &self.value), ("", &[])]
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

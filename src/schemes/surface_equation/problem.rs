@@ -23,6 +23,9 @@ pub struct Tools<'a, const D: usize> {
     pub to: Clock,
 }
 
+/// Fields by name, no more than two and without an allocation; an unused place has no values.
+pub type Watched<'a> = [(&'static str, &'a [f64]); 2];
+
 /// A problem: its unknowns, and how a step changes them.
 pub trait Problem<const D: usize>: Send {
     /// Operators that it needs.
@@ -38,7 +41,7 @@ pub trait Problem<const D: usize>: Send {
     fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)>;
 
     /// The unknowns whose finiteness is watched, by name.
-    fn watched(&self) -> Vec<(&'static str, &[f64])>;
+    fn watched(&self) -> Watched<'_>;
 
     /// Errors against what is known exactly.
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry>;
