@@ -101,6 +101,8 @@ fn front_bodies() -> Vec<Value> {
         front(
             json!({"law": "mean_curvature", "integrator": "tvd_rk2", "time_step": 8e-4, "end_time": 0.008, "shape": sphere(0.5)}),
         ),
+        // It vanishes on the way.
+        front(json!({"shape": {"type": "circle", "radius": 0.06}, "law": {"type": "normal", "speed": -1}})),
         front(json!({"shape": spheres, "topology": "cross"})),
         front(json!({"shape": spheres, "segment_test": {"type": "parameter", "cosine": 0.4}})),
         front(json!({"shape": sphere(0.35), "law": vortex, "end_time": 0.4, "degree": 4, "time_step": 0.04})),
@@ -119,6 +121,10 @@ fn states(body: &Value, threads: usize) -> Vec<State> {
         while !simulation.is_finished() {
             simulation.step().unwrap();
             states.push(simulation.state());
+        }
+        for array in states.iter().flat_map(|state| &state.reals) {
+            // A checkpoint takes nothing else.
+            assert!(array.values.iter().all(|value| value.is_finite()), "{} of {body}", array.name);
         }
         states
     })

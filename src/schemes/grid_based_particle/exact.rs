@@ -40,7 +40,7 @@ pub enum ExactFrontMotion<const D: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FrontErrors {
     pub time: f64,
-    /// In the order of [`ENTRIES`]; NaN where nothing is known.
+    /// In the order of [`ENTRIES`]; not finite where nothing is known.
     pub values: [f64; ENTRIES.len()],
 }
 
@@ -59,18 +59,21 @@ const ENTRIES: [(&str, &str); 10] = [
 ];
 
 impl FrontErrors {
-    pub const NUMBERS: usize = 1 + ENTRIES.len();
+    pub const NUMBERS: usize = 1 + 2 * ENTRIES.len();
 
+    /// For a state, which holds finite numbers alone: whether each value is known, and the value.
     pub fn to_numbers(self) -> Vec<f64> {
-        std::iter::once(self.time).chain(self.values).collect()
+        let pair = |value: f64| if value.is_finite() { [1.0, value] } else { [0.0; 2] };
+        std::iter::once(self.time).chain(self.values.into_iter().flat_map(pair)).collect()
     }
 
     pub fn from_numbers(n: &[f64]) -> Self {
-        Self { time: n[0], values: std::array::from_fn(|k| n[k + 1]) }
+        let value = |k: usize| if n[2 * k + 1] > 0.5 { n[2 * k + 2] } else { f64::NAN };
+        Self { time: n[0], values: std::array::from_fn(value) }
     }
 
     pub fn entries(&self) -> Vec<ErrorEntry> {
-        let known = ENTRIES.iter().zip(self.values).filter(|(_, value)| !value.is_nan());
+        let known = ENTRIES.iter().zip(self.values).filter(|(_, value)| value.is_finite());
         known.map(|((quantity, norm), value)| entry(quantity, norm, value, self.time, "exact motion")).collect()
     }
 }

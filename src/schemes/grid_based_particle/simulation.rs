@@ -159,7 +159,8 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         let mut state = State { step, time, ..State::default() };
         self.system.feet.save(&mut state);
         state.push_counts("removals", self.system.removals.entries().map(|(_, count)| count).to_vec());
-        state.push_reals("monitors", &[self.max_cfl, self.vanished.unwrap_or(f64::NAN)]);
+        state.push_counts("has_vanished", vec![u64::from(self.vanished.is_some())]);
+        state.push_reals("monitors", &[self.max_cfl, self.vanished.unwrap_or(0.0)]);
         let errors: Vec<f64> = self.errors.iter().flat_map(|e| e.to_numbers()).collect();
         state.push_reals("errors", &errors);
         state
@@ -171,18 +172,19 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         }
         let feet = FootPoints::load(state)?;
         let (removals, monitors) = (state.counts("removals")?, state.reals("monitors")?);
-        let errors = state.reals("errors")?;
+        let (errors, has_vanished) = (state.reals("errors")?, state.counts("has_vanished")?);
         let removals: [u64; 6] = removals.try_into().map_err(|_| RestoreError::Length {
             name: "removals".into(),
             got: removals.len(),
             expected: 6,
         })?;
         check_length("monitors", monitors.len(), 2)?;
+        check_length("has_vanished", has_vanished.len(), 1)?;
         check_length("errors", errors.len(), errors.len() / FrontErrors::NUMBERS * FrontErrors::NUMBERS)?;
         self.system.feet = feet;
         self.system.removals = Removals::from_numbers(removals);
         self.max_cfl = monitors[0];
-        self.vanished = (!monitors[1].is_nan()).then_some(monitors[1]);
+        self.vanished = (has_vanished[0] > 0).then_some(monitors[1]);
         self.errors = errors.chunks_exact(FrontErrors::NUMBERS).map(FrontErrors::from_numbers).collect();
         self.step = state.step;
         Ok(())
