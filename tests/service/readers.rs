@@ -35,14 +35,18 @@ fn frames_open_in_h5py_and_vtk_with_the_right_counts_times_and_fields() {
         let found: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
         let mut fields: Vec<String> = serde_json::from_value(job["resolved"]["output"]["fields"].clone()).unwrap();
         fields.sort();
-        for (frame, found) in frames.iter().zip(&found) {
+        for (k, (frame, found)) in frames.iter().zip(&found).enumerate() {
+            // A front has as many foot-points as it is long; what a job tells is the number at its end.
+            let is_end = k + 1 == frames.len();
+            let number =
+                if kind.kind == "front" && !is_end { &found["h5py"]["points"] } else { &job["progress"]["particles"] };
             for reader in ["h5py", "vtk"] {
                 let seen = &found[reader];
-                assert_eq!(seen["points"], job["progress"]["particles"], "{reader} {}", frame["path"]);
+                assert_eq!(&seen["points"], number, "{reader} {}", frame["path"]);
                 assert_eq!(seen["time"].as_f64(), frame["time"].as_f64(), "{reader}");
                 assert_eq!(serde_json::from_value::<Vec<String>>(seen["fields"].clone()).unwrap(), fields, "{reader}");
             }
-            assert_eq!(found["vtk"]["vertices"], job["progress"]["particles"]);
+            assert_eq!(&found["vtk"]["vertices"], number);
             let (a, b) = (found["h5py"]["mean_x"].as_f64().unwrap(), found["vtk"]["mean_x"].as_f64().unwrap());
             // VTK adds the same doubles in another order.
             assert!((a - b).abs() < 1e-12);
