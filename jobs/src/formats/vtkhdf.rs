@@ -64,7 +64,7 @@ pub struct FrameView {
     pub surface: Vec<([f64; 3], [f64; 3])>,
 }
 
-/// Reads a frame back, for a picture; None where it has neither `phi` nor a `value` on a surface.
+/// Reads a frame back, for a picture; None where it has neither `phi` nor a `value` on a surface nor is a front.
 ///
 /// # Errors
 /// Whatever libhdf5 reports.
@@ -76,8 +76,23 @@ pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
     let time = root.dataset("FieldData/Time")?.read_raw::<f64>()?.first().copied().unwrap_or(0.0);
     let points = triples(root.dataset("Points")?.read_raw()?);
     let Ok(phi) = data.dataset("phi") else {
-        let (Ok(values), Ok(normals)) = (data.dataset("value"), data.dataset("normal")) else { return Ok(None) };
-        let (points, phi) = surface_view::seen(&points, &triples(normals.read_raw()?), &values.read_raw::<f64>()?);
+        let Ok(normals) = data.dataset("normal") else { return Ok(None) };
+        let normals = triples(normals.read_raw()?);
+        if let Ok(values) = data.dataset("value") {
+            let (points, phi) = surface_view::seen(&points, &normals, &values.read_raw::<f64>()?);
+            return Ok(Some(FrameView { time, points, phi, surface: Vec::new() }));
+        }
+        // The points of a front are all on it: a line in the plane, shaded by its slope in space.
+        if data.dataset("grid_point").is_err() {
+            return Ok(None);
+        }
+        if points.iter().chain(&normals).all(|x| x[2] == 0.0) {
+            let phi = vec![0.0; points.len()];
+            let surface = points.iter().copied().zip(normals).collect();
+            return Ok(Some(FrameView { time, points, phi, surface }));
+        }
+        let slopes: Vec<f64> = normals.iter().map(|n| n[2]).collect();
+        let (points, phi) = surface_view::seen(&points, &normals, &slopes);
         return Ok(Some(FrameView { time, points, phi, surface: Vec::new() }));
     };
     let surface = match (data.dataset("closest_point"), data.dataset("normal")) {

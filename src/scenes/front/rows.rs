@@ -112,7 +112,7 @@ pub fn rows() -> Rows {
         row(name.into(), paper, circles(more), slope(quantity, norm), Reach::AtLeast(least), false);
     }
     for (degree, paper, least) in [(2, "4.10", 3.7), (4, "–", 5.4)] {
-        let runs = [24, 32, 48, 64].map(|cells| still_sphere(cells, &json!({"degree": degree}))).to_vec();
+        let runs = [32, 48, 64, 96, 128].map(|cells| still_sphere(cells, &json!({"degree": degree}))).to_vec();
         let case = format!("sphere, degree {degree}: order of the error");
         row(case, paper, runs, slope("front", "rms"), Reach::AtLeast(least), false);
     }
@@ -169,6 +169,7 @@ pub fn rows() -> Rows {
         let run = || vec![rotated(256, &disk(), turns, &json!({"cfl": 20}))];
         let case = |what: &str| format!("Zalesak disk, 257², {turns} revolution(s): {what}");
         row(case("mean distance"), "picture", run(), end("front", "mean"), most(figure), turns > 1.0);
+        row(case("coverage"), "–", run(), end("front", "coverage_h"), most(1.5), turns > 1.0);
         if let Some(largest) = largest {
             row(case("largest distance"), "picture", run(), end("front", "max"), most(largest), false);
             row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(0.4), false);
