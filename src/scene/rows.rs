@@ -3,6 +3,15 @@
 
 use serde_json::Value;
 
+/// A scene with the members of another object laid over it.
+#[must_use]
+pub fn with(mut scene: Value, more: &Value) -> Value {
+    if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
+        scene.extend(more.clone());
+    }
+    scene
+}
+
 /// One row of the table.
 #[derive(Debug, Clone)]
 pub struct Row {

@@ -23,7 +23,7 @@ pub const NEIGHBORS: Parameter = Parameter::new(
 /// Weight.
 pub const WEIGHT: Parameter = Parameter::new(
     "weight",
-    "k in the weights exp(−k t²), t the distance along the front in h; when not given, 1 for degree 4 in the plane, else 0",
+    "k in the weights exp(−k t²), t the distance along the front in h; when not given, 1 for degree 4 in the plane, 0 else and under mean_curvature",
     Kind::Number { above: None, least: Some(0.0), below: None, most: Some(10.0) },
     DefaultValue::Absent,
 );
@@ -145,11 +145,13 @@ pub fn understand(
     let neighbors = written.neighbors.unwrap_or(match (dimension, degree) {
         (2, 2) => 6,
         (2, 3) => 7,
+        // Narrower quartics blow up slowly under curvature.
+        (2, _) if is_by_curvature => 14,
         (2, _) => 8,
         (_, 2 | 3) => 16,
         _ => 24,
     });
-    let weight = written.weight.unwrap_or(if degree == 4 && dimension == 2 { 1.0 } else { 0.0 });
+    let weight = written.weight.unwrap_or(if degree == 4 && dimension == 2 && !is_by_curvature { 1.0 } else { 0.0 });
     let terms = if dimension == 2 { degree + 1 } else { (degree + 1) * (degree + 2) / 2 };
     if neighbors < terms {
         let detail = format!("a reconstruction of degree {degree} has {terms} coefficients");

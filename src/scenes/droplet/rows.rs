@@ -1,15 +1,7 @@
 //! The rows of `droplet`: PCP paper, sections 4.3 and 4.4.
 
-use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows, with};
 use serde_json::{Value, json};
-
-/// A scene with something else laid over it.
-fn with(mut scene: Value, more: &Value) -> Value {
-    if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
-        scene.extend(more.clone());
-    }
-    scene
-}
 
 /// The oscillating drop, off the centre: a centred one would hide errors of momentum by its symmetry.
 fn oscillating(cells: u32, more: &Value) -> Value {

@@ -1,16 +1,8 @@
 //! The rows of `front`, and of `vortex` with grid-based particles: GBPM paper, section 4.
 
-use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows, with};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
-
-/// A scene with something else laid over it.
-fn with(mut scene: Value, more: &Value) -> Value {
-    if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
-        scene.extend(more.clone());
-    }
-    scene
-}
 
 fn front(cells: u32, more: &Value) -> Value {
     with(json!({"kind": "front", "spacing": 1.0 / f64::from(cells)}), more)
@@ -127,7 +119,7 @@ pub fn rows() -> Rows {
     row("rotation, quadratic, 513²: L2".into(), "order 1.87", runs, end("front", "l2"), most(5e-6), false);
     let runs = vec![rotated(512, &circle, 1.0, &json!({"cfl": 3}))];
     row("rotation, quartic, 513²: L2".into(), "–", runs, end("front", "l2"), most(3.5e-10), false);
-    let wide = json!({"degree": 4, "neighbors": 14, "weight": 0});
+    let wide = json!({"degree": 4});
     for (name, more) in [("quadratic", &json!({})), ("quartic of 14 particles", &wide)] {
         let runs = vec![by_curvature(128, 0.05, more)];
         let case = format!("mean curvature, circle, {name}, 129²: L2 at t = .05");
@@ -142,16 +134,16 @@ pub fn rows() -> Rows {
         row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), false);
         row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(seconds), false);
     }
-    for (cells, is_long) in [(512, true), (256, true)] {
+    for cells in [512, 256] {
         for cfl in [8, 10, 12, 14, 16] {
             let run = || vec![vortex(cells, 8.0, &json!({"cfl": cfl}))];
             let case = |what: &str| format!("single vortex, T = 8, {}², step factor {cfl}: {what}", cells + 1);
             let mean = Reach::Within { of: 0.15, by: 3e-4 };
-            row(case("mean radius"), ".1512", run(), end("radius", "mean"), mean, is_long);
+            row(case("mean radius"), ".1512", run(), end("radius", "mean"), mean, true);
             let reach = most(if cells == 512 { 1.2e-3 } else { 1e-3 });
-            row(case("deviation"), "3.0e-3", run(), end("radius", "deviation"), reach, is_long);
-            row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), is_long);
-            row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(9.0), is_long);
+            row(case("deviation"), "3.0e-3", run(), end("radius", "deviation"), reach, true);
+            row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), true);
+            row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(9.0), true);
         }
     }
     for (name, scene, mean, largest) in [

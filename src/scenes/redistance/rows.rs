@@ -1,6 +1,6 @@
 //! The rows of `redistance`: PCP paper, section 4.1, and what goes beyond it.
 
-use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows, with};
 use serde_json::{Value, json};
 
 const PHI_RMS: Quantity = Quantity::at_end("phi", "rms");
@@ -8,17 +8,8 @@ const PHI_MAX: Quantity = Quantity::at_end("phi", "max");
 /// Below this errors are round-off.
 const FLOOR: f64 = 1e-13;
 
-/// `base` with the members of `more` laid over it.
-fn with(base: &Value, more: &Value) -> Value {
-    let mut whole = base.clone();
-    for (name, value) in more.as_object().into_iter().flatten() {
-        whole[name] = value.clone();
-    }
-    whole
-}
-
 fn over_spacings(base: &Value, cells: &[u32]) -> Vec<Value> {
-    cells.iter().map(|n| with(base, &json!({"spacing": 1.0 / f64::from(*n)}))).collect()
+    cells.iter().map(|n| with(base.clone(), &json!({"spacing": 1.0 / f64::from(*n)}))).collect()
 }
 
 fn pcp(degree: u32, cutoff_h: f64) -> Value {
@@ -59,7 +50,7 @@ pub fn rows() -> Rows {
         Reach::AtMost(2.5e-9),
         false,
     );
-    let sixth = with(&ellipse, &json!({"method": pcp(6, 3.5)}));
+    let sixth = with(ellipse.clone(), &json!({"method": pcp(6, 3.5)}));
     row(
         "2D plateau: degree 6 at 1/1024, max",
         "1e-13",
@@ -68,7 +59,7 @@ pub fn rows() -> Rows {
         Reach::AtMost(3e-14),
         true,
     );
-    let distance = with(&ellipse, &json!({"initial": "distance"}));
+    let distance = with(ellipse.clone(), &json!({"initial": "distance"}));
     row(
         "2D degree 4 from a distance: order of RMS",
         "–",
@@ -78,7 +69,7 @@ pub fn rows() -> Rows {
         false,
     );
     for (degree, cutoff_h) in [(2, 2.5), (3, 2.5), (5, 3.0), (6, 3.5)] {
-        let scene = with(&ellipse, &json!({"method": pcp(degree, cutoff_h)}));
+        let scene = with(ellipse.clone(), &json!({"method": pcp(degree, cutoff_h)}));
         let runs = over_spacings(&scene, &[16, 24, 32, 48, 64, 96, 128, 192, 256]);
         let reach = Reach::AtLeast(f64::from(degree) + 0.8);
         row(&format!("2D degree {degree}: order of RMS"), "–", runs, order(PHI_RMS), reach, degree > 3);
@@ -107,7 +98,7 @@ pub fn rows() -> Rows {
             true,
         );
     }
-    let fifth = with(&ellipsoid, &json!({"method": pcp(5, 2.6)}));
+    let fifth = with(ellipsoid.clone(), &json!({"method": pcp(5, 2.6)}));
     row(
         "3D degree 5, r_c = 2.6 h: order of phi, RMS",
         "–",
@@ -213,7 +204,7 @@ pub fn rows() -> Rows {
         Reach::AtMost(6e-3),
         false,
     );
-    let timed = with(&ellipsoid, &json!({"spacing": 1.0 / 64.0}));
+    let timed = with(ellipsoid.clone(), &json!({"spacing": 1.0 / 64.0}));
     row(
         "3D 1/64: seconds",
         "OpenFPM 11.6; algoim .73",
@@ -224,12 +215,13 @@ pub fn rows() -> Rows {
     );
 
     let line = |label: &str, scene: &Value, cells: &[u32]| (label.to_owned(), over_spacings(scene, cells));
-    let minter = with(&ellipse, &json!({"band": 0.125, "method": {"type": "pcp", "solver": "orthogonal"}}));
-    let monomial = with(&minter, &json!({"method": {"type": "pcp", "basis": "monomial", "solver": "orthogonal"}}));
+    let minter = with(ellipse.clone(), &json!({"band": 0.125, "method": {"type": "pcp", "solver": "orthogonal"}}));
+    let monomial =
+        with(minter.clone(), &json!({"method": {"type": "pcp", "basis": "monomial", "solver": "orthogonal"}}));
     let unscaled =
-        with(&minter, &json!({"method": {"type": "pcp", "basis": "monomial_unscaled", "solver": "orthogonal"}}));
-    let moments = with(&minter, &json!({"method": {"type": "pcp"}}));
-    let sixth = with(&minter, &json!({"method": pcp(6, 3.5)}));
+        with(minter.clone(), &json!({"method": {"type": "pcp", "basis": "monomial_unscaled", "solver": "orthogonal"}}));
+    let moments = with(minter.clone(), &json!({"method": {"type": "pcp"}}));
+    let sixth = with(minter.clone(), &json!({"method": pcp(6, 3.5)}));
     let grid = [32, 64, 128, 256, 512];
     let figure = Figure {
         name: "redistance",

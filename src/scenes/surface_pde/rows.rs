@@ -1,6 +1,6 @@
 //! What `surface_pde` must show (Surface DC-PSE paper, section 4).
 
-use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows};
+use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows, with};
 use serde_json::{Value, json};
 
 const ERROR: Quantity = Quantity::at_end("value", "relative");
@@ -10,14 +10,6 @@ const CONSTRUCTION: Measure = Measure::Seconds("operators/construction");
 const COUNTS: [u64; 4] = [1000, 4000, 16_000, 64_000];
 /// The same on a circle.
 const CIRCLE_COUNTS: [u64; 5] = [100, 200, 400, 800, 1600];
-
-/// A scene with something else laid over it.
-fn with(mut scene: Value, more: &Value) -> Value {
-    if let (Some(scene), Some(more)) = (scene.as_object_mut(), more.as_object()) {
-        scene.extend(more.clone());
-    }
-    scene
-}
 
 fn dcpse(order: u64) -> Value {
     json!({"type": "surface_dcpse", "order": order})

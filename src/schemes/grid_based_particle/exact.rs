@@ -89,12 +89,8 @@ impl<const D: usize> ExactFrontMotion<D> {
         let ball = ball?;
         match self {
             Self::Flow(motion) => {
-                let flow = motion.flow();
-                let is_back = flow.return_time().is_some_and(|period| {
-                    let turns = time / period;
-                    (turns - turns.round()).abs() < 1e-9
-                });
-                let center = flow.rigid_path(&ball.center, time).or(is_back.then_some(ball.center))?;
+                let back = motion.is_back(time).then_some(ball.center);
+                let center = motion.flow().rigid_path(&ball.center, time).or(back)?;
                 Some(Ball { center, radius: ball.radius })
             }
             Self::Offset { speed, .. } => {

@@ -145,7 +145,9 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         fields.vector("normal", feet.normals.iter().copied());
         fields.scalar("curvature", feet.curvatures.clone());
         if D == 3 {
-            fields.scalar("gauss_curvature", feet.gauss_curvatures.clone());
+            // Shapes tell their mean curvature alone.
+            let known = |value: &f64| if self.step > 0 { *value } else { f64::NAN };
+            fields.scalar("gauss_curvature", feet.gauss_curvatures.iter().map(known).collect());
         }
         fields.vector("velocity", (0..feet.len()).map(|i| self.velocity(i)));
         fields.vector("grid_point", feet.nodes.iter().map(|node| grid.place::<D>(*node)));
