@@ -2,7 +2,7 @@
 
 use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
-use crate::schemes::grid_based_particle::{FrontMethod, Topology};
+use crate::schemes::grid_based_particle::{self as gbpm, FrontMethod, MOST_LEVELS, Topology};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -55,17 +55,41 @@ pub const TOPOLOGY: Parameter = Parameter::new(
     Kind::Word(&["merge", "cross"]),
     DefaultValue::Json("\"merge\""),
 );
+/// Refinement.
+pub const ADAPTIVITY: Parameter = Parameter::new(
+    "adaptivity",
+    "refines the grid where the front is curved or close to another segment; when not given, the grid has one level",
+    Kind::Group(ADAPTIVITY_PARAMETERS),
+    DefaultValue::Absent,
+);
+
+static ADAPTIVITY_PARAMETERS: &[Parameter] = &[
+    Parameter::new(
+        "levels",
+        "levels of the grid: the coarsest has the spacing, each other half of that before",
+        Kind::Integer { least: 1, most: MOST_LEVELS as u64 },
+        DefaultValue::Json("3"),
+    ),
+    Parameter::new(
+        "curvature_constant",
+        "c: cells are halved as long as |κ| times their size is not below it",
+        POSITIVE,
+        DefaultValue::Json("0.2"),
+    ),
+];
+
 /// Step.
 pub const CFL: Parameter = Parameter::new(
     "cfl",
-    "dt · max speed/h; when neither it nor a step is given, 10 in a flow, .75 with a given speed, and dt = .5 h² under \
+    "dt · max speed/h, h that of the finest level; when neither it nor a step is given, 10 in a flow, .75 with a given speed, and dt = .5 h² under \
      mean_curvature",
     POSITIVE,
     DefaultValue::Absent,
 );
 
 /// All of them.
-pub static PARAMETERS: &[Parameter] = &[DEGREE, NEIGHBORS, WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, CFL];
+pub static PARAMETERS: &[Parameter] =
+    &[DEGREE, NEIGHBORS, WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, ADAPTIVITY, CFL];
 
 const COSINE: Kind = Kind::Number { above: Some(-1.0), least: None, below: Some(1.0), most: None };
 
@@ -105,10 +129,25 @@ pub struct Written {
     tube_radius_h: f64,
     min_separation_h: f64,
     segment_test: SegmentTest,
+    adaptivity: Option<Adaptivity>,
     /// None where the scene has no choice.
     topology: Option<String>,
     /// dt · max speed/h.
     pub cfl: Option<f64>,
+}
+
+impl Written {
+    /// How many levels the grid has.
+    #[must_use]
+    pub fn levels(&self) -> u32 {
+        self.adaptivity.map_or(1, |adaptivity| adaptivity.levels)
+    }
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Adaptivity {
+    levels: u32,
+    curvature_constant: f64,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -170,6 +209,9 @@ pub fn understand(
     resolved["weight"] = json!(weight);
     resolved["segment_test"] = json!({"type": name, "cosine": cosine});
     let (tube_radius, min_separation) = (written.tube_radius_h, written.min_separation_h);
-    let method = FrontMethod { degree, neighbors, weight, tube_radius, min_separation, cosine };
+    let adaptivity = written
+        .adaptivity
+        .map(|Adaptivity { levels, curvature_constant }| gbpm::Adaptivity { levels, curvature_constant });
+    let method = FrontMethod { degree, neighbors, weight, tube_radius, min_separation, cosine, adaptivity };
     Ok((Chosen { method, topology, by_part }, resolved))
 }

@@ -37,6 +37,7 @@ pub(super) static PARAMETERS: &[Parameter] = &[
     gbpm_parameters::MIN_SEPARATION,
     gbpm_parameters::SEGMENT_TEST,
     gbpm_parameters::TOPOLOGY,
+    gbpm_parameters::ADAPTIVITY,
     gbpm_parameters::CFL,
 ];
 

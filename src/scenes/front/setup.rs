@@ -121,10 +121,11 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         let detail = "motion by curvature has no speed to measure a step by; give time_step";
         violations.push(Violation::new("/cfl", "conflict", detail, &json!(written.cfl), Value::Null));
     }
+    let finest = choice.spacing / f64::from(1_u32 << (written.levels() - 1));
     let limit = match &choice.law {
-        Law::MeanCurvature => CURVATURE_STEP * choice.spacing * choice.spacing,
-        Law::Flow { .. } => written.cfl.unwrap_or(FLOW_CFL) * choice.spacing / top,
-        Law::Normal { .. } => written.cfl.unwrap_or(SPEED_CFL) * choice.spacing / top,
+        Law::MeanCurvature => CURVATURE_STEP * finest * finest,
+        Law::Flow { .. } => written.cfl.unwrap_or(FLOW_CFL) * finest / top,
+        Law::Normal { .. } => written.cfl.unwrap_or(SPEED_CFL) * finest / top,
     };
     let fixed = match (choice.time_step, choice.steps) {
         (Some(step), _) => FixedStep::from_time_step(choice.end_time, step),
@@ -186,7 +187,8 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             by_part: self.chosen.by_part,
             interrupt,
         };
-        Ok(FrontSystem::about(&shapes::parts::<D>(&self.choice.shape, "/shape")?, parts))
+        let surfaces = shapes::parts::<D>(&self.choice.shape, "/shape")?;
+        Ok(FrontSystem::about(&surfaces, parts))
     }
 
     fn exact(&self) -> Result<ExactFrontMotion<D>, Vec<Violation>> {
@@ -222,9 +224,11 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
-        let reach = self.chosen.method.tube_radius * self.choice.spacing;
+        // As if it were refined everywhere; what is, is counted.
+        let finest = self.choice.spacing / f64::from(1_u32 << (self.chosen.method.levels() - 1));
+        let reach = self.chosen.method.tube_radius * finest;
         let about = shapes::surface::<D>(&self.choice.shape, "/shape")
-            .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.choice.spacing));
+            .map_or(0, |surface| band_particles(surface.as_ref(), reach, finest));
         // Corners without foot-points matter where there are few.
         let counted = if about < COUNTED { self.system(Interrupt::default()).ok() } else { None };
         let at_start = counted.map_or(about, |system| system.particle_count() as u64);

@@ -124,13 +124,15 @@ impl<const D: usize> ExactFrontMotion<D> {
         interrupt: &Interrupt,
     ) -> Result<Option<FrontErrors>, Interrupted> {
         let ball = self.ball(ball, time);
-        let spacing = grid.spacing;
+        // The finest that there is.
+        let level = feet.nodes.iter().map(|node| Grid::level(*node)).max().unwrap_or(0);
+        let spacing = grid.spacing_at(level);
         let mut chains = Vec::new();
         let mut loose = Vec::new();
         let distances: Vec<f64> = if let Some(ball) = &ball {
             chains = ball.outline(spacing / POINTS_PER_SPACING);
             if chains.is_empty() {
-                sample(ball, grid, |x| loose.push(x));
+                sample(ball, spacing, |x| loose.push(x));
             }
             feet.positions.iter().map(|x| (x - ball.center).norm() - ball.radius).collect()
         } else {
@@ -139,14 +141,14 @@ impl<const D: usize> ExactFrontMotion<D> {
                     let Some(front) = motion.front(time, spacing, interrupt)? else { return Ok(None) };
                     chains = front.chains(spacing / POINTS_PER_SPACING);
                     if let (true, Some(surface)) = (chains.is_empty(), motion.surface()) {
-                        sample(surface, grid, |x| loose.extend(front.place_by_formula(&x)));
+                        sample(surface, spacing, |x| loose.extend(front.place_by_formula(&x)));
                     }
                     feet.positions.par_iter().map(|x| front.signed_distance(x)).collect()
                 }
                 Self::Offset { surfaces, speed, topology } => {
                     let way = speed * time;
                     let level = |x: &Vector<D>| offset_distance(surfaces, *topology, x, way);
-                    loose = offset_points(surfaces, *topology, grid, way);
+                    loose = offset_points(surfaces, *topology, spacing, way);
                     feet.positions.iter().map(level).collect()
                 }
                 Self::Shrinking(_) | Self::Unknown => return Ok(None),
@@ -166,10 +168,12 @@ impl<const D: usize> ExactFrontMotion<D> {
             f64::INFINITY
         } else {
             let samples = chains.iter().flatten().chain(&loose);
-            let far = samples.map(|x| cells.nearest(x, f64::INFINITY).map_or(f64::INFINITY, |(_, r)| r));
-            far.fold(f64::NAN, f64::max) / spacing
+            let far = |(i, r): (usize, f64)| r / grid.spacing_of(feet.nodes[i]);
+            let far = samples.map(|x| cells.nearest(x, f64::INFINITY).map_or(f64::INFINITY, far));
+            far.fold(f64::NAN, f64::max)
         };
-        let gap = if chains.is_empty() { f64::NAN } else { largest_gap(&chains, &feet.positions) / spacing };
+        let spacings = feet.nodes.iter().map(|node| grid.spacing_of(*node));
+        let gap = if chains.is_empty() { f64::NAN } else { largest_gap(&chains, &feet.positions, spacings) };
         let mut values = [f64::NAN; ENTRIES.len()];
         values[..3].copy_from_slice(&[sum / count, norms.rms(), norms.max()]);
         (values[4], values[5], values[9]) = (coverage, gap, count);
@@ -219,22 +223,23 @@ fn offset_distance<const D: usize>(
 }
 
 /// Points of a surface about half a spacing apart, from a lattice of its own: that of the foot-points would find these again.
-fn sample<const D: usize>(surface: &dyn Surface<D>, grid: &Grid, mut visit: impl FnMut(Vector<D>)) {
-    let fine = Grid { spacing: SAMPLE * grid.spacing };
-    for_each_near(surface, 0.5 * fine.spacing * (D as f64).sqrt(), &fine, |_, x| visit(surface.nearest(&x).point));
+fn sample<const D: usize>(surface: &dyn Surface<D>, spacing: f64, mut visit: impl FnMut(Vector<D>)) {
+    let fine = Grid { spacing: SAMPLE * spacing };
+    let reach = 0.5 * fine.spacing * (D as f64).sqrt();
+    for_each_near(surface, reach, (&fine, 0), |_, x| visit(surface.nearest(&x).point));
 }
 
 /// Points of that front: points of a lattice near it, moved along the ray from the start that passes through them.
 fn offset_points<const D: usize>(
     surfaces: &[Box<dyn Surface<D>>],
     topology: Topology,
-    grid: &Grid,
+    spacing: f64,
     way: f64,
 ) -> Vec<Vector<D>> {
     let mut points = Vec::new();
-    let fine = Grid { spacing: SAMPLE * grid.spacing };
+    let fine = Grid { spacing: SAMPLE * spacing };
     for surface in surfaces {
-        for_each_near(surface.as_ref(), way.abs() + fine.spacing, &fine, |_, x| {
+        for_each_near(surface.as_ref(), way.abs() + fine.spacing, (&fine, 0), |_, x| {
             let exact = surface.nearest(&x);
             if (exact.distance - way).abs() > fine.spacing || exact.distance == 0.0 {
                 return;
@@ -248,40 +253,53 @@ fn offset_points<const D: usize>(
     points
 }
 
-/// The longest part of the chains between the nearest points of the given places.
-fn largest_gap<const D: usize>(chains: &[Vec<Vector<D>>], places: &[Vector<D>]) -> f64 {
+/// The longest part of the chains between the nearest points of the given places, by the coarser spacing of its two ends.
+fn largest_gap<const D: usize>(
+    chains: &[Vec<Vector<D>>],
+    places: &[Vector<D>],
+    spacings: impl Iterator<Item = f64> + Clone,
+) -> f64 {
+    if places.is_empty() {
+        return f64::INFINITY;
+    }
     let all: Vec<Vector<D>> = chains.iter().flatten().copied().collect();
     let mut cells = CellList::new(Domain::unbounded());
     let step = all.windows(2).map(|pair| (pair[1] - pair[0]).norm()).fold(f64::INFINITY, f64::min);
     cells.rebuild(all.iter().copied(), step.max(f64::MIN_POSITIVE));
-    let mut is_hit = vec![false; all.len()];
-    for place in places {
+    let finest = spacings.clone().fold(f64::INFINITY, f64::min);
+    // The spacing of the place that a point is nearest to.
+    let mut hits: Vec<Option<f64>> = vec![None; all.len()];
+    for (place, spacing) in places.iter().zip(spacings) {
         if let Some((nearest, _)) = cells.nearest(place, f64::INFINITY) {
-            is_hit[nearest] = true;
+            let hit = hits[nearest].get_or_insert(spacing);
+            *hit = hit.max(spacing);
         }
     }
     let mut first = 0;
     let mut largest = 0.0_f64;
     for chain in chains {
-        let hits = &is_hit[first..first + chain.len()];
+        let hits = &hits[first..first + chain.len()];
         first += chain.len();
         // Once round from the first hit, and on to it again; a chain without a hit is one gap.
         let mut since_hit = 0.0;
-        let mut before_first = None;
+        let mut start: Option<(f64, f64)> = None;
+        let mut last = finest;
         for (k, hit) in hits.iter().enumerate() {
             if k > 0 {
                 since_hit += (chain[k] - chain[k - 1]).norm();
             }
-            if *hit {
-                if before_first.is_none() {
-                    before_first = Some(since_hit);
+            if let Some(spacing) = *hit {
+                if start.is_none() {
+                    start = Some((since_hit, spacing));
                 } else {
-                    largest = largest.max(since_hit);
+                    largest = largest.max(since_hit / spacing.max(last));
                 }
                 since_hit = 0.0;
+                last = spacing;
             }
         }
-        largest = largest.max(since_hit + before_first.unwrap_or(0.0));
+        let (before, spacing) = start.unwrap_or((0.0, finest));
+        largest = largest.max((since_hit + before) / spacing.max(last));
     }
     largest
 }
@@ -305,8 +323,14 @@ mod tests {
         let chains = ball().outline(0.001);
         let places: Vec<Vector<2>> = (0..100).map(|k| at(f64::from(k) * 0.05 + 0.4)).collect();
         let missing = std::f64::consts::TAU - 99.0 * 0.05;
-        assert!((largest_gap(&chains, &places) - 0.5 * missing).abs() < 2e-3);
-        assert!((largest_gap(&chains, &[]) - 0.5 * std::f64::consts::TAU).abs() < 1e-3);
+        let gap = largest_gap(&chains, &places, std::iter::repeat_n(0.1, 100));
+        assert!((gap - 5.0 * missing).abs() < 2e-2);
+        // One end at a coarser level: the same way is fewer of its spacings.
+        let coarser = (0..100).map(|k| if k == 0 { 0.2 } else { 0.1 });
+        assert!((largest_gap(&chains, &places, coarser) - 2.5 * missing).abs() < 1e-2);
+        let start = &places[..1];
+        assert!((largest_gap(&chains, start, std::iter::once(0.1)) - 5.0 * std::f64::consts::TAU).abs() < 2e-2);
+        assert_eq!(largest_gap(&chains, &[], std::iter::empty()), f64::INFINITY);
     }
 
     #[test]

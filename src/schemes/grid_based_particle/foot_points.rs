@@ -105,7 +105,7 @@ impl<const D: usize> FootPoints<D> {
         state.push_vectors("normal", &self.normals);
         state.push_reals("curvature", &self.curvatures);
         state.push_reals("gauss_curvature", &self.gauss_curvatures);
-        state.push_counts("node", self.nodes.clone());
+        state.push_counts("grid_point", self.nodes.clone());
         state.push_counts("part", self.parts.iter().map(|part| u64::from(*part)).collect());
     }
 
@@ -117,7 +117,7 @@ impl<const D: usize> FootPoints<D> {
         let vectors = |name: &str| -> Result<Vec<Vector<D>>, RestoreError> {
             Ok(state.reals(name)?.chunks_exact(D).map(Vector::<D>::from_column_slice).collect())
         };
-        let nodes = state.counts("node")?.to_vec();
+        let nodes = state.counts("grid_point")?.to_vec();
         let n = nodes.len();
         for (name, components) in [("position", D), ("normal", D), ("curvature", 1), ("gauss_curvature", 1)] {
             check_length(name, state.reals(name)?.len(), n * components)?;

@@ -1,5 +1,7 @@
 //! What a front is reconstructed by.
 
+use super::refinement::Adaptivity;
+
 /// Parameters of the local reconstructions and of the tube (GBPM 3.2 to 3.4), lengths in spacings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrontMethod {
@@ -15,4 +17,14 @@ pub struct FrontMethod {
     pub min_separation: f64,
     /// Cosine of the normals up to which particles belong to one segment.
     pub cosine: f64,
+    /// Where the grid is refined; None where it has one level.
+    pub adaptivity: Option<Adaptivity>,
+}
+
+impl FrontMethod {
+    /// How many levels the grid has.
+    #[must_use]
+    pub fn levels(&self) -> u32 {
+        self.adaptivity.map_or(1, |adaptivity| adaptivity.levels)
+    }
 }

@@ -1,7 +1,8 @@
 //! The closest point of the front to a place, by a local reconstruction through the particles about it (GBPM 3.3.1 to 3.3.3).
 
 use super::foot_points::{FootPoint, FootPoints};
-use super::local_graph::{GraphJet, Terms};
+use super::grid::Grid;
+use super::local_graph::Terms;
 use super::method::FrontMethod;
 use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
@@ -50,7 +51,7 @@ pub(super) struct Reconstruction<'a, const D: usize, const M: usize> {
     pub quadratic: &'a Terms<M>,
     /// Whether segments are told apart by the part of the front beside their normals.
     pub by_part: bool,
-    pub spacing: f64,
+    pub grid: Grid,
 }
 
 /// Storage of a thread.
@@ -76,7 +77,7 @@ impl<const D: usize, const M: usize> Default for Room<D, M> {
 }
 
 impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
-    /// The closest point of the front to p.
+    /// The closest point of the front to a place, that of a grid point of a level with some spacing or a particle of it.
     ///
     /// 1. The particles about p, nearest first. 2. The nearest is the base of a segment: the particles whose normals agree
     ///    with its own. 3. A reconstruction of the segment, and its closest point. 4. The same for the nearest particle that belongs to
@@ -84,21 +85,28 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
     ///
     /// # Errors
     /// [`Failure`] of the nearest segment where none has an answer.
-    pub fn closest(&self, p: &Vector<D>, room: &mut Room<D, M>) -> Result<FootPoint<D>, Failure> {
-        let mut reach = self.method.tube_radius + if M == 1 { 1.4 } else { 1.0 };
+    pub fn closest(&self, p: &Vector<D>, spacing: f64, room: &mut Room<D, M>) -> Result<FootPoint<D>, Failure> {
+        let first_reach = self.method.tube_radius + if M == 1 { 1.4 } else { 1.0 };
+        let mut reach = first_reach * spacing;
         self.gather(p, reach, room);
+        // About a new grid point of a finer level there are the particles of the coarser one.
+        while room.near.is_empty() && reach < first_reach * self.grid.spacing {
+            reach *= GROWTH;
+            self.gather(p, reach, room);
+        }
         room.bases.clear();
         let mut best: Result<(f64, FootPoint<D>), Failure> = Err(Failure::Starved);
         for segment in 0..MOST_SEGMENTS {
             let next = room.near.iter().find(|near| !room.bases.iter().any(|base| self.agrees(*base, near.index)));
             let Some(base) = next.copied() else { break };
             if let Ok((distance, _)) = best
-                && base.r2.sqrt() > distance + SEGMENT_MARGIN * self.spacing
+                && base.r2.sqrt() > distance + SEGMENT_MARGIN * spacing
             {
                 break;
             }
             room.bases.push(base.index);
-            let found = self.of_segment(p, base.index, &mut reach, room);
+            let unit = spacing.max(self.grid.spacing_of(self.feet.nodes[base.index]));
+            let found = self.of_segment(p, base.index, unit, &mut reach, room);
             match found {
                 Ok(foot) => {
                     let distance = (foot.position - p).norm();
@@ -120,13 +128,13 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
     }
 
     fn gather(&self, p: &Vector<D>, reach: f64, room: &mut Room<D, M>) {
-        self.cells.gather(p, reach * self.spacing, &mut room.near);
+        self.cells.gather(p, reach, &mut room.near);
         room.near.sort_unstable_by(|a, b| a.r2.total_cmp(&b.r2).then(a.index.cmp(&b.index)));
     }
 
     /// Particles of the segment of a base, nearest first, each some way from those taken before.
-    fn choose(&self, base: usize, number: usize, room: &mut Room<D, M>) {
-        let least = (self.method.min_separation * self.spacing).powi(2);
+    fn choose(&self, base: usize, number: usize, unit: f64, room: &mut Room<D, M>) {
+        let least = (self.method.min_separation * unit).powi(2);
         room.chosen.clear();
         room.chosen.push(base);
         for near in &room.near {
@@ -141,18 +149,20 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
     }
 
-    /// The closest point of one segment: with more particles where those taken do not determine the polynomial well, as on
-    /// two rows of a lattice.
+    /// The closest point of one segment, in units of the coarser spacing of grid point and base: with more particles where
+    /// those taken do not determine the polynomial well, as on two rows of a lattice.
     fn of_segment(
         &self,
         p: &Vector<D>,
         base: usize,
+        unit: f64,
         reach: &mut f64,
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
         let mut number = self.method.neighbors;
         loop {
-            let found = self.with_particles(p, base, number, reach, room);
+            self.take(p, base, (number, unit), reach, room);
+            let found = self.with_particles(p, base, unit, room);
             if found != Err(Failure::Undetermined) || number > 2 * self.method.neighbors {
                 return found;
             }
@@ -160,22 +170,32 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
     }
 
-    fn with_particles(
+    /// Chooses so many particles, from farther away where too few are near.
+    fn take(
         &self,
         p: &Vector<D>,
         base: usize,
-        number: usize,
+        (number, unit): (usize, f64),
         reach: &mut f64,
         room: &mut Room<D, M>,
-    ) -> Result<FootPoint<D>, Failure> {
+    ) {
         loop {
-            self.choose(base, number, room);
-            if room.chosen.len() >= number || *reach * GROWTH > FARTHEST {
-                break;
+            self.choose(base, number, unit, room);
+            if room.chosen.len() >= number || *reach * GROWTH > FARTHEST * unit {
+                return;
             }
             *reach *= GROWTH;
             self.gather(p, *reach, room);
         }
+    }
+
+    fn with_particles(
+        &self,
+        p: &Vector<D>,
+        base: usize,
+        unit: f64,
+        room: &mut Room<D, M>,
+    ) -> Result<FootPoint<D>, Failure> {
         if room.chosen.len() < self.quadratic.count() {
             return Err(Failure::Starved);
         }
@@ -183,7 +203,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let straightest = room.chosen.iter().map(|j| normals[*j].dot(&normals[base])).fold(1.0, f64::min);
         let mut first = Err(Failure::Unresolved);
         if straightest > TURNED {
-            first = self.fit(p, base, &normals[base], self.terms, room);
+            first = self.fit(p, base, (&normals[base], self.terms), unit, room);
             if first.is_ok() || first == Err(Failure::Undetermined) {
                 return first;
             }
@@ -191,7 +211,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         // Where the front turns within the stencil, its mean normal is the better upward direction, and less is known of it.
         let mean: Vector<D> = room.chosen.iter().map(|j| normals[*j]).sum();
         let Some(mean) = mean.try_normalize(0.1) else { return first };
-        self.fit(p, base, &mean, self.quadratic, room).or(first)
+        self.fit(p, base, (&mean, self.quadratic), unit, room).or(first)
     }
 
     /// One fit in the frame of an upward direction.
@@ -199,13 +219,13 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         &self,
         p: &Vector<D>,
         base: usize,
-        up: &Vector<D>,
-        terms: &Terms<M>,
+        (up, terms): (&Vector<D>, &Terms<M>),
+        unit: f64,
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
         let origin = self.feet.positions[base];
         let frame = tangents::<D, M>(up);
-        let inverse = 1.0 / self.spacing;
+        let inverse = 1.0 / unit;
         let local = |x: &Vector<D>| -> ([f64; M], f64) {
             let d = (x - origin) * inverse;
             (frame.map(|t| t.dot(&d)), up.dot(&d))
@@ -229,27 +249,18 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if is_sharp || normal.dot(&self.feet.normals[base]) < LEAST_AGREEMENT {
             return Err(Failure::Unresolved);
         }
-        let mut position = origin + up * (jet.value * self.spacing);
+        let mut position = origin + up * (jet.value * unit);
         for (t, s) in frame.iter().zip(s) {
-            position += t * (s * self.spacing);
+            position += t * (s * unit);
         }
         let nearest = |j: &usize| (self.feet.positions[*j] - position).norm_squared();
         let nearest = room.chosen.iter().map(nearest).fold(f64::INFINITY, f64::min);
         let most = if beyond > 0.0 { MOST_LONELY } else { WIDEST_BRIDGE };
-        if nearest > (most * self.spacing).powi(2) {
+        if nearest > (most * unit).powi(2) {
             return Err(Failure::Extrapolated);
         }
-        Ok(FootPoint { position, normal, part: self.feet.parts[base], ..self.bent(&jet) })
-    }
-
-    fn bent(&self, jet: &GraphJet<M>) -> FootPoint<D> {
-        FootPoint {
-            position: Vector::<D>::zeros(),
-            normal: Vector::<D>::zeros(),
-            curvature: jet.curvature() / self.spacing,
-            gauss_curvature: jet.gauss_curvature() / (self.spacing * self.spacing),
-            part: 0,
-        }
+        let (curvature, gauss_curvature) = (jet.curvature() / unit, jet.gauss_curvature() / (unit * unit));
+        Ok(FootPoint { position, normal, curvature, gauss_curvature, part: self.feet.parts[base] })
     }
 }
 

@@ -4,7 +4,7 @@
 //! and deactivation of the tube are one thing.
 
 use super::foot_points::FootPoint;
-use super::grid::Node;
+use super::grid::{Grid, Node};
 use super::reconstruction::{Failure, Reconstruction, Room, WIDEST_BRIDGE};
 use super::system::FrontSystem;
 use crate::geometry::Vector;
@@ -65,17 +65,18 @@ impl Removals {
 pub(super) type Outcome<const D: usize> = Result<FootPoint<D>, Failure>;
 
 impl<const D: usize, const M: usize> FrontSystem<D, M> {
-    /// 1. The moved particles are sorted into cells. 2. Each proposes the grid points about it. 3. Each of these gets the closest
-    ///    point of its local reconstruction. 4. Those within the tube are the new foot-points. 5. In a flow, where every
-    ///    particle is exact by itself, one that nothing has replaced stays.
+    /// 1. The moved particles are sorted into cells, and the grid is refined where they need it. 2. Each proposes the grid points
+    ///    about it. 3. Each of these gets the closest point of its local reconstruction. 4. Those within the tube are the new
+    ///    foot-points. 5. In a flow, where every particle is exact by itself, one that nothing has replaced stays.
     pub(super) fn resample(&mut self) -> Result<(), Interrupted> {
         self.sort_cells();
+        self.refine()?;
         self.propose();
         self.outcomes.clear();
         self.outcomes.resize(self.candidates.len(), Err(Failure::Starved));
         let mut outcomes = std::mem::take(&mut self.outcomes);
         let (grid, interrupt) = (self.parts.grid, &self.parts.interrupt);
-        let place = |node: &Node| grid.place(*node);
+        let place = |_: usize, node: &Node| (grid.place(*node), grid.spacing_of(*node));
         let filled = fill(&self.reconstruction(), &self.candidates, &mut outcomes, &self.rooms, interrupt, place);
         self.outcomes = outcomes;
         filled?;
@@ -87,27 +88,41 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         Ok(())
     }
 
-    /// The grid points that the particles have about them, each once and in order.
+    /// Splits the cells where the particles need it.
+    pub(super) fn refine(&mut self) -> Result<(), Interrupted> {
+        let Self { refinement, feet, cells, parts, .. } = self;
+        refinement.renew(feet, cells, (&parts.grid, &parts.method), parts.by_part, &parts.interrupt)
+    }
+
+    /// The grid points that the particles have about them, each once and in order: of each level those of cells without parts.
     fn propose(&mut self) {
         let grid = self.parts.grid;
-        let across = (self.parts.method.tube_radius + MARGIN) * grid.spacing;
+        let width = self.parts.method.tube_radius + MARGIN;
+        let levels = self.parts.method.levels();
         self.candidates.clear();
         for i in 0..self.feet.len() {
             let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
-            if grid.nearest(y).is_none() {
+            if grid.nearest(y, levels - 1).is_none() {
                 self.removals.outside += 1;
                 continue;
             }
-            let along = if self.is_at_gap(i) { WIDEST_BRIDGE } else { ALONG };
-            let reach = (self.parts.method.tube_radius + MARGIN).hypot(along).floor() as i64 + 1;
-            let along = (along * grid.spacing).powi(2);
-            grid.for_each_about(y, reach, |node, place| {
-                let d = place - y;
-                let height = d.dot(n);
-                if height.abs() <= across && d.norm_squared() - height * height <= along {
-                    self.candidates.push(node);
-                }
-            });
+            let own = grid.spacing_of(self.feet.nodes[i]);
+            let farthest = own * if self.is_at_gap(i) { WIDEST_BRIDGE } else { ALONG };
+            for level in 0..levels {
+                let spacing = grid.spacing_at(level);
+                let (across, along) = (width * spacing, farthest.max(ALONG * spacing));
+                let reach = across.hypot(along);
+                let corner = |side: f64| grid.nearest(&y.add_scalar(side), level);
+                let (Some(low), Some(high)) = (corner(-reach), corner(reach)) else { continue };
+                Grid::for_each_in(&low, &high, |at| {
+                    let d = grid.center(at, level) - y;
+                    let height = d.dot(n);
+                    let is_near = height.abs() <= across && d.norm_squared() - height * height <= along * along;
+                    if is_near && self.refinement.is_leaf(at, level) {
+                        self.candidates.push(Grid::node(at, level));
+                    }
+                });
+            }
         }
         self.candidates.sort_unstable();
         self.candidates.dedup();
@@ -116,7 +131,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// Whether a particle has nobody of its segment near it in some direction along the front: a motion has drawn its neighbours
     /// away, or a sharp tip has become round again and lacks particles.
     fn is_at_gap(&self, i: usize) -> bool {
-        let spacing = self.parts.grid.spacing;
+        let spacing = self.parts.grid.spacing_of(self.feet.nodes[i]);
         let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
         let frame = tangents::<D, M>(n);
         let mut has_neighbor = [[false; 2]; M];
@@ -137,12 +152,12 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// New foot-points from the outcomes within the tube.
     fn renew(&mut self) {
         let grid = self.parts.grid;
-        let radius = self.parts.method.tube_radius * grid.spacing;
+        let radius = self.parts.method.tube_radius;
         self.fresh.clear();
         for (node, outcome) in self.candidates.iter().zip(&self.outcomes) {
             match outcome {
                 Ok(foot) => {
-                    if (foot.position - grid.place::<D>(*node)).norm() <= radius {
+                    if (foot.position - grid.place::<D>(*node)).norm() <= radius * grid.spacing_of(*node) {
                         self.fresh.push(*node, foot);
                     }
                 }
@@ -158,14 +173,14 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         let grid = self.parts.grid;
         self.fresh_cells.rebuild(self.fresh.positions.iter().copied(), grid.spacing);
         let order = self.fresh_cells.order();
-        let reach = COVERED[M - 1] * grid.spacing;
         for i in 0..self.feet.len() {
             let foot = self.feet.get(i);
-            let is_replaced = self.fresh_cells.any_within(&foot.position, reach, |place| {
+            let Some(node) = self.refinement.leaf_at(&grid, &foot.position) else { continue };
+            let spacing = grid.spacing_of(node).max(grid.spacing_of(self.feet.nodes[i]));
+            let is_replaced = self.fresh_cells.any_within(&foot.position, COVERED[M - 1] * spacing, |place| {
                 self.fresh.normals[order[place]].dot(&foot.normal) > self.parts.method.cosine
             });
-            if !is_replaced && let Some(at) = grid.nearest(&foot.position) {
-                let node: Node = super::Grid::node(&at);
+            if !is_replaced {
                 self.fresh.push(node, &foot);
                 self.removals.kept += 1;
             }
@@ -173,22 +188,23 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     }
 }
 
-/// The outcome of a reconstruction at every item's place.
+/// The outcome of a reconstruction at every item's place, where the grid has that spacing.
 pub(super) fn fill<const D: usize, const M: usize, T: Sync>(
     reconstruction: &Reconstruction<'_, D, M>,
     items: &[T],
     outcomes: &mut [Outcome<D>],
     rooms: &PerThread<Room<D, M>>,
     interrupt: &Interrupt,
-    place: impl Fn(&T) -> Vector<D> + Sync,
+    place: impl Fn(usize, &T) -> (Vector<D>, f64) + Sync,
 ) -> Result<(), Interrupted> {
-    items.par_chunks(BLOCK).zip(outcomes.par_chunks_mut(BLOCK)).for_each(|(items, outcomes)| {
+    items.par_chunks(BLOCK).zip(outcomes.par_chunks_mut(BLOCK)).enumerate().for_each(|(block, (items, outcomes))| {
         if interrupt.is_raised() {
             return;
         }
         rooms.with(|room| {
-            for (item, outcome) in items.iter().zip(outcomes) {
-                *outcome = reconstruction.closest(&place(item), room);
+            for (k, (item, outcome)) in items.iter().zip(outcomes).enumerate() {
+                let (place, spacing) = place(block * BLOCK + k, item);
+                *outcome = reconstruction.closest(&place, spacing, room);
             }
         });
     });

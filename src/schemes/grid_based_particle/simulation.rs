@@ -2,6 +2,7 @@
 
 use super::exact::{ExactFrontMotion, FrontErrors};
 use super::foot_points::FootPoints;
+use super::grid::Grid;
 use super::motion::{self, Law};
 use super::resampling::Removals;
 use super::system::FrontSystem;
@@ -151,6 +152,9 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         }
         fields.vector("velocity", (0..feet.len()).map(|i| self.velocity(i)));
         fields.vector("grid_point", feet.nodes.iter().map(|node| grid.place::<D>(*node)));
+        if self.system.parts.method.adaptivity.is_some() {
+            fields.scalar("level", feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
+        }
         fields.scalar("segment", feet.parts.iter().map(|part| f64::from(*part)).collect());
         fields.id("particle_id", (0..feet.len() as u64).collect());
         fields

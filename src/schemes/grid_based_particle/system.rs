@@ -6,6 +6,7 @@ use super::local_graph::Terms;
 use super::method::FrontMethod;
 use super::motion::{self, Law};
 use super::reconstruction::{Failure, Reconstruction, Room};
+use super::refinement::Refinement;
 use super::resampling::{Outcome, Removals, fill};
 use super::topology::{Topology, mark_unswept};
 use crate::geometry::{Domain, Surface, Vector};
@@ -45,6 +46,7 @@ pub struct FrontSystem<const D: usize, const M: usize> {
     pub(super) candidates: Vec<Node>,
     pub(super) outcomes: Vec<Outcome<D>>,
     pub(super) rooms: PerThread<Room<D, M>>,
+    pub(super) refinement: Refinement,
     pub(super) removals: Removals,
     keep: Vec<bool>,
     /// Positions at the start of a step, and the sum of its stages' velocities.
@@ -57,36 +59,15 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     ///
     /// At a corner, where a surface has no normal, it is the direction from the corner to the grid point, outward, where the
     /// corner opens; elsewhere the sides go on until they meet.
+    ///
+    /// Where the grid is refined, coarse foot-points first tell where; an interrupt ends that early, and then the first step.
     #[must_use]
     pub fn about(surfaces: &[Box<dyn Surface<D>>], parts: FrontParts<D>) -> Self {
-        let mut feet = FootPoints::default();
-        let radius = parts.method.tube_radius * parts.grid.spacing;
-        let mut near: Vec<(Node, FootPoint<D>)> = Vec::new();
-        for (part, surface) in surfaces.iter().enumerate() {
-            for_each_near(surface.as_ref(), radius, &parts.grid, |node, place| {
-                let exact = surface.nearest(&place);
-                let way = (place - exact.point) * exact.distance.signum();
-                let fan = || parts.law.opens_corners(exact.distance).then(|| way.try_normalize(0.0)).flatten();
-                let normal = exact.normal.or_else(fan);
-                if let Some(normal) = normal.filter(|_| exact.distance.abs() <= radius) {
-                    let curvature = exact.curvature.unwrap_or(0.0);
-                    let foot =
-                        FootPoint { position: exact.point, normal, curvature, gauss_curvature: 0.0, part: part as u32 };
-                    near.push((node, foot));
-                }
-            });
-        }
-        // Where parts share a grid point the nearer one has it.
-        let distance = |(node, foot): &(Node, FootPoint<D>)| (foot.position - parts.grid.place::<D>(*node)).norm();
-        near.sort_by(|a, b| a.0.cmp(&b.0).then(distance(a).total_cmp(&distance(b))).then(a.1.part.cmp(&b.1.part)));
-        near.dedup_by_key(|(node, _)| *node);
-        for (node, foot) in &near {
-            feet.push(*node, foot);
-        }
         let (terms, quadratic) = (Terms::new(parts.method.degree), Terms::new(2));
-        Self {
+        let levels = parts.method.levels();
+        let mut system = Self {
             parts,
-            feet,
+            feet: FootPoints::default(),
             fresh: FootPoints::default(),
             cells: CellList::new(Domain::unbounded()),
             fresh_cells: CellList::new(Domain::unbounded()),
@@ -95,10 +76,51 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             candidates: Vec::new(),
             outcomes: Vec::new(),
             rooms: PerThread::new(),
+            refinement: Refinement::default(),
             removals: Removals::default(),
             keep: Vec::new(),
             starts: Vec::new(),
             slopes: Vec::new(),
+        };
+        system.place_on(surfaces);
+        for _ in 1..levels {
+            system.sort_cells();
+            if system.refine().is_err() {
+                break;
+            }
+            system.place_on(surfaces);
+        }
+        system
+    }
+
+    /// Foot-points of the grid as it is refined.
+    fn place_on(&mut self, surfaces: &[Box<dyn Surface<D>>]) {
+        let Self { parts, feet, refinement, .. } = self;
+        let mut near: Vec<(Node, FootPoint<D>)> = Vec::new();
+        for level in 0..parts.method.levels() {
+            let radius = parts.method.tube_radius * parts.grid.spacing_at(level);
+            for (part, surface) in surfaces.iter().enumerate() {
+                for_each_near(surface.as_ref(), radius, (&parts.grid, level), |at, place| {
+                    let exact = surface.nearest(&place);
+                    let way = (place - exact.point) * exact.distance.signum();
+                    let fan = || parts.law.opens_corners(exact.distance).then(|| way.try_normalize(0.0)).flatten();
+                    let normal = exact.normal.or_else(fan);
+                    let is_active = exact.distance.abs() <= radius && refinement.is_leaf(at, level);
+                    if let Some(normal) = normal.filter(|_| is_active) {
+                        let (position, curvature) = (exact.point, exact.curvature.unwrap_or(0.0));
+                        let foot = FootPoint { position, normal, curvature, gauss_curvature: 0.0, part: part as u32 };
+                        near.push((Grid::node(at, level), foot));
+                    }
+                });
+            }
+        }
+        // Where parts share a grid point the nearer one has it.
+        let distance = |(node, foot): &(Node, FootPoint<D>)| (foot.position - parts.grid.place::<D>(*node)).norm();
+        near.sort_by(|a, b| a.0.cmp(&b.0).then(distance(a).total_cmp(&distance(b))).then(a.1.part.cmp(&b.1.part)));
+        near.dedup_by_key(|(node, _)| *node);
+        feet.clear();
+        for (node, foot) in &near {
+            feet.push(*node, foot);
         }
     }
 
@@ -117,7 +139,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             terms: &self.terms,
             quadratic: &self.quadratic,
             by_part: self.parts.by_part,
-            spacing: self.parts.grid.spacing,
+            grid: self.parts.grid,
         }
     }
 
@@ -171,7 +193,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             Law::MeanCurvature => -curvatures[i] * step,
             Law::Flow(_) => 0.0,
         };
-        mark_unswept(feet, cells, &parts.method, parts.grid.spacing, &way, keep, &parts.interrupt)?;
+        mark_unswept(feet, cells, (&parts.method, &parts.grid), &way, keep, &parts.interrupt)?;
         let removed = keep.iter().filter(|keep| !**keep).count();
         if removed > 0 {
             self.removals.swept += removed as u64;
@@ -220,7 +242,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         self.outcomes.resize(self.feet.len(), Err(Failure::Starved));
         let mut outcomes = std::mem::take(&mut self.outcomes);
         let (positions, interrupt) = (&self.feet.positions, &self.parts.interrupt);
-        let filled = fill(&self.reconstruction(), positions, &mut outcomes, &self.rooms, interrupt, |x| *x);
+        let place = |i: usize, x: &Vector<D>| (*x, self.parts.grid.spacing_of(self.feet.nodes[i]));
+        let filled = fill(&self.reconstruction(), positions, &mut outcomes, &self.rooms, interrupt, place);
         self.outcomes = outcomes;
         filled?;
         for (i, outcome) in self.outcomes.iter().enumerate() {
@@ -239,25 +262,25 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
 pub(super) fn for_each_near<const D: usize>(
     surface: &dyn Surface<D>,
     radius: f64,
-    grid: &Grid,
-    mut visit: impl FnMut(Node, Vector<D>),
+    (grid, level): (&Grid, u32),
+    mut visit: impl FnMut(&[i64; D], Vector<D>),
 ) {
     let (low, high) = surface.bounding_box();
-    let margin = radius + grid.spacing;
-    let (Some(low), Some(high)) = (grid.nearest(&low.add_scalar(-margin)), grid.nearest(&high.add_scalar(margin)))
-    else {
-        return;
-    };
+    let spacing = grid.spacing_at(level);
+    let margin = radius + spacing;
+    let corner = |x: &Vector<D>, side: f64| grid.nearest(&x.add_scalar(side), level);
+    let (Some(low), Some(high)) = (corner(&low, -margin), corner(&high, margin)) else { return };
     let mut boxes = vec![(low, high)];
     while let Some((low, high)) = boxes.pop() {
-        let center = Vector::<D>::from_fn(|d, _| 0.5 * (low[d] + high[d]) as f64 * grid.spacing);
-        let half = Vector::<D>::from_fn(|d, _| 0.5 * (high[d] - low[d]) as f64 * grid.spacing).norm();
+        let (first, last) = (grid.center(&low, level), grid.center(&high, level));
+        let center = (first + last) * 0.5;
+        let half = 0.5 * (last - first).norm();
         if surface.signed_distance(&center).abs() > half * (1.0 + 1e-12) + radius {
             continue;
         }
         let longest = (0..D).fold(0, |best, d| if high[d] - low[d] > high[best] - low[best] { d } else { best });
         if high[longest] == low[longest] {
-            visit(Grid::node(&low), center);
+            visit(&low, center);
             continue;
         }
         let middle = low[longest] + (high[longest] - low[longest]) / 2;

@@ -5,6 +5,7 @@
 //! more than both have moved in the step.
 
 use super::foot_points::FootPoints;
+use super::grid::Grid;
 use super::method::FrontMethod;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
@@ -31,8 +32,7 @@ const BEHIND: f64 = 1e-9;
 pub(super) fn mark_unswept<const D: usize>(
     feet: &FootPoints<D>,
     cells: &CellList<D>,
-    method: &FrontMethod,
-    spacing: f64,
+    (method, grid): (&FrontMethod, &Grid),
     way: &(impl Fn(usize) -> f64 + Sync),
     keep: &mut Vec<bool>,
     interrupt: &Interrupt,
@@ -45,7 +45,7 @@ pub(super) fn mark_unswept<const D: usize>(
                 return;
             }
             let i = block * BLOCK + k;
-            let (x, n) = (&feet.positions[i], &feet.normals[i]);
+            let (x, n, spacing) = (&feet.positions[i], &feet.normals[i], grid.spacing_of(feet.nodes[i]));
             let mut nearest: Option<(f64, usize)> = None;
             cells.for_each_within(x, REACH * spacing, |j, _, r2| {
                 if feet.normals[j].dot(n) <= method.cosine && nearest.is_none_or(|best| (r2, j) < best) {

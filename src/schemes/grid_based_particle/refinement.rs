@@ -1,0 +1,134 @@
+//! Where the grid is finer, and where it is not any more (GBPM 3.5): by the curvature against the local spacing, and where another
+//! segment is close (GBPM 3.6, remark 1).
+//!
+//! Nothing is remembered but the levels of the foot-points: each step finds anew what its particles need, which may be one level
+//! coarser than what they have. Both refinement and coarsening come out of that.
+
+use super::foot_points::FootPoints;
+use super::grid::{Grid, Node};
+use super::method::FrontMethod;
+use crate::geometry::Vector;
+use crate::neighbors::{CellList, NeighborSearch};
+use crate::parallel::{BLOCK, Interrupt, Interrupted};
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
+
+/// Levels and what asks for them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adaptivity {
+    /// How many levels there are.
+    pub levels: u32,
+    /// c: the grid is fine enough where |κ| h < c (GBPM eq. 16).
+    pub curvature_constant: f64,
+}
+
+/// Within so many spacings a turn of the normals counts as curvature: a corner is one.
+const TURN_REACH: f64 = 1.5;
+/// Spacings that another segment is away at least.
+const CLEARANCE: f64 = 2.0;
+/// A level is given up where the coarser one fulfils the criterion with so much of its c: so levels do not flicker.
+const COARSENED: f64 = 0.7;
+/// A cell is split for every particle within so many of its edges, so that the levels of neighbours differ by one.
+const GRADED: f64 = 2.5;
+
+/// The cells that are split, of all levels, in order.
+#[derive(Debug, Default)]
+pub(super) struct Refinement {
+    split: Vec<Node>,
+    /// The level that each particle needs.
+    needs: Vec<u32>,
+}
+
+impl Refinement {
+    /// Finds the split cells anew from particles sorted into cells.
+    pub fn renew<const D: usize>(
+        &mut self,
+        feet: &FootPoints<D>,
+        cells: &CellList<D>,
+        (grid, method): (&Grid, &FrontMethod),
+        by_part: bool,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        self.split.clear();
+        let Some(adaptivity) = method.adaptivity else { return Ok(()) };
+        self.needs.clear();
+        self.needs.resize(feet.len(), 0);
+        self.needs.par_chunks_mut(BLOCK).enumerate().for_each(|(block, needs)| {
+            for (k, need) in needs.iter_mut().enumerate() {
+                if interrupt.is_raised() {
+                    return;
+                }
+                *need = needed_level(feet, cells, (grid, method.cosine), adaptivity, by_part, block * BLOCK + k);
+            }
+        });
+        interrupt.check()?;
+        for (x, need) in feet.positions.iter().zip(&self.needs) {
+            for level in 0..*need {
+                let margin = GRADED * grid.spacing_at(level);
+                let corner = |side: f64| grid.nearest(&x.add_scalar(side), level);
+                let (Some(low), Some(high)) = (corner(-margin), corner(margin)) else { continue };
+                Grid::for_each_in(&low, &high, |at| self.split.push(Grid::node(at, level)));
+            }
+        }
+        self.split.sort_unstable();
+        self.split.dedup();
+        Ok(())
+    }
+
+    /// Whether a cell has parts.
+    pub fn is_split(&self, node: Node) -> bool {
+        self.split.binary_search(&node).is_ok()
+    }
+
+    /// Whether a cell is there and has no parts.
+    pub fn is_leaf<const D: usize>(&self, at: &[i64; D], level: u32) -> bool {
+        let is_there = level == 0 || self.is_split(Grid::node(&at.map(|c| c >> 1), level - 1));
+        is_there && !self.is_split(Grid::node(at, level))
+    }
+
+    /// The grid point of the cell without parts that a place lies in; None where the grid ends.
+    pub fn leaf_at<const D: usize>(&self, grid: &Grid, x: &Vector<D>) -> Option<Node> {
+        let mut level = 0;
+        loop {
+            let node = Grid::node(&grid.nearest(x, level)?, level);
+            if !self.is_split(node) {
+                return Some(node);
+            }
+            level += 1;
+        }
+    }
+}
+
+/// The coarsest level that does for a particle, at most one coarser than its own.
+fn needed_level<const D: usize>(
+    feet: &FootPoints<D>,
+    cells: &CellList<D>,
+    (grid, cosine): (&Grid, f64),
+    adaptivity: Adaptivity,
+    by_part: bool,
+    i: usize,
+) -> u32 {
+    let own = Grid::level(feet.nodes[i]);
+    let (x, n, spacing) = (&feet.positions[i], &feet.normals[i], grid.spacing_at(own));
+    let (turn_square, reach) = ((TURN_REACH * spacing).powi(2), CLEARANCE * 2.0 * spacing);
+    // Squares: of the curvature, and of the distance to another segment.
+    let (mut bend, mut clear) = (0.0_f64, f64::INFINITY);
+    cells.for_each_within(x, reach, |j, _, square| {
+        let is_other = by_part && feet.parts[i] != feet.parts[j];
+        if is_other || feet.normals[j].dot(n) <= cosine {
+            clear = clear.min(square);
+        } else if j != i && square <= turn_square && square > 0.0 {
+            bend = bend.max((feet.normals[j] - n).norm_squared() / square);
+        }
+    });
+    let mut level = own.saturating_sub(1);
+    while level + 1 < adaptivity.levels {
+        let spacing = grid.spacing_at(level);
+        let share = if level < own { COARSENED } else { 1.0 };
+        let is_fine = bend * spacing * spacing < (share * adaptivity.curvature_constant).powi(2);
+        if is_fine && clear >= (CLEARANCE * spacing).powi(2) {
+            break;
+        }
+        level += 1;
+    }
+    level
+}
