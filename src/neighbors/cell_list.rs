@@ -59,7 +59,9 @@ impl<const D: usize> CellList<D> {
             low = low.inf(&x);
             high = high.sup(&x);
         }
-        if n == 0 {
+        // Points that are nowhere share one cell: whoever moved them will find out.
+        let is_somewhere = low.iter().chain(high.iter()).all(|c| c.is_finite());
+        if n == 0 || !is_somewhere {
             low = Vector::<D>::zeros();
             high = Vector::<D>::zeros();
         }

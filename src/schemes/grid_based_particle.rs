@@ -3,6 +3,7 @@
 //! Foot-points move by a law; then every grid point near the front gets the closest point of a local reconstruction
 //! through the moved ones as its new foot-point.
 
+mod corners;
 mod exact;
 mod foot_points;
 mod grid;

@@ -21,6 +21,26 @@ pub enum Law<const D: usize> {
 }
 
 impl<const D: usize> Law<D> {
+    /// Whether particles stay on the front by themselves, however far apart they come.
+    pub(super) fn keeps_particles_exact(&self) -> bool {
+        matches!(self, Self::Flow(_))
+    }
+
+    /// How far from its particles a place between them may lie, in spacings: a flow opens gaps, elsewhere they are what other
+    /// segments have swept.
+    pub(super) fn widest_bridge(&self) -> f64 {
+        if matches!(self, Self::Flow(_)) { 3.0 } else { 1.5 }
+    }
+
+    /// Whether a particle moves along its normal, 1, or against it, −1.
+    pub(super) fn facing(&self, curvature: f64) -> f64 {
+        match self {
+            Self::Flow(_) => 1.0,
+            Self::Normal { speed } => speed.signum(),
+            Self::MeanCurvature => -curvature.signum(),
+        }
+    }
+
     /// Whether a corner becomes round, seen from a grid point at a distance on the side where it is the closest point:
     /// where it moves towards that side, and always by its curvature.
     pub(super) fn opens_corners(&self, distance: f64) -> bool {

@@ -4,12 +4,15 @@ use super::foot_points::{FootPoint, FootPoints};
 use super::grid::Grid;
 use super::local_graph::Terms;
 use super::method::FrontMethod;
+use super::motion::Law;
+use super::topology::{height_over, may_pass};
 use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
 use crate::linear_algebra::least_squares::LeastSquares;
 use crate::neighbors::{CellList, Neighbor, NeighborSearch};
 
-/// How far past its particles a reconstruction is trusted, in spacings: the paper's zero loses the ends of thin filaments.
+/// How far past its particles a reconstruction is trusted, in spacings, where particles are not exact by themselves: the paper's
+/// zero loses the ends of thin filaments.
 const MOST_EXTRAPOLATION: f64 = 0.3;
 /// Cosine between the normal of the base point and that of the answer below which the graph has folded.
 const LEAST_AGREEMENT: f64 = 0.2;
@@ -17,9 +20,10 @@ const LEAST_AGREEMENT: f64 = 0.2;
 const TURNED: f64 = 0.7;
 /// How far from the nearest of its particles an answer may lie, in spacings: past the last of them, and between two.
 const MOST_LONELY: f64 = 1.0;
-pub(super) const WIDEST_BRIDGE: f64 = 3.0;
 /// The largest |κ| h of a front that its particles resolve.
 const SHARPEST: f64 = 2.0;
+/// How far behind a segment still counts as on it, in spacings.
+const NOTHING: f64 = 1e-6;
 /// Segments that are tried at one place.
 const MOST_SEGMENTS: usize = 3;
 /// How much farther than the best answer so far the first particle of another segment may lie, in spacings.
@@ -39,6 +43,8 @@ pub enum Failure {
     Extrapolated,
     /// The front turns too sharply for the spacing.
     Unresolved,
+    /// The closest point lies behind another segment, its particles do not.
+    Swept,
 }
 
 /// What a reconstruction reads.
@@ -52,6 +58,9 @@ pub(super) struct Reconstruction<'a, const D: usize, const M: usize> {
     /// Whether segments are told apart by the part of the front beside their normals.
     pub by_part: bool,
     pub grid: Grid,
+    pub law: &'a Law<D>,
+    /// Whether nothing may be drawn from in front of another segment to behind it.
+    pub merges: bool,
 }
 
 /// Storage of a thread.
@@ -150,7 +159,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
     }
 
     /// The closest point of one segment, in units of the coarser spacing of grid point and base: with more particles where
-    /// those taken do not determine the polynomial well, as on two rows of a lattice.
+    /// those taken do not determine the polynomial well, as on two rows of a lattice, and then by a quadratic.
     fn of_segment(
         &self,
         p: &Vector<D>,
@@ -160,14 +169,17 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
         let mut number = self.method.neighbors;
-        loop {
+        while number <= 2 * self.method.neighbors {
             self.take(p, base, (number, unit), reach, room);
-            let found = self.with_particles(p, base, unit, room);
-            if found != Err(Failure::Undetermined) || number > 2 * self.method.neighbors {
+            let found = self.with_particles(p, base, self.terms, unit, room);
+            if found != Err(Failure::Undetermined) {
                 return found;
             }
             number += self.method.neighbors.div_ceil(2);
         }
+        // At the end of a segment particles of one side determine a quadratic still.
+        self.take(p, base, (self.method.neighbors, unit), reach, room);
+        self.with_particles(p, base, self.quadratic, unit, room)
     }
 
     /// Chooses so many particles, from farther away where too few are near.
@@ -193,6 +205,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         &self,
         p: &Vector<D>,
         base: usize,
+        terms: &Terms<M>,
         unit: f64,
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
@@ -203,7 +216,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let straightest = room.chosen.iter().map(|j| normals[*j].dot(&normals[base])).fold(1.0, f64::min);
         let mut first = Err(Failure::Unresolved);
         if straightest > TURNED {
-            first = self.fit(p, base, (&normals[base], self.terms), unit, room);
+            first = self.fit(p, base, (&normals[base], terms), unit, room);
             if first.is_ok() || first == Err(Failure::Undetermined) {
                 return first;
             }
@@ -237,7 +250,9 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let start = inside(&across, &room.points);
         let (s, jet) = graph.closest(&across, height, start).ok_or(Failure::Unresolved)?;
         let beyond = extrapolation(&s, &room.points);
-        if beyond > MOST_EXTRAPOLATION {
+        // Where every particle is exact by itself the last ones are the ends of their segments, corners and tips.
+        let most = if self.law.keeps_particles_exact() { 0.0 } else { MOST_EXTRAPOLATION };
+        if beyond > most {
             return Err(Failure::Extrapolated);
         }
         let (flat, rise) = jet.normal();
@@ -255,12 +270,28 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
         let nearest = |j: &usize| (self.feet.positions[*j] - position).norm_squared();
         let nearest = room.chosen.iter().map(nearest).fold(f64::INFINITY, f64::min);
-        let most = if beyond > 0.0 { MOST_LONELY } else { WIDEST_BRIDGE };
+        let most = if beyond > 0.0 { MOST_LONELY } else { self.law.widest_bridge() };
         if nearest > (most * unit).powi(2) {
             return Err(Failure::Extrapolated);
         }
+        if self.merges && self.passes_another(base, &position, room) {
+            return Err(Failure::Swept);
+        }
         let (curvature, gauss_curvature) = (jet.curvature() / unit, jet.gauss_curvature() / (unit * unit));
         Ok(FootPoint { position, normal, curvature, gauss_curvature, part: self.feet.parts[base] })
+    }
+}
+
+impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
+    /// Whether another segment lies between a particle and a place on its own.
+    fn passes_another(&self, base: usize, place: &Vector<D>, room: &Room<D, M>) -> bool {
+        let start = &self.feet.positions[base];
+        room.near.iter().map(|near| near.index).filter(|j| may_pass(self.feet, base, *j, self.method.cosine)).any(|j| {
+            let spacing = self.grid.spacing_of(self.feet.nodes[j]);
+            let ahead = |x| height_over(self.feet, j, x, spacing).map(|height| height * self.law.facing(self.feet.curvatures[j]));
+            let (Some(from), Some(to)) = (ahead(start), ahead(place)) else { return false };
+            from >= -NOTHING * spacing && to < -NOTHING * spacing && to < from
+        })
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::foot_points::FootPoint;
 use super::grid::{Grid, Node};
-use super::reconstruction::{Failure, Reconstruction, Room, WIDEST_BRIDGE};
+use super::reconstruction::{Failure, Reconstruction, Room};
 use super::system::FrontSystem;
 use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
@@ -21,6 +21,8 @@ const MARGIN: f64 = 0.35;
 /// A moved particle with a new foot-point of its segment within so many spacings needs not stay: half the largest distance between
 /// neighbours, on a curve and on a surface. Less would keep particles that nothing misses, which distort reconstructions.
 const COVERED: [f64; 2] = [0.55, 1.0];
+/// The same at the end of a segment, a corner or the tip of a filament, and at a gap: whatever is lost there is never found again.
+const SAME: f64 = 0.02;
 
 /// How many particles were removed, and why; and what was done to keep the front whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -67,10 +69,12 @@ pub(super) type Outcome<const D: usize> = Result<FootPoint<D>, Failure>;
 impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// 1. The moved particles are sorted into cells, and the grid is refined where they need it. 2. Each proposes the grid points
     ///    about it. 3. Each of these gets the closest point of its local reconstruction. 4. Those within the tube are the new
-    ///    foot-points. 5. In a flow, where every particle is exact by itself, one that nothing has replaced stays.
+    ///    foot-points. 5. Where every particle is exact by itself, in a flow and with a given speed, one that nothing has
+    ///    replaced stays.
     pub(super) fn resample(&mut self) -> Result<(), Interrupted> {
         self.sort_cells();
         self.refine()?;
+        self.find_gaps()?;
         self.propose();
         self.outcomes.clear();
         self.outcomes.resize(self.candidates.len(), Err(Failure::Starved));
@@ -81,7 +85,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         self.outcomes = outcomes;
         filled?;
         self.renew();
-        if matches!(self.parts.law, super::Law::Flow(_)) {
+        if self.parts.law.keeps_particles_exact() {
             self.keep_unreplaced();
         }
         std::mem::swap(&mut self.feet, &mut self.fresh);
@@ -107,7 +111,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                 continue;
             }
             let own = grid.spacing_of(self.feet.nodes[i]);
-            let farthest = own * if self.is_at_gap(i) { WIDEST_BRIDGE } else { ALONG };
+            let farthest = own * if self.at_gap[i] { self.parts.law.widest_bridge() } else { ALONG };
             for level in 0..levels {
                 let spacing = grid.spacing_at(level);
                 let (across, along) = (width * spacing, farthest.max(ALONG * spacing));
@@ -126,6 +130,24 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         }
         self.candidates.sort_unstable();
         self.candidates.dedup();
+    }
+
+    /// Which particles are next to a gap or at an end.
+    fn find_gaps(&mut self) -> Result<(), Interrupted> {
+        let mut at_gap = std::mem::take(&mut self.at_gap);
+        at_gap.clear();
+        at_gap.resize(self.feet.len(), false);
+        let interrupt = &self.parts.interrupt;
+        at_gap.par_chunks_mut(BLOCK).enumerate().for_each(|(block, at_gap)| {
+            for (k, is_at_gap) in at_gap.iter_mut().enumerate() {
+                if interrupt.is_raised() {
+                    return;
+                }
+                *is_at_gap = self.is_at_gap(block * BLOCK + k);
+            }
+        });
+        self.at_gap = at_gap;
+        self.parts.interrupt.check()
     }
 
     /// Whether a particle has nobody of its segment near it in some direction along the front: a motion has drawn its neighbours
@@ -164,6 +186,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                 Err(Failure::Starved | Failure::Undetermined) => self.removals.starved += 1,
                 Err(Failure::Extrapolated) => self.removals.extrapolated += 1,
                 Err(Failure::Unresolved) => self.removals.unresolved += 1,
+                Err(Failure::Swept) => self.removals.swept += 1,
             }
         }
     }
@@ -177,7 +200,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             let foot = self.feet.get(i);
             let Some(node) = self.refinement.leaf_at(&grid, &foot.position) else { continue };
             let spacing = grid.spacing_of(node).max(grid.spacing_of(self.feet.nodes[i]));
-            let is_replaced = self.fresh_cells.any_within(&foot.position, COVERED[M - 1] * spacing, |place| {
+            let covered = if self.at_gap[i] { SAME } else { COVERED[M - 1] };
+            let is_replaced = self.fresh_cells.any_within(&foot.position, covered * spacing, |place| {
                 self.fresh.normals[order[place]].dot(&foot.normal) > self.parts.method.cosine
             });
             if !is_replaced {

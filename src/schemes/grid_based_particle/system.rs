@@ -1,5 +1,6 @@
 //! The front: its foot-points, and how a step moves and renews them.
 
+use super::corners::for_each_fan;
 use super::foot_points::{FootPoint, FootPoints};
 use super::grid::{Grid, Node};
 use super::local_graph::Terms;
@@ -12,8 +13,8 @@ use super::topology::{Topology, mark_unswept};
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::CellList;
 use crate::parallel::{Interrupt, Interrupted, PerThread};
-use crate::simulation::Phases;
-use crate::time::PathIntegrator;
+use crate::simulation::{Phases, StepError};
+use crate::time::{Clock, PathIntegrator};
 
 /// What a front is made of beside its foot-points.
 pub struct FrontParts<const D: usize> {
@@ -47,6 +48,8 @@ pub struct FrontSystem<const D: usize, const M: usize> {
     pub(super) outcomes: Vec<Outcome<D>>,
     pub(super) rooms: PerThread<Room<D, M>>,
     pub(super) refinement: Refinement,
+    /// Of every moved particle, whether it is next to a gap or at the end of its segment.
+    pub(super) at_gap: Vec<bool>,
     pub(super) removals: Removals,
     keep: Vec<bool>,
     /// Positions at the start of a step, and the sum of its stages' velocities.
@@ -57,8 +60,7 @@ pub struct FrontSystem<const D: usize, const M: usize> {
 impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// The foot-points of all grid points within the tube about the parts of a front (GBPM 3.2).
     ///
-    /// At a corner, where a surface has no normal, it is the direction from the corner to the grid point, outward, where the
-    /// corner opens; elsewhere the sides go on until they meet.
+    /// At a corner a surface has no normal: where it opens it gets a fan of particles, elsewhere the sides go on until they meet.
     ///
     /// Where the grid is refined, coarse foot-points first tell where; an interrupt ends that early, and then the first step.
     #[must_use]
@@ -77,6 +79,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             outcomes: Vec::new(),
             rooms: PerThread::new(),
             refinement: Refinement::default(),
+            at_gap: Vec::new(),
             removals: Removals::default(),
             keep: Vec::new(),
             starts: Vec::new(),
@@ -102,11 +105,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             for (part, surface) in surfaces.iter().enumerate() {
                 for_each_near(surface.as_ref(), radius, (&parts.grid, level), |at, place| {
                     let exact = surface.nearest(&place);
-                    let way = (place - exact.point) * exact.distance.signum();
-                    let fan = || parts.law.opens_corners(exact.distance).then(|| way.try_normalize(0.0)).flatten();
-                    let normal = exact.normal.or_else(fan);
                     let is_active = exact.distance.abs() <= radius && refinement.is_leaf(at, level);
-                    if let Some(normal) = normal.filter(|_| is_active) {
+                    if let Some(normal) = exact.normal.filter(|_| is_active) {
                         let (position, curvature) = (exact.point, exact.curvature.unwrap_or(0.0));
                         let foot = FootPoint { position, normal, curvature, gauss_curvature: 0.0, part: part as u32 };
                         near.push((Grid::node(at, level), foot));
@@ -121,6 +121,19 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         feet.clear();
         for (node, foot) in &near {
             feet.push(*node, foot);
+        }
+        for level in 0..parts.method.levels() {
+            for (part, surface) in surfaces.iter().enumerate() {
+                let opens = |distance: f64| parts.law.opens_corners(distance);
+                for_each_fan(surface.as_ref(), (&parts.grid, level), opens, |position, normal| {
+                    let leaf = refinement.leaf_at(&parts.grid, &position);
+                    if let Some(node) = leaf.filter(|node| Grid::level(*node) == level) {
+                        let foot =
+                            FootPoint { position, normal, curvature: 0.0, gauss_curvature: 0.0, part: part as u32 };
+                        feet.push(node, &foot);
+                    }
+                });
+            }
         }
     }
 
@@ -140,6 +153,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             quadratic: &self.quadratic,
             by_part: self.parts.by_part,
             grid: self.parts.grid,
+            law: &self.parts.law,
+            merges: self.merges(),
         }
     }
 
@@ -149,9 +164,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
 
     /// Moves and renews the foot-points; returns the longest way in spacings.
     ///
-    /// 1. Motion. 2. What other segments have swept goes. 3. Resampling. 4. The same again for what it has
-    ///    drawn past other segments.
-    pub(super) fn advance(&mut self, time: f64, step: f64, phases: &mut Phases) -> Result<f64, Interrupted> {
+    /// 1. Motion. 2. A look at the numbers. 3. What other segments have swept goes. 4. Resampling.
+    pub(super) fn advance(&mut self, from: Clock, to: Clock, step: f64, phases: &mut Phases) -> Result<f64, StepError> {
         let clock = phases.clock();
         let start = clock();
         let spacing = self.parts.grid.spacing;
@@ -160,29 +174,44 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                 &mut self.feet,
                 flow.as_ref(),
                 self.parts.integrator,
-                (time, step),
+                (from.time, step),
                 spacing,
                 &self.parts.interrupt,
             )?,
             Law::Normal { speed } => motion::along_normals(&mut self.feet, speed * step, spacing),
             Law::MeanCurvature => self.by_curvature(step)?,
         };
+        self.check_finite(to)?;
         let moved = clock();
         phases.book("front/motion", moved - start);
         self.remove_swept(step)?;
         let swept = clock();
         phases.book("front/topology", swept - moved);
         self.resample()?;
-        let sampled = clock();
-        phases.book("front/resampling", sampled - swept);
-        self.remove_swept(step)?;
-        phases.book("front/topology", clock() - sampled);
+        self.check_finite(to)?;
+        phases.book("front/resampling", clock() - swept);
         Ok(way)
     }
 
-    /// Removes what another segment has passed, where segments merge. In a flow none can pass another.
+    /// An error where a position or a normal is no number.
+    fn check_finite(&self, Clock { step, time }: Clock) -> Result<(), StepError> {
+        let is_broken = |vectors: &[Vector<D>]| vectors.iter().position(|x| !x.iter().all(|c| c.is_finite()));
+        for (field, vectors) in [("position", &self.feet.positions), ("normal", &self.feet.normals)] {
+            if let Some(particle) = is_broken(vectors) {
+                return Err(StepError::NonFinite { field, particle, step, time });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether segments that run into each other end there. In a flow none can pass another.
+    fn merges(&self) -> bool {
+        self.parts.topology == Topology::Merge && !matches!(self.parts.law, Law::Flow(_))
+    }
+
+    /// Removes what another segment has passed, where segments merge.
     fn remove_swept(&mut self, step: f64) -> Result<(), Interrupted> {
-        if self.parts.topology == Topology::Cross || matches!(self.parts.law, Law::Flow(_)) {
+        if !self.merges() {
             return Ok(());
         }
         self.sort_cells();
