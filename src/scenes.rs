@@ -3,6 +3,7 @@
 
 mod dimension;
 pub mod droplet;
+mod flow_work;
 mod flows;
 pub mod front;
 mod gbpm_parameters;

@@ -1,10 +1,12 @@
 //! Prescribed velocity fields u(x, t). One file a flow.
 
+pub mod rays;
 pub mod rotation;
 pub mod single_vortex;
 pub mod translation;
 pub mod vortex_3d;
 
+pub use rays::Rays;
 pub use rotation::Rotation;
 pub use single_vortex::SingleVortex;
 pub use translation::Translation;

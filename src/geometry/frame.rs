@@ -1,4 +1,5 @@
-//! Frames of a hyperplane: unit vectors across a normal, and the normal across given vectors.
+//! Frames of a hyperplane: unit vectors across a normal, and the normal across given vectors; and those of a front, which may be
+//! a curve in space.
 
 use super::Vector;
 
@@ -40,6 +41,27 @@ pub fn across<const D: usize, const M: usize>(tangents: &[Vector<D>; M]) -> Vect
         }
     }
     n.normalize()
+}
+
+/// Unit vectors along a front of M dimensions, and those across it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame<const D: usize, const M: usize, const C: usize> {
+    /// Tangents.
+    pub along: [Vector<D>; M],
+    /// Normals.
+    pub across: [Vector<D>; C],
+}
+
+/// The frame of a front of D − 1 dimensions by its normal.
+#[must_use]
+pub fn about_normal<const D: usize, const M: usize, const C: usize>(normal: &Vector<D>) -> Frame<D, M, C> {
+    Frame { along: tangents(normal), across: [*normal; C] }
+}
+
+/// The frame of a curve by its tangent.
+#[must_use]
+pub fn about_tangent<const D: usize, const M: usize, const C: usize>(tangent: &Vector<D>) -> Frame<D, M, C> {
+    Frame { along: [*tangent; M], across: tangents(tangent) }
 }
 
 #[cfg(test)]

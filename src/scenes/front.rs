@@ -3,6 +3,7 @@
 mod parameters;
 mod rows;
 mod setup;
+mod wavefront;
 
 pub(super) use parameters::Law;
 pub(super) use setup::{FrontChoice, understand_choice};

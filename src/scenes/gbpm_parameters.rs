@@ -4,7 +4,7 @@ use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
 use crate::schemes::grid_based_particle::{self as gbpm, FrontMethod, MOST_LEVELS, Topology};
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// Degree of the reconstructions.
 pub const DEGREE: Parameter = Parameter::new(
@@ -99,7 +99,7 @@ static SEGMENT_TESTS: &[Variant] = &[
         doc: "by the angle of their normals",
         parameters: &[Parameter::new(
             "cosine",
-            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space",
+            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space, −.2 and −.05 under mean_curvature",
             COSINE,
             DefaultValue::Absent,
         )],
@@ -109,7 +109,7 @@ static SEGMENT_TESTS: &[Variant] = &[
         doc: "by the part of the front at the start that they belong to, carried along, and the angle of their normals",
         parameters: &[Parameter::new(
             "cosine",
-            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space",
+            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space, −.2 and −.05 under mean_curvature",
             COSINE,
             DefaultValue::Absent,
         )],
@@ -118,6 +118,16 @@ static SEGMENT_TESTS: &[Variant] = &[
 
 fn segment_tests() -> &'static [Variant] {
     SEGMENT_TESTS
+}
+
+/// Adds what the paper reconstructs by: quadratics of 6 particles, in space of 10, without weights; where another degree is
+/// given the number of particles is left to it.
+pub fn lay_paper_method(preset: &mut Map<String, Value>, given: Option<&Map<String, Value>>, is_in_space: bool) {
+    preset.insert("degree".into(), json!(2));
+    preset.insert("weight".into(), json!(0));
+    if given.and_then(|given| given.get("degree")).is_none_or(|degree| *degree == json!(2)) {
+        preset.insert("neighbors".into(), json!(if is_in_space { 10 } else { 6 }));
+    }
 }
 
 /// As checked.
@@ -202,7 +212,13 @@ pub fn understand(
         SegmentTest::Normals { cosine } => (topology == Topology::Cross, cosine, "normals"),
         SegmentTest::Parameter { cosine } => (true, cosine, "parameter"),
     };
-    let cosine = cosine.unwrap_or(if dimension == 2 { 0.2 } else { 0.5 });
+    // By its curvature a corner becomes round at once, so its two sides must find each other.
+    let cosine = cosine.unwrap_or(match (dimension, is_by_curvature) {
+        (2, false) => 0.2,
+        (2, true) => -0.2,
+        (_, false) => 0.5,
+        (_, true) => -0.05,
+    });
     let mut resolved = json.clone();
     resolved["degree"] = json!(degree);
     resolved["neighbors"] = json!(neighbors);

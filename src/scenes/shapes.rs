@@ -6,7 +6,7 @@ use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
 use crate::scenes::dimension::in_dimension;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 const CENTER: Parameter = Parameter::new(
     "center",
@@ -135,6 +135,13 @@ pub fn implied_dimension(shape: &Value) -> Option<usize> {
         "union" => shape.get("of")?.as_array()?.iter().find_map(implied_dimension),
         _ => length("size").or_else(|| length("center")),
     }
+}
+
+/// Whether a scene as written is of three dimensions: as it says, else as its shape implies.
+#[must_use]
+pub fn is_in_space(given: &Map<String, Value>) -> bool {
+    let implied = || given.get("shape").and_then(implied_dimension).map(|dimension| dimension as u64);
+    given.get("dimension").and_then(Value::as_u64).or_else(implied) == Some(3)
 }
 
 /// The surface of a checked shape in `D` dimensions. Pointers of violations start with `pointer`.

@@ -16,6 +16,7 @@ mod resampling;
 mod simulation;
 mod system;
 mod topology;
+mod wavefront;
 
 pub use exact::ExactFrontMotion;
 pub use foot_points::FootPoints;
@@ -27,3 +28,4 @@ pub use resampling::Removals;
 pub use simulation::GridBasedParticles;
 pub use system::{FrontParts, FrontSystem};
 pub use topology::Topology;
+pub use wavefront::EllipticalWavefront;

@@ -58,6 +58,11 @@ static LAWS: &[Variant] = &[
             DefaultValue::Json("\"single_vortex\""),
         )],
     },
+    Variant {
+        name: "geometrical_optics",
+        doc: "rays that start along the inner normals of a circle or an ellipse, as a curve in (x, y, θ)",
+        parameters: &[Parameter::new("speed", "c, everywhere the same", ANY, DefaultValue::Json("1"))],
+    },
 ];
 
 fn laws() -> &'static [Variant] {
@@ -66,13 +71,8 @@ fn laws() -> &'static [Variant] {
 
 /// What section 4 states.
 pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Value> {
-    let implied = || given.get("shape").and_then(shapes::implied_dimension);
-    let is_in_space =
-        given.get("dimension").and_then(Value::as_u64).map_or_else(|| implied() == Some(3), |dimension| dimension == 3);
     let mut preset = Map::new();
-    preset.insert("degree".into(), json!(2));
-    preset.insert("neighbors".into(), json!(if is_in_space { 10 } else { 6 }));
-    preset.insert("weight".into(), json!(0));
+    gbpm_parameters::lay_paper_method(&mut preset, Some(given), shapes::is_in_space(given));
     preset.insert("integrator".into(), json!("tvd_rk2"));
     let law = given.get("law").map(|law| law.get("type").unwrap_or(law));
     if !given.contains_key("time_step") && law != Some(&json!("mean_curvature")) {
@@ -99,4 +99,5 @@ pub enum Law {
     Normal { speed: f64 },
     MeanCurvature,
     Flow { flow: Flow },
+    GeometricalOptics { speed: f64 },
 }

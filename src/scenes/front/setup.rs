@@ -1,10 +1,13 @@
 //! From parameters to a front and what moves it.
 
 use super::parameters::{Law, Written};
+use super::wavefront::{self, WavefrontScene};
+use crate::geometry::Surface;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
+use crate::scenes::flow_work::{Stretch, error_units, stretch};
 use crate::scenes::flows::{Flow, flow, top_speed};
 use crate::scenes::gbpm_parameters::{self, Chosen};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
@@ -21,10 +24,15 @@ use std::collections::BTreeMap;
 /// dt · max speed/h in a flow, and with a given speed.
 const FLOW_CFL: f64 = 10.0;
 const SPEED_CFL: f64 = 0.75;
-/// dt/h² under motion by curvature: more blows up slowly.
+/// The same for rays.
+const RAY_CFL: f64 = 2.0;
+/// dt/h² under motion by curvature, and at most: a little more blows up slowly, much more at once.
 const CURVATURE_STEP: f64 = 0.5;
-/// How much longer a vortex makes a front, about.
-const DRAWN_OUT: u64 = 4;
+const MOST_CURVATURE_STEP: f64 = 1.0;
+/// Steps in the period of a flow that turns back, at least.
+const STEPS_A_TURN: f64 = 32.0;
+/// How much larger a vortex makes a surface, about.
+const DRAWN_OUT: f64 = 4.0;
 /// Resident bytes a foot-point: its columns twice, its outcome, cells, a frame and a checkpoint in the making.
 const BYTES: u64 = 1200;
 /// Foot-points up to which an estimate counts them.
@@ -93,13 +101,22 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
             violations.extend(flow::<D>(of).err().map(|found| at_law(found, choice.pointer)));
             top_speed::<D>(of, surface.bounding_box())
         }
-        (_, Law::Normal { speed }) => speed.abs(),
+        (_, Law::Normal { speed } | Law::GeometricalOptics { speed }) => speed.abs(),
         _ => 0.0,
     };
     match &surface {
         Ok(surface) => violations.extend(check_extent(surface.as_ref(), 4.0 * choice.spacing, choice.spacing)),
         Err(found) => violations.extend(found.iter().cloned()),
     }
+    let wavefront = match &choice.law {
+        Law::GeometricalOptics { speed } => Some(wavefront::of_shape(&choice.shape, *speed)),
+        _ => None,
+    };
+    violations.extend(wavefront.iter().filter_map(|front| front.as_ref().err().cloned()));
+    let turn = match &choice.law {
+        Law::Flow { flow: of } => flow::<D>(of).ok().and_then(|flow| flow.return_time()),
+        _ => None,
+    };
     let is_by_curvature = matches!(choice.law, Law::MeanCurvature);
     if is_by_curvature && let PathIntegrator::Dopri5 { .. } = choice.integrator {
         let detail = "error control is for prescribed flows";
@@ -122,15 +139,31 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         violations.push(Violation::new("/cfl", "conflict", detail, &json!(written.cfl), Value::Null));
     }
     let finest = choice.spacing / f64::from(1_u32 << (written.levels() - 1));
+    if let Ok(surface) = &surface
+        && !is_within_grid(surface.as_ref(), choice.spacing, written.levels())
+    {
+        let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
+        violations.push(Violation::new("/spacing", "range", detail, &json!(choice.spacing), json!("a larger number")));
+    }
+    let longest = MOST_CURVATURE_STEP * finest * finest;
+    if is_by_curvature && let Some(step) = choice.time_step.filter(|step| *step > longest) {
+        let detail = "motion by curvature is unstable with steps longer than the square of the (finest) spacing";
+        let allowed = json!(format!("a number ≤ {longest:e}"));
+        violations.push(Violation::new("/time_step", "range", detail, &json!(step), allowed));
+    }
     let limit = match &choice.law {
         Law::MeanCurvature => CURVATURE_STEP * finest * finest,
-        Law::Flow { .. } => written.cfl.unwrap_or(FLOW_CFL) * finest / top,
+        Law::Flow { .. } => {
+            let by_speed = written.cfl.unwrap_or(FLOW_CFL) * finest / top;
+            turn.map_or(by_speed, |turn| by_speed.min(turn / STEPS_A_TURN))
+        }
         Law::Normal { .. } => written.cfl.unwrap_or(SPEED_CFL) * finest / top,
+        Law::GeometricalOptics { .. } => written.cfl.unwrap_or(RAY_CFL) * finest / top,
     };
     let fixed = match (choice.time_step, choice.steps) {
         (Some(step), _) => FixedStep::from_time_step(choice.end_time, step),
         (None, Some(steps)) => FixedStep::from_steps(choice.end_time, steps),
-        (None, None) => FixedStep::from_limit(choice.end_time, limit),
+        (None, None) => landing_on_turns(FixedStep::from_limit(choice.end_time, limit), choice.end_time, turn),
     };
     if !fixed.time_step.is_normal() || fixed.steps == 0 || fixed.steps > MOST_STEPS {
         let allowed = json!(format!("a number from {} to {}", choice.end_time * 1e-9, choice.end_time));
@@ -156,7 +189,43 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
     if let Some(map) = resolved.as_object_mut() {
         map.shift_remove("steps");
     }
-    Ok(Box::new(FrontScene::<D, M> { resolved, choice, chosen, fixed }))
+    Ok(match wavefront {
+        Some(Ok(front)) => Box::new(WavefrontScene { resolved, choice, chosen, fixed, front }),
+        _ => Box::new(FrontScene::<D, M> { resolved, choice, chosen, fixed }),
+    })
+}
+
+/// What a report says of the method.
+pub(super) fn labels(chosen: &Chosen, fixed: FixedStep) -> BTreeMap<&'static str, String> {
+    let method = &chosen.method;
+    let reconstruction = format!(
+        "degree {}, {} particles, weight {}, normals to {}",
+        method.degree, method.neighbors, method.weight, method.cosine
+    );
+    let mut said = BTreeMap::from([("reconstruction", reconstruction), ("time_step", format!("{}", fixed.time_step))]);
+    if let Some(adaptivity) = method.adaptivity {
+        let levels = format!("{} levels where |κ| h ≥ {}", adaptivity.levels, adaptivity.curvature_constant);
+        said.insert("adaptivity", levels);
+    }
+    said
+}
+
+/// Whether a grid reaches around a shape.
+fn is_within_grid<const D: usize>(surface: &dyn Surface<D>, spacing: f64, levels: u32) -> bool {
+    let (low, high) = surface.bounding_box();
+    let grid = Grid { spacing };
+    let margin = 8.0 * spacing;
+    [low.add_scalar(-margin), high.add_scalar(margin)].iter().all(|x| grid.nearest(x, levels - 1).is_some())
+}
+
+/// A few more steps where the end is a whole number of half turns, so that each of these ends a step: errors are asked for there.
+fn landing_on_turns(fixed: FixedStep, end_time: f64, turn: Option<f64>) -> FixedStep {
+    let halves = turn.map_or(0.0, |turn| 2.0 * end_time / turn);
+    let is_whole = (halves - halves.round()).abs() < 1e-9 && halves >= 1.0 && halves < fixed.steps as f64;
+    if !is_whole {
+        return fixed;
+    }
+    FixedStep::from_steps(end_time, fixed.steps.next_multiple_of(halves.round() as u64))
 }
 
 /// A violation of a flow, where the flow is a part of the law.
@@ -173,6 +242,10 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             Law::Normal { speed } => gbpm::Law::Normal { speed: *speed },
             Law::MeanCurvature => gbpm::Law::MeanCurvature,
             Law::Flow { flow: of } => gbpm::Law::Flow(flow::<D>(of).map_err(|found| vec![found])?),
+            Law::GeometricalOptics { .. } => {
+                let detail = "a wave front is a curve, not a surface of this dimension";
+                return Err(vec![Violation::new("/law/type", "conflict", detail, &Value::Null, Value::Null)]);
+            }
         })
     }
 
@@ -191,6 +264,28 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
         Ok(FrontSystem::about(&surfaces, parts))
     }
 
+    /// How much larger the front becomes.
+    fn stretch(&self) -> Stretch {
+        let none = Stretch { mean: 1.0, most: 1.0 };
+        match &self.choice.law {
+            Law::Flow { flow: Flow::Vortex3d { .. } } => Stretch { mean: 0.5 * DRAWN_OUT, most: DRAWN_OUT },
+            Law::Flow { flow: of } => match (shapes::surface::<D>(&self.choice.shape, "/shape"), flow::<D>(of)) {
+                (Ok(surface), Ok(flow)) => stretch(surface.as_ref(), flow.as_ref(), self.choice.end_time),
+                _ => none,
+            },
+            Law::Normal { speed } if *speed > 0.0 => {
+                let parts = shapes::parts::<D>(&self.choice.shape, "/shape").unwrap_or_default();
+                let growth = |surface: &Box<dyn Surface<D>>| {
+                    let (low, high) = surface.bounding_box();
+                    1.0 + 2.0 * speed * self.choice.end_time / (high - low).max()
+                };
+                let most = parts.iter().map(growth).fold(1.0, f64::max).powi(D as i32 - 1);
+                Stretch { mean: 0.5 * (1.0 + most), most }
+            }
+            _ => none,
+        }
+    }
+
     fn exact(&self) -> Result<ExactFrontMotion<D>, Vec<Violation>> {
         let shape = &self.choice.shape;
         Ok(match &self.choice.law {
@@ -206,6 +301,7 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             Law::MeanCurvature => {
                 shapes::ball::<D>(shape).map_or(ExactFrontMotion::Unknown, ExactFrontMotion::Shrinking)
             }
+            Law::GeometricalOptics { .. } => ExactFrontMotion::Unknown,
         })
     }
 }
@@ -216,7 +312,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     }
 
     fn field_names(&self) -> Vec<&'static str> {
-        let mut names = vec!["normal", "curvature", "velocity", "grid_point", "segment", "particle_id"];
+        let mut names = vec!["normal", "curvature", "velocity", "grid_point", "level", "segment", "particle_id"];
         if D == 3 {
             names.push("gauss_curvature");
         }
@@ -232,9 +328,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         // Corners without foot-points matter where there are few.
         let counted = if about < COUNTED { self.system(Interrupt::default()).ok() } else { None };
         let at_start = counted.map_or(about, |system| system.particle_count() as u64);
-        let is_drawn_out =
-            matches!(self.choice.law, Law::Flow { flow: Flow::SingleVortex { .. } | Flow::Vortex3d { .. } });
-        let most = if is_drawn_out { DRAWN_OUT * at_start } else { at_start };
+        let most = (at_start as f64 * self.stretch().most) as u64;
         Estimate {
             particles: at_start,
             steps: self.fixed.steps,
@@ -249,18 +343,25 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             Law::Normal { .. } => "normal",
             Law::MeanCurvature => "mean_curvature",
             Law::Flow { .. } => "flow",
+            Law::GeometricalOptics { .. } => "optics",
         };
         format!("front/{D}/{law}/{}", self.chosen.method.degree)
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
-        let number = particles as f64 * steps as f64;
+        let number = particles as f64 * self.stretch().mean * steps as f64;
+        let exact = match (&self.choice.law, shapes::surface::<D>(&self.choice.shape, "/shape")) {
+            (Law::Flow { flow: of }, Ok(surface)) => flow::<D>(of).map_or(0.0, |flow| {
+                error_units(Some(surface.as_ref()), flow.as_ref(), self.choice.spacing, particles as f64, end_time)
+            }),
+            _ => particles as f64,
+        };
         let mut work = vec![
             PhaseWork::every_step("front/motion", number),
             PhaseWork::every_step("front/resampling", number * self.chosen.method.neighbors as f64),
             PhaseWork::every_step("front/topology", number),
-            PhaseWork::at_moments("errors", particles as f64),
+            PhaseWork::at_moments("errors", exact),
         ];
         work.extend(work_estimate::around(particles as f64, steps, end_time, plan));
         work
@@ -268,12 +369,11 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
         let system = self.system(context.interrupt)?;
-        let method = &self.chosen.method;
-        let chosen = format!(
-            "degree {}, {} particles, weight {}, normals to {}",
-            method.degree, method.neighbors, method.weight, method.cosine
-        );
-        let said = BTreeMap::from([("reconstruction", chosen), ("time_step", format!("{}", self.fixed.time_step))]);
+        if system.particle_count() == 0 {
+            let detail = "no grid point of this spacing has a foot-point on the shape";
+            return Err(vec![Violation::new("/spacing", "range", detail, &json!(self.choice.spacing), Value::Null)]);
+        }
+        let said = labels(&self.chosen, self.fixed);
         let ball = shapes::ball::<D>(&self.choice.shape);
         Ok(Box::new(GridBasedParticles::new(system, self.exact()?, ball, self.fixed, context.cpu_clock, said)))
     }

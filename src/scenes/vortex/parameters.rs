@@ -42,7 +42,12 @@ pub(super) static PARAMETERS: &[Parameter] = &[
         DefaultValue::Json("1"),
     ),
     Parameter::restart_safe("end_time", "scene time at the end", POSITIVE, DefaultValue::Json("8")),
-    Parameter::new("time_step", "Δt; end_time/240 when neither it nor steps is given", POSITIVE, DefaultValue::Absent),
+    Parameter::new(
+        "time_step",
+        "Δt; when neither it nor steps is given, end_time/240, and by cfl with gbpm",
+        POSITIVE,
+        DefaultValue::Absent,
+    ),
     Parameter::new("steps", "number of equal steps, instead of time_step", STEPS, DefaultValue::Absent),
     Parameter::new("integrator", "path integrator", Kind::Choice(flows::integrators), DefaultValue::Json("\"rk4\"")),
     Parameter::new("band_h", "width w of the narrow band in h", POSITIVE, DefaultValue::Json("40")),
@@ -95,6 +100,9 @@ fn method_variants() -> &'static [Variant] {
 
 /// What section 4.2 states.
 pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Value> {
+    if given.get("method").is_some_and(|method| method.get("type").unwrap_or(method) == "gbpm") {
+        return front_preset(given);
+    }
     let mut method = json!({
         "type": "pcp", "degree": 4, "basis": "minter", "solver": "orthogonal", "same_branch": false, "weight": 0, "minimum_ratio": 1,
         "sample_threshold_h": 1.5, "tolerance": 1e-10, "max_iterations": 100
@@ -117,6 +125,22 @@ pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Val
         Value::Object(map) => map,
         _ => Map::new(),
     }
+}
+
+/// What sections 4.1 to 4.3 and 4.7 of the GBPM paper state.
+fn front_preset(given: &Map<String, Value>) -> Map<String, Value> {
+    let is_in_space = shapes::is_in_space(given);
+    let mut method = Map::new();
+    method.insert("type".into(), json!("gbpm"));
+    let own = given.get("method").and_then(Value::as_object);
+    gbpm_parameters::lay_paper_method(&mut method, own, is_in_space);
+    if !["steps", "time_step"].iter().any(|name| given.contains_key(*name)) {
+        method.insert("cfl".into(), json!(0.75));
+    }
+    let mut preset = Map::new();
+    preset.insert("integrator".into(), json!("tvd_rk2"));
+    preset.insert("method".into(), Value::Object(method));
+    preset
 }
 
 /// The scene as checked.

@@ -2,12 +2,13 @@
 
 use super::parameters::{Field, Redistance, Written};
 use crate::closest_point::PcpMethod;
-use crate::geometry::Vector;
+use crate::geometry;
 use crate::geometry::lattice::Lattice;
 use crate::scene::check;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
+use crate::scenes::flow_work::{error_units, stretch};
 use crate::scenes::flows::{Flow, flow};
 use crate::scenes::front::{FrontChoice, Law, understand_choice};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
@@ -15,7 +16,7 @@ use crate::scenes::{pcp_parameters, shapes, work_estimate};
 use crate::schemes::advected_level_set::{
     AdvectedLevelSet, AdvectedParts, AdvectedSystem, FieldChoice, RedistanceWhen, Start,
 };
-use crate::schemes::exact_motion::{ExactMotion, front_points};
+use crate::schemes::exact_motion::ExactMotion;
 use crate::simulation::{OutputPlan, Simulation};
 use crate::time::{FixedStep, PathIntegrator};
 use serde_json::{Map, Value, json};
@@ -68,6 +69,7 @@ fn front(written: &Written, resolved: Value) -> Understood {
         }
     };
     refuse("jitter", written.jitter == 0.0);
+    refuse("seed", written.seed == 1);
     refuse("band_h", written.band_h == 40.0);
     refuse("redistance", matches!(written.redistance, Redistance::Auto));
     refuse("field", written.field == Field::Dual);
@@ -223,50 +225,12 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     }))
 }
 
-/// Points of a front that is carried along to learn how long it becomes, by its extent, and the steps.
-const FRONT_PART: f64 = 0.02;
-const FRONT_STEPS: u32 = 80;
-
 impl<const D: usize> VortexScene<D> {
     /// How far from the surface particles are made: over the band, and beyond a thin one what fits need.
     fn reach(&self) -> f64 {
         self.half_band.max(self.method.even_reach_h::<D>() * self.lattice.spacing)
     }
-
-    /// The length of the front by that at the start, on the average over the run; 1 in space, where it is not known.
-    fn mean_stretch(&self, end_time: f64) -> f64 {
-        let (Ok(surface), Ok(flow)) = (shapes::surface::<D>(&self.shape, "/shape"), flow::<D>(&self.flow)) else {
-            return 1.0;
-        };
-        let (low, high) = surface.bounding_box();
-        let mut chains = surface.outline(FRONT_PART * (high - low).max());
-        let length = |chains: &[Vec<Vector<D>>]| -> f64 {
-            chains.iter().flat_map(|chain| chain.windows(2)).map(|pair| (pair[1] - pair[0]).norm()).sum()
-        };
-        let start = length(&chains);
-        let step = end_time / FRONT_STEPS as f64;
-        let mut sum = 0.0;
-        for k in 0..FRONT_STEPS {
-            for x in chains.iter_mut().flatten() {
-                *x = PathIntegrator::Rk4.advance(flow.as_ref(), x, k as f64 * step, step);
-            }
-            sum += length(&chains);
-        }
-        if start > 0.0 { sum / (FRONT_STEPS as f64 * start) } else { 1.0 }
-    }
-
-    /// Points of the exact front, about.
-    fn front_points(&self) -> f64 {
-        let surface = shapes::surface::<D>(&self.shape, "/shape");
-        surface.map_or(0.0, |surface| {
-            let (low, high) = surface.bounding_box();
-            front_points((high - low).max(), self.lattice.spacing)
-        })
-    }
 }
-
-/// Units of work of a tight path through one unit of time, against the distance of one particle from a known shape.
-const PATH: f64 = 100.0;
 
 impl<const D: usize> Scene for VortexScene<D> {
     fn resolved(&self) -> Value {
@@ -325,17 +289,20 @@ impl<const D: usize> Scene for VortexScene<D> {
         };
         let reach_h = self.reach() / self.lattice.spacing;
         // At a few moments of output the surface is as often short as long.
-        let stretch = if course == Course::EveryStep { self.mean_stretch(end_time) } else { 1.0 };
+        let surface = shapes::surface::<D>(&self.shape, "/shape").ok();
+        let stretch = match (&surface, &flow) {
+            (Some(surface), Some(flow)) if course == Course::EveryStep => {
+                stretch(surface.as_ref(), flow.as_ref(), end_time).mean
+            }
+            _ => 1.0,
+        };
         let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, stretch, times, course);
-        let is_rigid = flow.as_ref().is_some_and(|flow| flow.is_rigid());
         work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages));
         work.push(PhaseWork { phase: "measure", units: particles * times, course });
-        // At these times the exact front is carried along; a flow that is back or rigid needs none.
-        let is_returned = turn.is_some_and(|turn| (end_time / turn - (end_time / turn).round()).abs() < 1e-9);
-        let at_end = if is_returned { 0.0 } else { end_time };
-        let path = if is_rigid { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
-        let points = if D == 2 { self.front_points() } else { 0.0 };
-        work.push(PhaseWork::at_moments("errors", particles + (points + particles) * path * PATH));
+        let errors = |flow: &Box<dyn geometry::Flow<D>>| {
+            error_units(surface.as_deref(), flow.as_ref(), self.lattice.spacing, particles, end_time)
+        };
+        work.push(PhaseWork::at_moments("errors", flow.as_ref().map_or(particles, errors)));
         work.extend(work_estimate::around(particles, steps, end_time, plan));
         work
     }

@@ -1,9 +1,10 @@
-//! Corners and edges that open at once: there particles of all the directions in between stand in one place, and become an
-//! arc with the first motion.
+//! Corners and edges that open at once. With a given speed particles of all the directions in between stand in one place, and
+//! become an arc with the first motion; by curvature one of the mean direction is enough for fits to see the turn.
 
 use super::grid::Grid;
 use super::system::for_each_near;
 use crate::geometry::{Surface, Vector};
+use std::cmp::Ordering;
 
 /// Places that see a corner from this far, in spacings, tell the directions.
 const RING: [f64; 2] = [0.6, 0.85];
@@ -11,6 +12,20 @@ const RING: [f64; 2] = [0.6, 0.85];
 const PLACES: [f64; 2] = [6.0, 4.0];
 /// Any corner that opens widely is seen by a grid point within so many spacings.
 const SIGHT: f64 = 2.5;
+
+/// Places and normals, those of one place as one with their mean direction.
+pub(super) fn of_mean_direction<const D: usize>(mut fans: Vec<(Vector<D>, Vector<D>)>) -> Vec<(Vector<D>, Vector<D>)> {
+    let order = |a: &Vector<D>, b: &Vector<D>| {
+        a.iter().zip(b.iter()).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    };
+    fans.sort_by(|a, b| order(&a.0, &b.0));
+    let of_one_place = fans.chunk_by(|a, b| a.0 == b.0);
+    let mean = |fan: &[(Vector<D>, Vector<D>)]| {
+        let sum: Vector<D> = fan.iter().map(|(_, normal)| normal).sum();
+        sum.try_normalize(0.0).map(|normal| (fan[0].0, normal))
+    };
+    of_one_place.filter_map(mean).collect()
+}
 
 /// Calls with the place and the normal of every particle of the fans of a surface. `opens` says it of a signed distance from
 /// which a corner is the closest point.
@@ -66,7 +81,7 @@ mod tests {
             angles.sort_by(f64::total_cmp);
             let widest = angles.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
             assert!(widest < 0.35, "{size}: {widest}");
-            assert!(found.iter().all(|(x, n)| (x[0].abs() - 0.5 * size).abs() < 1e-15 && x[0] * n[0] > 0.0));
+            assert!(found.iter().all(|(x, n)| (x[0].abs() - 0.5 * size).abs() < 1e-15 && x[0] * n[0] >= 0.0));
             assert!(found.len() < 100, "{}", found.len());
         }
     }

@@ -7,6 +7,7 @@ use super::foot_points::FootPoints;
 use super::grid::Grid;
 use super::system::for_each_near;
 use super::topology::Topology;
+use super::wavefront::EllipticalWavefront;
 use crate::geometry::surfaces::Ball;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
@@ -30,6 +31,8 @@ pub enum ExactFrontMotion<const D: usize> {
         /// What happens where they meet.
         topology: Topology,
     },
+    /// A wave front in (x, y, θ).
+    Rays(EllipticalWavefront),
     /// Of a circle or a sphere by its mean curvature: r² = R² − 2 (D − 1) t.
     Shrinking(Ball<D>),
     /// Not known.
@@ -101,7 +104,7 @@ impl<const D: usize> ExactFrontMotion<D> {
                 let square = start.radius * start.radius - 2.0 * (D as f64 - 1.0) * time;
                 (square > 0.0).then(|| Ball { center: start.center, radius: square.sqrt() })
             }
-            Self::Unknown => None,
+            Self::Rays(_) | Self::Unknown => None,
         }
     }
 
@@ -151,6 +154,11 @@ impl<const D: usize> ExactFrontMotion<D> {
                     loose = offset_points(surfaces, *topology, spacing, way);
                     feet.positions.iter().map(level).collect()
                 }
+                Self::Rays(front) => {
+                    let points = front.points(spacing / POINTS_PER_SPACING, time);
+                    chains = vec![points.into_iter().map(|x| in_dimensions(&x)).collect()];
+                    feet.positions.iter().map(|x| front.distance(&in_dimensions(x), time)).collect()
+                }
                 Self::Shrinking(_) | Self::Unknown => return Ok(None),
             }
         };
@@ -164,9 +172,7 @@ impl<const D: usize> ExactFrontMotion<D> {
         let count = feet.len() as f64;
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(feet.positions.iter().copied(), spacing);
-        let coverage = if feet.is_empty() {
-            f64::INFINITY
-        } else {
+        let coverage = {
             let samples = chains.iter().flatten().chain(&loose);
             let far = |(i, r): (usize, f64)| r / grid.spacing_of(feet.nodes[i]);
             let far = samples.map(|x| cells.nearest(x, f64::INFINITY).map_or(f64::INFINITY, far));
@@ -175,8 +181,13 @@ impl<const D: usize> ExactFrontMotion<D> {
         let spacings = feet.nodes.iter().map(|node| grid.spacing_of(*node));
         let gap = if chains.is_empty() { f64::NAN } else { largest_gap(&chains, &feet.positions, spacings) };
         let mut values = [f64::NAN; ENTRIES.len()];
+        values[9] = count;
+        if feet.is_empty() {
+            // Norms of nothing are no norms: that nothing is there is the error.
+            return Ok(Some(FrontErrors { time, values }));
+        }
         values[..3].copy_from_slice(&[sum / count, norms.rms(), norms.max()]);
-        (values[4], values[5], values[9]) = (coverage, gap, count);
+        (values[4], values[5]) = (coverage, gap);
         if let Some(ball) = &ball {
             let mean = distances.iter().sum::<f64>() / count;
             let square = distances.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / count;
@@ -191,6 +202,11 @@ impl<const D: usize> ExactFrontMotion<D> {
         }
         Ok(Some(FrontErrors { time, values }))
     }
+}
+
+/// A vector of another number of components; those of a wave front are three either way.
+fn in_dimensions<const D: usize, const E: usize>(x: &Vector<D>) -> Vector<E> {
+    Vector::<E>::from_fn(|d, _| if d < D { x[d] } else { 0.0 })
 }
 
 /// [∫ d² dθ]^½ by the trapezoidal rule over the angles of the foot-points (GBPM eq. 18).

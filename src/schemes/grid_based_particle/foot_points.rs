@@ -10,7 +10,7 @@ use crate::simulation::{RestoreError, State};
 pub struct FootPoint<const D: usize> {
     /// y.
     pub position: Vector<D>,
-    /// n, outward.
+    /// n, outward; of a curve in space its tangent.
     pub normal: Vector<D>,
     /// ∇·n.
     pub curvature: f64,

@@ -86,7 +86,9 @@ impl Grid {
     #[must_use]
     pub fn node<const D: usize>(at: &[i64; D], level: u32) -> Node {
         let level = u64::from(level) << (u64::BITS - LEVEL_BITS);
-        at.iter().enumerate().fold(level, |node, (d, c)| node | ((c + offset::<D>()) as u64) << (bits::<D>() * d as u32))
+        at.iter()
+            .enumerate()
+            .fold(level, |node, (d, c)| node | ((c + offset::<D>()) as u64) << (bits::<D>() * d as u32))
     }
 
     /// The coordinates of a grid point.

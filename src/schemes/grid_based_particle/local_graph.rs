@@ -1,5 +1,5 @@
-//! A front as the graph of a polynomial over a tangent plane (GBPM 3.3.1): f(s), s of M = D − 1 coordinates, all lengths
-//! in spacings.
+//! A front as the graph of polynomials over a tangent plane (GBPM 3.3.1): f(s), s of M coordinates, one polynomial for each
+//! of the D − M directions across, all lengths in spacings.
 
 use crate::linear_algebra::least_squares::LeastSquares;
 use crate::polynomials::MultiIndexSet;
@@ -8,6 +8,11 @@ use crate::polynomials::MultiIndexSet;
 pub(super) const MOST_DEGREE: usize = 4;
 /// Terms of two variables up to that degree.
 const MOST_TERMS: usize = 15;
+/// Directions across a front at most: of a curve in space two.
+pub(super) const MOST_ACROSS: usize = 2;
+/// Coordinates along the tangent plane, and heights over it.
+pub(super) type LocalPoint<const M: usize> = ([f64; M], [f64; MOST_ACROSS]);
+
 /// Newton's steps to a closest point at most.
 const MOST_ITERATIONS: usize = 30;
 /// The longest of them.
@@ -50,23 +55,34 @@ impl<const M: usize> Terms<M> {
         self.indices.len()
     }
 
-    /// The least-squares fit to heights z_j at s_j with weights exp(−k |s_j|²), or None where the points do not
-    /// determine it.
-    pub fn fit(&self, points: &[([f64; M], f64)], k: f64, room: &mut LeastSquares) -> Option<LocalGraph<'_, M>> {
+    /// The graph that is zero everywhere.
+    pub fn nothing(&self) -> LocalGraph<'_, M> {
+        LocalGraph { terms: self, coefficients: [0.0; MOST_TERMS] }
+    }
+
+    /// The least-squares fit to the heights of one direction at s_j with weights exp(−k |s_j|²), or None where the
+    /// points do not determine it.
+    pub fn fit(
+        &self,
+        points: &[LocalPoint<M>],
+        direction: usize,
+        k: f64,
+        room: &mut LeastSquares,
+    ) -> Option<LocalGraph<'_, M>> {
         let n = self.count();
         if points.len() < n {
             return None;
         }
         room.reset(points.len(), n);
         let mut row = [0.0; MOST_TERMS];
-        for (j, (s, z)) in points.iter().enumerate() {
+        for (j, (s, heights)) in points.iter().enumerate() {
             let square: f64 = s.iter().map(|s| s * s).sum();
             let root = (-0.5 * k * square).exp();
             let powers = powers(s);
             for (value, index) in row.iter_mut().zip(&self.indices) {
                 *value = root * product(&powers, index);
             }
-            room.set_row(j, &row[..n], root * z);
+            room.set_row(j, &row[..n], root * heights[direction]);
         }
         let (found, solution) = room.solve();
         if found.rank < n || found.condition > WORST_CONDITION {
@@ -117,40 +133,54 @@ impl<const M: usize> LocalGraph<'_, M> {
         }
         jet
     }
+}
 
-    /// The closest point of the graph to (p, height), searched from `start`: Newton's iteration for
-    /// d(s) = ½ |s − p|² + ½ (f(s) − height)² (GBPM eq. 4), with the Hessian without its indefinite part where that
-    /// leads uphill. None where it does not settle.
-    pub fn closest(&self, p: &[f64; M], height: f64, start: [f64; M]) -> Option<([f64; M], GraphJet<M>)> {
-        let mut s = start;
-        let mut jet = self.jet(&s);
-        let mut last = f64::INFINITY;
-        for _ in 0..MOST_ITERATIONS {
-            let rest = jet.value - height;
-            let gradient: [f64; M] = std::array::from_fn(|a| s[a] - p[a] + rest * jet.first[a]);
-            let hessian = |bend: f64| -> [[f64; M]; M] {
-                std::array::from_fn(|a| {
-                    std::array::from_fn(|b| {
-                        f64::from(u8::from(a == b)) + jet.first[a] * jet.first[b] + bend * jet.second[a][b]
-                    })
-                })
-            };
-            let step =
-                solve_positive(&hessian(rest), &gradient).or_else(|| solve_positive(&hessian(0.0), &gradient))?;
-            let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
-            let scale = if length > LONGEST_STEP { LONGEST_STEP / length } else { 1.0 };
-            for (s, step) in s.iter_mut().zip(step) {
-                *s -= scale * step;
+/// The closest point of the graph of C polynomials to (p, heights), searched from `start`: Newton's iteration for
+/// d(s) = ½ |s − p|² + ½ Σ (f(s) − height)² (GBPM eq. 4), with the Hessian without its indefinite part where that
+/// leads uphill. None where it does not settle.
+pub(super) fn closest<const M: usize, const C: usize>(
+    graphs: &[LocalGraph<'_, M>; C],
+    p: &[f64; M],
+    heights: &[f64; C],
+    start: [f64; M],
+) -> Option<([f64; M], [GraphJet<M>; C])> {
+    let jets = |s: &[f64; M]| -> [GraphJet<M>; C] { std::array::from_fn(|c| graphs[c].jet(s)) };
+    let mut s = start;
+    let mut found = jets(&s);
+    let mut last = f64::INFINITY;
+    for _ in 0..MOST_ITERATIONS {
+        let mut gradient: [f64; M] = std::array::from_fn(|a| s[a] - p[a]);
+        let mut hessian = [[[0.0; M]; M]; 2];
+        for (bend, hessian) in [1.0, 0.0].into_iter().zip(&mut hessian) {
+            for (a, row) in hessian.iter_mut().enumerate() {
+                row[a] = 1.0;
+                for (b, entry) in row.iter_mut().enumerate() {
+                    for (jet, height) in found.iter().zip(heights) {
+                        let rest = bend * (jet.value - height);
+                        *entry += jet.first[a] * jet.first[b] + rest * jet.second[a][b];
+                    }
+                }
             }
-            jet = self.jet(&s);
-            // At round-off steps stop shrinking.
-            if length <= STILL || (length <= FOUND && length >= 0.5 * last) {
-                return Some((s, jet));
-            }
-            last = length;
         }
-        (last <= FOUND).then_some((s, jet))
+        for (jet, height) in found.iter().zip(heights) {
+            for (a, gradient) in gradient.iter_mut().enumerate() {
+                *gradient += (jet.value - height) * jet.first[a];
+            }
+        }
+        let step = solve_positive(&hessian[0], &gradient).or_else(|| solve_positive(&hessian[1], &gradient))?;
+        let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
+        let scale = if length > LONGEST_STEP { LONGEST_STEP / length } else { 1.0 };
+        for (s, step) in s.iter_mut().zip(step) {
+            *s -= scale * step;
+        }
+        found = jets(&s);
+        // At round-off steps stop shrinking.
+        if length <= STILL || (length <= FOUND && length >= 0.5 * last) {
+            return Some((s, found));
+        }
+        last = length;
     }
+    (last <= FOUND).then_some((s, found))
 }
 
 /// The exponents of ∂_a of a monomial and its factor; None where the derivative vanishes.
@@ -230,21 +260,21 @@ impl<const M: usize> GraphJet<M> {
 
 #[cfg(test)]
 mod tests {
-    use super::Terms;
+    use super::{LocalPoint, Terms, closest};
     use crate::linear_algebra::least_squares::LeastSquares;
 
     #[test]
     fn a_polynomial_is_reproduced_with_its_curvatures() {
         let f = |x: f64, y: f64| 0.3 + 0.1 * x - 0.2 * y + 0.4 * x * x + 0.15 * x * y - 0.3 * y * y;
-        let points: Vec<([f64; 2], f64)> = (0..12)
+        let points: Vec<LocalPoint<2>> = (0..12)
             .map(|k| {
                 let (x, y) = (f64::from(k % 4) - 1.3, f64::from(k / 4) - 0.8);
-                ([x, y], f(x, y))
+                ([x, y], [f(x, y), 0.0])
             })
             .collect();
         let terms = Terms::<2>::new(2);
         let mut room = LeastSquares::default();
-        let graph = terms.fit(&points, 0.7, &mut room).unwrap();
+        let graph = terms.fit(&points, 0, 0.7, &mut room).unwrap();
         let jet = graph.jet(&[0.2, -0.1]);
         assert!((jet.value - f(0.2, -0.1)).abs() < 1e-13);
         assert!((jet.first[0] - (0.1 + 0.8 * 0.2 - 0.015)).abs() < 1e-13);
@@ -264,21 +294,26 @@ mod tests {
 
     #[test]
     fn the_closest_point_is_across_the_graph() {
-        let points: Vec<([f64; 1], f64)> =
-            (0..8).map(|k| f64::from(k) * 0.5 - 1.8).map(|x| ([x], (9.0 - x * x).sqrt() - 3.0)).collect();
+        let points: Vec<LocalPoint<1>> =
+            (0..8).map(|k| f64::from(k) * 0.5 - 1.8).map(|x| ([x], [(9.0 - x * x).sqrt() - 3.0, 0.3 * x])).collect();
         let terms = Terms::<1>::new(4);
         let mut room = LeastSquares::default();
-        let graph = terms.fit(&points, 1.0, &mut room).unwrap();
+        let graph = terms.fit(&points, 0, 1.0, &mut room).unwrap();
         for (p, height) in [(0.4, 1.0), (-0.6, -1.1), (0.0, 0.3)] {
-            let (s, jet) = graph.closest(&[p], height, [0.0]).unwrap();
+            let (s, [jet]) = closest(&[graph], &[p], &[height], [0.0]).unwrap();
             assert!((s[0] - p + (jet.value - height) * jet.first[0]).abs() < 1e-13);
             // On a circle of radius 3 about (0, −3).
             let (x, y) = (s[0], jet.value + 3.0);
             assert!((x * (height + 3.0) - y * p).abs() < 3e-3, "{p} {height}");
             assert!((jet.curvature() - 1.0 / 3.0).abs() < 1e-2);
         }
-        assert!(terms.fit(&points[..4], 1.0, &mut room).is_none());
-        let same = [([0.1], 0.0); 9];
-        assert!(terms.fit(&same, 1.0, &mut room).is_none());
+        // As a curve in space, on a plane inclined by .3: its closest point to a place is across its tangent.
+        let inclined = terms.fit(&points, 1, 1.0, &mut room).unwrap();
+        let (s, [up, aside]) = closest(&[graph, inclined], &[0.4], &[1.0, -0.5], [0.0]).unwrap();
+        assert!((aside.value - 0.3 * s[0]).abs() < 1e-12);
+        assert!((s[0] - 0.4 + (up.value - 1.0) * up.first[0] + (aside.value + 0.5) * aside.first[0]).abs() < 1e-12);
+        assert!(terms.fit(&points[..4], 0, 1.0, &mut room).is_none());
+        let same = [([0.1], [0.0; 2]); 9];
+        assert!(terms.fit(&same, 0, 1.0, &mut room).is_none());
     }
 }

@@ -57,8 +57,8 @@ const OFFSET: f64 = 1e-4;
 
 /// Carries particles and their normals through a flow; returns the longest way in spacings.
 ///
-/// A tangent is the difference of two points close by, and the normal stays across all tangents: with steps of several
-/// spacings the normals of before would tell segments apart no more.
+/// A tangent is the difference of two points close by, and the normal stays across all tangents (a curve in space has its
+/// tangent instead): with steps of several spacings the normals of before would tell segments apart no more.
 pub(super) fn carry<const D: usize, const M: usize>(
     feet: &mut FootPoints<D>,
     flow: &dyn Flow<D>,
@@ -76,11 +76,15 @@ pub(super) fn carry<const D: usize, const M: usize>(
             }
             let mut longest = 0.0_f64;
             for (x, n) in positions.iter_mut().zip(normals) {
-                let frame = tangents::<D, M>(n);
-                let side = across(&frame).dot(n).signum();
                 let next = integrator.advance(flow, x, time, step);
-                let carried = frame.map(|t| integrator.advance(flow, &(*x + t * offset), time, step) - next);
-                *n = across(&carried) * side;
+                let carried = |t: Vector<D>| integrator.advance(flow, &(*x + t * offset), time, step) - next;
+                *n = if D - M == 1 {
+                    let frame = tangents::<D, M>(n);
+                    let side = across(&frame).dot(n).signum();
+                    across(&frame.map(carried)) * side
+                } else {
+                    carried(*n).normalize()
+                };
                 longest = longest.max((next - *x).norm_squared());
                 *x = next;
             }

@@ -2,12 +2,12 @@
 
 use super::foot_points::{FootPoint, FootPoints};
 use super::grid::Grid;
-use super::local_graph::Terms;
+use super::local_graph::{GraphJet, LocalPoint, MOST_ACROSS, Terms, closest};
 use super::method::FrontMethod;
 use super::motion::Law;
 use super::topology::{height_over, may_pass};
 use crate::geometry::Vector;
-use crate::geometry::frame::tangents;
+use crate::geometry::frame::{self, Frame};
 use crate::linear_algebra::least_squares::LeastSquares;
 use crate::neighbors::{CellList, Neighbor, NeighborSearch};
 
@@ -69,7 +69,7 @@ pub(super) struct Room<const D: usize, const M: usize> {
     near: Vec<Neighbor<D>>,
     chosen: Vec<usize>,
     bases: Vec<usize>,
-    points: Vec<([f64; M], f64)>,
+    points: Vec<LocalPoint<M>>,
     squares: LeastSquares,
 }
 
@@ -183,14 +183,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
     }
 
     /// Chooses so many particles, from farther away where too few are near.
-    fn take(
-        &self,
-        p: &Vector<D>,
-        base: usize,
-        (number, unit): (usize, f64),
-        reach: &mut f64,
-        room: &mut Room<D, M>,
-    ) {
+    fn take(&self, p: &Vector<D>, base: usize, (number, unit): (usize, f64), reach: &mut f64, room: &mut Room<D, M>) {
         loop {
             self.choose(base, number, unit, room);
             if room.chosen.len() >= number || *reach * GROWTH > FARTHEST * unit {
@@ -227,45 +220,68 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         self.fit(p, base, (&mean, self.quadratic), unit, room).or(first)
     }
 
-    /// One fit in the frame of an upward direction.
+    /// One fit in the frame of a direction.
     fn fit(
         &self,
         p: &Vector<D>,
         base: usize,
-        (up, terms): (&Vector<D>, &Terms<M>),
+        (direction, terms): (&Vector<D>, &Terms<M>),
+        unit: f64,
+        room: &mut Room<D, M>,
+    ) -> Result<FootPoint<D>, Failure> {
+        if D - M == 1 {
+            self.fit_across::<1>(p, base, (&frame::about_normal(direction), terms), unit, room)
+        } else {
+            self.fit_across::<MOST_ACROSS>(p, base, (&frame::about_tangent(direction), terms), unit, room)
+        }
+    }
+
+    /// The same with C = D − M directions across the front.
+    fn fit_across<const C: usize>(
+        &self,
+        p: &Vector<D>,
+        base: usize,
+        (frame, terms): (&Frame<D, M, C>, &Terms<M>),
         unit: f64,
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
         let origin = self.feet.positions[base];
-        let frame = tangents::<D, M>(up);
         let inverse = 1.0 / unit;
-        let local = |x: &Vector<D>| -> ([f64; M], f64) {
+        let local = |x: &Vector<D>| -> LocalPoint<M> {
             let d = (x - origin) * inverse;
-            (frame.map(|t| t.dot(&d)), up.dot(&d))
+            let mut heights = [0.0; MOST_ACROSS];
+            for (height, up) in heights.iter_mut().zip(&frame.across) {
+                *height = up.dot(&d);
+            }
+            (frame.along.map(|t| t.dot(&d)), heights)
         };
         room.points.clear();
         room.points.extend(room.chosen.iter().map(|j| local(&self.feet.positions[*j])));
-        let graph = terms.fit(&room.points, self.method.weight, &mut room.squares).ok_or(Failure::Undetermined)?;
-        let (across, height) = local(p);
+        let mut graphs = [terms.nothing(); C];
+        for (c, graph) in graphs.iter_mut().enumerate() {
+            let fitted = terms.fit(&room.points, c, self.method.weight, &mut room.squares);
+            *graph = fitted.ok_or(Failure::Undetermined)?;
+        }
+        let (across, heights) = local(p);
+        let heights: [f64; C] = std::array::from_fn(|c| heights[c]);
         let start = inside(&across, &room.points);
-        let (s, jet) = graph.closest(&across, height, start).ok_or(Failure::Unresolved)?;
+        let (s, jets) = closest(&graphs, &across, &heights, start).ok_or(Failure::Unresolved)?;
         let beyond = extrapolation(&s, &room.points);
         // Where every particle is exact by itself the last ones are the ends of their segments, corners and tips.
         let most = if self.law.keeps_particles_exact() { 0.0 } else { MOST_EXTRAPOLATION };
         if beyond > most {
             return Err(Failure::Extrapolated);
         }
-        let (flat, rise) = jet.normal();
-        let mut normal = up * rise;
-        for (t, part) in frame.iter().zip(flat) {
-            normal += t * part;
-        }
-        let is_sharp = jet.sharpest() > SHARPEST || jet.sharpest().is_nan();
-        if is_sharp || normal.dot(&self.feet.normals[base]) < LEAST_AGREEMENT {
+        let shape = shape_of(frame, &jets);
+        let is_sharp = shape.sharpest > SHARPEST || shape.sharpest.is_nan();
+        if is_sharp || shape.direction.dot(&self.feet.normals[base]) < LEAST_AGREEMENT {
             return Err(Failure::Unresolved);
         }
-        let mut position = origin + up * (jet.value * unit);
-        for (t, s) in frame.iter().zip(s) {
+        let mut position = origin;
+        for (up, jet) in frame.across.iter().zip(&jets) {
+            position += up * (jet.value * unit);
+        }
+        for (t, s) in frame.along.iter().zip(s) {
             position += t * (s * unit);
         }
         let nearest = |j: &usize| (self.feet.positions[*j] - position).norm_squared();
@@ -277,9 +293,46 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if self.merges && self.passes_another(base, &position, room) {
             return Err(Failure::Swept);
         }
-        let (curvature, gauss_curvature) = (jet.curvature() / unit, jet.gauss_curvature() / (unit * unit));
-        Ok(FootPoint { position, normal, curvature, gauss_curvature, part: self.feet.parts[base] })
+        let (curvature, gauss_curvature) = (shape.curvature / unit, shape.gauss_curvature / (unit * unit));
+        Ok(FootPoint { position, normal: shape.direction, curvature, gauss_curvature, part: self.feet.parts[base] })
     }
+}
+
+/// Direction and curvatures at a point of a front, lengths in units.
+struct LocalShape<const D: usize> {
+    /// The normal of a surface, the tangent of a curve in space.
+    direction: Vector<D>,
+    curvature: f64,
+    gauss_curvature: f64,
+    /// The largest principal curvature by absolute value.
+    sharpest: f64,
+}
+
+fn shape_of<const D: usize, const M: usize, const C: usize>(
+    frame: &Frame<D, M, C>,
+    jets: &[GraphJet<M>; C],
+) -> LocalShape<D> {
+    let jet = &jets[0];
+    if C == 1 {
+        let (flat, rise) = jet.normal();
+        let mut direction = frame.across[0] * rise;
+        for (t, part) in frame.along.iter().zip(flat) {
+            direction += t * part;
+        }
+        let (curvature, gauss_curvature) = (jet.curvature(), jet.gauss_curvature());
+        return LocalShape { direction, curvature, gauss_curvature, sharpest: jet.sharpest() };
+    }
+    // r′ = (1, f′), r″ = (0, f″); κ = |r″ across r′|/|r′|².
+    let mut direction = frame.along[0];
+    let mut bend = Vector::<D>::zeros();
+    for (up, jet) in frame.across.iter().zip(jets) {
+        direction += up * jet.first[0];
+        bend += up * jet.second[0][0];
+    }
+    let square = direction.norm_squared();
+    bend -= direction * (bend.dot(&direction) / square);
+    let curvature = bend.norm() / square;
+    LocalShape { direction: direction / square.sqrt(), curvature, gauss_curvature: 0.0, sharpest: curvature }
 }
 
 impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
@@ -288,7 +341,9 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let start = &self.feet.positions[base];
         room.near.iter().map(|near| near.index).filter(|j| may_pass(self.feet, base, *j, self.method.cosine)).any(|j| {
             let spacing = self.grid.spacing_of(self.feet.nodes[j]);
-            let ahead = |x| height_over(self.feet, j, x, spacing).map(|height| height * self.law.facing(self.feet.curvatures[j]));
+            let ahead = |x| {
+                height_over(self.feet, j, x, spacing).map(|height| height * self.law.facing(self.feet.curvatures[j]))
+            };
             let (Some(from), Some(to)) = (ahead(start), ahead(place)) else { return false };
             from >= -NOTHING * spacing && to < -NOTHING * spacing && to < from
         })
@@ -296,7 +351,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
 }
 
 /// A place within the box of the points.
-fn inside<const M: usize>(s: &[f64; M], points: &[([f64; M], f64)]) -> [f64; M] {
+fn inside<const M: usize>(s: &[f64; M], points: &[LocalPoint<M>]) -> [f64; M] {
     std::array::from_fn(|a| {
         let (low, high) = points.iter().fold((0.0_f64, 0.0_f64), |(l, h), (x, _)| (l.min(x[a]), h.max(x[a])));
         s[a].clamp(low, high)
@@ -304,7 +359,7 @@ fn inside<const M: usize>(s: &[f64; M], points: &[([f64; M], f64)]) -> [f64; M] 
 }
 
 /// How far s lies outside the points, seen from their middle.
-fn extrapolation<const M: usize>(s: &[f64; M], points: &[([f64; M], f64)]) -> f64 {
+fn extrapolation<const M: usize>(s: &[f64; M], points: &[LocalPoint<M>]) -> f64 {
     let share = 1.0 / points.len().max(1) as f64;
     let mut way = *s;
     for (x, _) in points {

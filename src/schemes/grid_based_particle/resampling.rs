@@ -120,8 +120,11 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                 let (Some(low), Some(high)) = (corner(-reach), corner(reach)) else { continue };
                 Grid::for_each_in(&low, &high, |at| {
                     let d = grid.center(at, level) - y;
-                    let height = d.dot(n);
-                    let is_near = height.abs() <= across && d.norm_squared() - height * height <= along * along;
+                    // Of the squares along the direction and across it, one is that along the front.
+                    let by_direction = d.dot(n).powi(2);
+                    let rest = d.norm_squared() - by_direction;
+                    let (height, way) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
+                    let is_near = height <= across * across && way <= along * along;
                     if is_near && self.refinement.is_leaf(at, level) {
                         self.candidates.push(Grid::node(at, level));
                     }
@@ -152,10 +155,10 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
 
     /// Whether a particle has nobody of its segment near it in some direction along the front: a motion has drawn its neighbours
     /// away, or a sharp tip has become round again and lacks particles.
-    fn is_at_gap(&self, i: usize) -> bool {
+    pub(super) fn is_at_gap(&self, i: usize) -> bool {
         let spacing = self.parts.grid.spacing_of(self.feet.nodes[i]);
         let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
-        let frame = tangents::<D, M>(n);
+        let frame = if D - M == 1 { tangents::<D, M>(n) } else { [*n; M] };
         let mut has_neighbor = [[false; 2]; M];
         self.cells.for_each_within(y, ALONG * spacing, |j, d, square| {
             if j != i && self.feet.normals[j].dot(n) > self.parts.method.cosine {

@@ -17,12 +17,17 @@ use crate::simulation::{
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
 
+/// Foot-points under mean curvature, by those at the start, beyond which a run has gone astray.
+const MOST_GROWTH: usize = 2;
+
 /// A front as a simulation, M = D − 1.
 pub struct GridBasedParticles<const D: usize, const M: usize> {
     system: FrontSystem<D, M>,
     exact: ExactFrontMotion<D>,
     /// The front at the start, where it is a ball.
     ball: Option<Ball<D>>,
+    /// Foot-points at the start.
+    start_count: usize,
     fixed: FixedStep,
     step: u64,
     max_cfl: f64,
@@ -46,6 +51,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
         method: BTreeMap<&'static str, String>,
     ) -> Self {
         Self {
+            start_count: system.particle_count(),
             system,
             exact,
             ball,
@@ -67,6 +73,34 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
             _ => None,
         };
         step == self.fixed.steps || turn.is_some_and(|turn| self.fixed.reaches(step, 0.5 * turn))
+    }
+
+    /// By its mean curvature a front only shrinks.
+    fn check_growth(&self, Clock { step, time }: Clock) -> Result<(), StepError> {
+        let count = self.system.particle_count();
+        if !matches!(self.system.parts.law, Law::MeanCurvature) || count <= MOST_GROWTH * self.start_count {
+            return Ok(());
+        }
+        let reason = format!(
+            "{count} foot-points where {} were at the start, though a front only shrinks by its mean curvature: the time step              ({}) is too long or the spacing too coarse",
+            self.start_count, self.fixed.time_step
+        );
+        Err(StepError::Unsolved { reason, step, time })
+    }
+
+    /// A closed front has no ends: by its mean curvature even corners become round at once.
+    fn look_for_ends(&mut self, time: f64) {
+        let ends = self.system.ends();
+        if let (Law::MeanCurvature, Some(first)) = (&self.system.parts.law, ends.first()) {
+            let place: Vec<String> = self.system.feet.positions[*first].iter().map(|c| format!("{c:.4}")).collect();
+            let message = format!(
+                "{} of {} foot-points are at open ends, the first at ({}): the front is finer there than its spacing",
+                ends.len(),
+                self.system.particle_count(),
+                place.join(", ")
+            );
+            self.findings.push(Finding { name: "front_open", message, time });
+        }
     }
 
     fn velocity(&self, i: usize) -> Vector<D> {
@@ -94,6 +128,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         if !self.system.feet.is_empty() {
             let way = self.system.advance(from, to, self.fixed.time_step, &mut self.phases)?;
             self.max_cfl = self.max_cfl.max(way);
+            self.check_growth(to)?;
             if self.system.feet.is_empty() {
                 self.vanished = Some(to.time);
                 let counts = self.system.removals.entries().map(|(name, count)| format!("{name} {count}")).join(", ");
@@ -106,6 +141,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
             let (feet, grid, interrupt) = (&system.feet, &system.parts.grid, &system.parts.interrupt);
             let found = phases.measure("errors", || exact.errors(ball.as_ref(), feet, grid, to.time, interrupt))?;
             self.errors.extend(found);
+            self.look_for_ends(to.time);
         }
         self.step = to.step;
         Ok(())
@@ -136,18 +172,20 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         let feet = &self.system.feet;
         let grid = self.system.parts.grid;
         let mut fields = Fields::at(&feet.positions);
-        fields.vector("normal", feet.normals.iter().copied());
+        // Of a wave front the direction of travel.
+        let is_curve_in_space = D - M == 2;
+        let travel = |i: usize| self.velocity(i).try_normalize(0.0).unwrap_or(feet.normals[i]);
+        let normal = |i: usize| if is_curve_in_space { travel(i) } else { feet.normals[i] };
+        fields.vector("normal", (0..feet.len()).map(normal));
         fields.scalar("curvature", feet.curvatures.clone());
-        if D == 3 {
+        if D == 3 && !is_curve_in_space {
             // Shapes tell their mean curvature alone.
             let known = |value: &f64| if self.step > 0 { *value } else { f64::NAN };
             fields.scalar("gauss_curvature", feet.gauss_curvatures.iter().map(known).collect());
         }
         fields.vector("velocity", (0..feet.len()).map(|i| self.velocity(i)));
         fields.vector("grid_point", feet.nodes.iter().map(|node| grid.place::<D>(*node)));
-        if self.system.parts.method.adaptivity.is_some() {
-            fields.scalar("level", feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
-        }
+        fields.scalar("level", feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
         fields.scalar("segment", feet.parts.iter().map(|part| f64::from(*part)).collect());
         fields.id("particle_id", (0..feet.len() as u64).collect());
         fields

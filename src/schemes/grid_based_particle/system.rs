@@ -1,6 +1,6 @@
 //! The front: its foot-points, and how a step moves and renews them.
 
-use super::corners::for_each_fan;
+use super::corners::{for_each_fan, of_mean_direction};
 use super::foot_points::{FootPoint, FootPoints};
 use super::grid::{Grid, Node};
 use super::local_graph::Terms;
@@ -65,11 +65,26 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// Where the grid is refined, coarse foot-points first tell where; an interrupt ends that early, and then the first step.
     #[must_use]
     pub fn about(surfaces: &[Box<dyn Surface<D>>], parts: FrontParts<D>) -> Self {
-        let (terms, quadratic) = (Terms::new(parts.method.degree), Terms::new(2));
         let levels = parts.method.levels();
-        let mut system = Self {
+        let mut system = Self::of(FootPoints::default(), parts);
+        system.place_on(surfaces);
+        for _ in 1..levels {
+            system.sort_cells();
+            if system.refine().is_err() {
+                break;
+            }
+            system.place_on(surfaces);
+        }
+        system
+    }
+
+    /// Foot-points that are known.
+    #[must_use]
+    pub fn of(feet: FootPoints<D>, parts: FrontParts<D>) -> Self {
+        let (terms, quadratic) = (Terms::new(parts.method.degree), Terms::new(2));
+        Self {
             parts,
-            feet: FootPoints::default(),
+            feet,
             fresh: FootPoints::default(),
             cells: CellList::new(Domain::unbounded()),
             fresh_cells: CellList::new(Domain::unbounded()),
@@ -84,16 +99,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             keep: Vec::new(),
             starts: Vec::new(),
             slopes: Vec::new(),
-        };
-        system.place_on(surfaces);
-        for _ in 1..levels {
-            system.sort_cells();
-            if system.refine().is_err() {
-                break;
-            }
-            system.place_on(surfaces);
         }
-        system
     }
 
     /// Foot-points of the grid as it is refined.
@@ -125,14 +131,18 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         for level in 0..parts.method.levels() {
             for (part, surface) in surfaces.iter().enumerate() {
                 let opens = |distance: f64| parts.law.opens_corners(distance);
-                for_each_fan(surface.as_ref(), (&parts.grid, level), opens, |position, normal| {
+                let mut fans = Vec::new();
+                for_each_fan(surface.as_ref(), (&parts.grid, level), opens, |place, normal| fans.push((place, normal)));
+                if matches!(parts.law, Law::MeanCurvature) {
+                    fans = of_mean_direction(fans);
+                }
+                for (position, normal) in fans {
                     let leaf = refinement.leaf_at(&parts.grid, &position);
                     if let Some(node) = leaf.filter(|node| Grid::level(*node) == level) {
-                        let foot =
-                            FootPoint { position, normal, curvature: 0.0, gauss_curvature: 0.0, part: part as u32 };
-                        feet.push(node, &foot);
+                        let (curvature, gauss_curvature) = (0.0, 0.0);
+                        feet.push(node, &FootPoint { position, normal, curvature, gauss_curvature, part: part as u32 });
                     }
-                });
+                }
             }
         }
     }
@@ -141,6 +151,12 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     #[must_use]
     pub fn particle_count(&self) -> usize {
         self.feet.len()
+    }
+
+    /// The foot-points that have nobody of their segment on some side.
+    pub(super) fn ends(&mut self) -> Vec<usize> {
+        self.sort_cells();
+        (0..self.feet.len()).filter(|i| self.is_at_gap(*i)).collect()
     }
 
     /// Reconstruction through the particles as they stand and were sorted.

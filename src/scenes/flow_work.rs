@@ -1,0 +1,67 @@
+//! How long a flow draws a front out, and what its exact motion costs, before anything is run.
+
+use crate::geometry::{Flow, Surface, Vector};
+use crate::schemes::exact_motion::front_points;
+use crate::time::PathIntegrator;
+
+/// Points of a front that is carried along to learn how long it becomes, by its extent, and the steps.
+const FRONT_PART: f64 = 0.02;
+const FRONT_STEPS: u32 = 80;
+/// Units of work of a tight path through one unit of time, against the distance of one particle from a known shape.
+const PATH: f64 = 100.0;
+
+/// The length of a front by that at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// On the average over the run.
+    pub mean: f64,
+    /// At its longest.
+    pub most: f64,
+}
+
+/// How much a flow stretches a surface; 1 in space, where outlines are not known.
+#[must_use]
+pub fn stretch<const D: usize>(surface: &dyn Surface<D>, flow: &dyn Flow<D>, end_time: f64) -> Stretch {
+    let (low, high) = surface.bounding_box();
+    let mut chains = surface.outline(FRONT_PART * (high - low).max());
+    let length = |chains: &[Vec<Vector<D>>]| -> f64 {
+        chains.iter().flat_map(|chain| chain.windows(2)).map(|pair| (pair[1] - pair[0]).norm()).sum()
+    };
+    let start = length(&chains);
+    if start.is_nan() || start <= 0.0 {
+        return Stretch { mean: 1.0, most: 1.0 };
+    }
+    let step = end_time / FRONT_STEPS as f64;
+    let (mut sum, mut most) = (0.0, 1.0_f64);
+    for k in 0..FRONT_STEPS {
+        for x in chains.iter_mut().flatten() {
+            *x = PathIntegrator::Rk4.advance(flow, x, k as f64 * step, step);
+        }
+        let now = length(&chains) / start;
+        sum += now;
+        most = most.max(now);
+    }
+    Stretch { mean: sum / FRONT_STEPS as f64, most }
+}
+
+/// Units of work of all errors of a run: distances of the particles, and where the exact front is not known by a formula the
+/// paths of its points and of the particles.
+#[must_use]
+pub fn error_units<const D: usize>(
+    surface: Option<&dyn Surface<D>>,
+    flow: &dyn Flow<D>,
+    spacing: f64,
+    particles: f64,
+    end_time: f64,
+) -> f64 {
+    let turn = flow.return_time();
+    let halfway = turn.map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
+    let is_returned = turn.is_some_and(|turn| (end_time / turn - (end_time / turn).round()).abs() < 1e-9);
+    let at_end = if is_returned { 0.0 } else { end_time };
+    let path = if flow.is_rigid() { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
+    let points = surface.filter(|_| D == 2).map_or(0.0, |surface| {
+        let (low, high) = surface.bounding_box();
+        front_points((high - low).max(), spacing)
+    });
+    particles + (points + particles) * path * PATH
+}

@@ -1,0 +1,170 @@
+//! Wave fronts of geometrical optics as curves in (x, y, θ) (GBPM 4.6): where the front crosses itself in the plane, the
+//! directions of its parts tell them apart.
+
+use super::foot_points::{FootPoint, FootPoints};
+use super::grid::{Grid, Node};
+use super::method::FrontMethod;
+use crate::geometry::Vector;
+
+/// The wave front that starts on an ellipse, along its inner normals, with a constant speed.
+///
+/// Place of parameter φ at time t: (a cos φ + c t cos θ, b sin φ + c t sin θ, θ), θ = π + arg(b cos φ + i a sin φ) without jumps. One
+/// turn is a curve from θ = π to 3 π; its ends are one place of the plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EllipticalWavefront {
+    /// Centre in the plane.
+    pub center: [f64; 2],
+    /// a and b.
+    pub semi_axes: [f64; 2],
+    /// c.
+    pub speed: f64,
+}
+
+/// Points of a curve per spacing from which closest points are searched.
+const STARTS_PER_SPACING: f64 = 4.0;
+/// Newton's steps to a closest point, and when they have settled.
+const MOST_ITERATIONS: usize = 50;
+const STILL: f64 = 1e-15;
+const TURN: f64 = std::f64::consts::TAU;
+
+impl EllipticalWavefront {
+    /// The direction at φ.
+    fn direction(&self, phi: f64) -> f64 {
+        let [a, b] = self.semi_axes;
+        // The angle runs ahead of φ or behind it by less than a right angle.
+        let lead = ((a - b) * phi.sin() * phi.cos()).atan2(b * phi.cos().powi(2) + a * phi.sin().powi(2));
+        std::f64::consts::PI + phi + lead
+    }
+
+    /// The parameter of a direction.
+    fn parameter(&self, theta: f64) -> f64 {
+        let [a, b] = self.semi_axes;
+        let psi = theta - std::f64::consts::PI;
+        let lag = ((b - a) * psi.sin() * psi.cos()).atan2(a * psi.cos().powi(2) + b * psi.sin().powi(2));
+        psi + lag
+    }
+
+    /// The place of φ at a time.
+    #[must_use]
+    pub fn place(&self, phi: f64, time: f64) -> Vector<3> {
+        let ([a, b], theta, way) = (self.semi_axes, self.direction(phi), self.speed * time);
+        Vector::<3>::new(
+            self.center[0] + a * phi.cos() + way * theta.cos(),
+            self.center[1] + b * phi.sin() + way * theta.sin(),
+            theta,
+        )
+    }
+
+    /// First and second derivatives by φ at the start.
+    fn derivatives(&self, phi: f64) -> [Vector<3>; 2] {
+        let [a, b] = self.semi_axes;
+        let (sin, cos) = phi.sin_cos();
+        let square = (b * cos).powi(2) + (a * sin).powi(2);
+        let bend = -a * b * 2.0 * (a * a - b * b) * sin * cos / (square * square);
+        [Vector::<3>::new(-a * sin, b * cos, a * b / square), Vector::<3>::new(-a * cos, -b * sin, bend)]
+    }
+
+    /// The distance of a place from the exact place with the same direction.
+    pub(super) fn distance(&self, x: &Vector<3>, time: f64) -> f64 {
+        (x - self.place(self.parameter(x[2]), time)).norm()
+    }
+
+    /// Points of the exact front about `spacing` apart at the start.
+    pub(super) fn points(&self, spacing: f64, time: f64) -> Vec<Vector<3>> {
+        let number = self.number(spacing);
+        (0..=number).map(|k| self.place(TURN * k as f64 / number as f64, time)).collect()
+    }
+
+    fn number(&self, spacing: f64) -> usize {
+        let [a, b] = self.semi_axes;
+        (TURN * (a.max(b) + a.max(b) / a.min(b)) / spacing).ceil().max(64.0) as usize
+    }
+
+    /// The foot-points of all grid points within the tube, and the two ends of the curve.
+    #[must_use]
+    pub fn foot_points(&self, grid: &Grid, method: &FrontMethod) -> FootPoints<3> {
+        let radius = method.tube_radius * grid.spacing;
+        let mut near: Vec<(Node, f64)> = Vec::new();
+        for x in self.points(grid.spacing / STARTS_PER_SPACING, 0.0) {
+            let corner = |side: f64| grid.nearest(&x.add_scalar(side), 0);
+            let (Some(low), Some(high)) = (corner(-1.5 * radius), corner(1.5 * radius)) else { continue };
+            Grid::for_each_in(&low, &high, |at| {
+                let p = grid.center(at, 0);
+                if let Some(phi) = self.closest(&p, self.parameter(x[2]))
+                    && (p - self.place(phi, 0.0)).norm() <= radius
+                {
+                    near.push((Grid::node(at, 0), phi));
+                }
+            });
+        }
+        let distance = |(node, phi): &(Node, f64)| (grid.place::<3>(*node) - self.place(*phi, 0.0)).norm();
+        near.sort_by(|a, b| a.0.cmp(&b.0).then(distance(a).total_cmp(&distance(b))));
+        near.dedup_by_key(|(node, _)| *node);
+        for phi in [0.0, TURN] {
+            near.extend(grid.nearest(&self.place(phi, 0.0), 0).map(|at| (Grid::node(&at, 0), phi)));
+        }
+        let mut feet = FootPoints::default();
+        for (node, phi) in near {
+            let [first, second] = self.derivatives(phi);
+            let square = first.norm_squared();
+            let across = second - first * (second.dot(&first) / square);
+            let foot = FootPoint {
+                position: self.place(phi, 0.0),
+                normal: first / square.sqrt(),
+                curvature: across.norm() / square,
+                gauss_curvature: 0.0,
+                part: 0,
+            };
+            feet.push(node, &foot);
+        }
+        feet
+    }
+
+    /// The parameter of the closest point at the start, within the one turn.
+    fn closest(&self, p: &Vector<3>, start: f64) -> Option<f64> {
+        let mut phi = start;
+        for _ in 0..MOST_ITERATIONS {
+            let rest = self.place(phi, 0.0) - p;
+            let [first, second] = self.derivatives(phi);
+            let slope = first.norm_squared();
+            let bend = slope + rest.dot(&second);
+            let step = rest.dot(&first) / if bend > 1e-3 * slope { bend } else { slope };
+            phi -= step;
+            if step.abs() <= STILL * (1.0 + phi.abs()) {
+                break;
+            }
+        }
+        (0.0..=TURN).contains(&phi).then_some(phi)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{EllipticalWavefront, TURN};
+    use std::f64::consts::PI;
+
+    const FRONT: EllipticalWavefront =
+        EllipticalWavefront { center: [0.1, -0.2], semi_axes: [0.6 * PI, 0.3 * PI], speed: 1.0 };
+
+    #[test]
+    fn directions_are_inner_normals_and_turn_once() {
+        for k in 0..=20 {
+            let phi = TURN * f64::from(k) / 20.0;
+            let theta = FRONT.direction(phi);
+            let inward = (-phi.cos() / FRONT.semi_axes[0], -phi.sin() / FRONT.semi_axes[1]);
+            let length = inward.0.hypot(inward.1);
+            assert!((theta.cos() - inward.0 / length).abs() < 1e-14 && (theta.sin() - inward.1 / length).abs() < 1e-14);
+            assert!((FRONT.parameter(theta) - phi).abs() < 1e-13);
+        }
+        assert!((FRONT.direction(TURN) - FRONT.direction(0.0) - TURN).abs() < 1e-14);
+    }
+
+    #[test]
+    fn derivatives_are_those_of_places() {
+        let (phi, e) = (0.7, 1e-5);
+        let [first, second] = FRONT.derivatives(phi);
+        let [before, at, after] = [phi - e, phi, phi + e].map(|phi| FRONT.place(phi, 0.0));
+        assert!(((after - before) / (2.0 * e) - first).norm() < 1e-9);
+        assert!(((after - at * 2.0 + before) / (e * e) - second).norm() < 1e-4);
+    }
+}
