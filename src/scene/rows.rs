@@ -134,6 +134,8 @@ pub enum Plot {
     SpeedAgainstError {
         /// The error shown.
         quantity: Quantity,
+        /// What is shown of runs that do not report it.
+        otherwise: Option<Quantity>,
         /// Prefix of the phases whose CPU time is shown.
         phases: &'static str,
         /// A label and the runs of each line.

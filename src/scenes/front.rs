@@ -1,5 +1,7 @@
 //! `front`: geometric motion by the grid-based particle method (GBPM paper).
 
+mod cases;
+mod figures;
 mod parameters;
 mod rows;
 mod setup;

@@ -15,10 +15,10 @@ impl Bench {
     pub(super) fn draw(&self, figure: &Figure, path: &Path) -> Result<(), String> {
         let title = figure.title;
         let text = match &figure.plot {
-            Plot::SpeedAgainstError { quantity, phases, lines } => {
+            Plot::SpeedAgainstError { quantity, otherwise, phases, lines } => {
                 let seconds =
                     if phases.is_empty() { "CPU seconds".to_owned() } else { format!("CPU seconds of {phases}") };
-                speed_error::draw(title, &seconds, &self.speed_lines(*quantity, phases, lines)?)
+                speed_error::draw(title, &seconds, &self.speed_lines((*quantity, *otherwise), phases, lines)?)
             }
             Plot::History { column, is_log, lines, marks } => {
                 let lines = each(lines, |scene| self.history(scene, column))?;
@@ -44,7 +44,7 @@ impl Bench {
 
     fn speed_lines(
         &self,
-        quantity: Quantity,
+        (quantity, otherwise): (Quantity, Option<Quantity>),
         phases: &str,
         lines: &[(String, Vec<Value>)],
     ) -> Result<speed_error::Lines, String> {
@@ -54,7 +54,7 @@ impl Bench {
                 Some(speed_error::Point {
                     spacing: measure::spacing(scene)?,
                     seconds: measure::seconds(&report, phases),
-                    error: measure::error(&report, quantity)?,
+                    error: measure::error(&report, quantity).or_else(|| measure::error(&report, otherwise?))?,
                 })
             };
             found().ok_or_else(|| format!("{scene} reports no {} {}", quantity.name, quantity.norm))

@@ -24,11 +24,12 @@ pub fn spacing(scene: &Value) -> Option<f64> {
     scene["spacing"].as_f64().or_else(|| scene["count"].as_f64().map(apart))
 }
 
-/// CPU seconds in phases whose names begin so.
+/// CPU seconds in phases whose names begin so; without a name in all that are not errors and references.
 #[must_use]
 pub fn seconds(report: &Value, prefix: &str) -> f64 {
     let phases = report["cost"]["phases"].as_object();
-    let own = phases.into_iter().flatten().filter(|(name, _)| name.starts_with(prefix));
+    let is_meant = |name: &str| if prefix.is_empty() { name != "errors" } else { name.starts_with(prefix) };
+    let own = phases.into_iter().flatten().filter(|(name, _)| is_meant(name));
     own.filter_map(|(_, seconds)| seconds.as_f64()).sum()
 }
 

@@ -156,7 +156,7 @@ fn figures() -> Vec<Figure> {
     let errors = |name, title, quantity, number| {
         let runs = |more: &Value| [16, 24, 32, 48].map(|cells| oscillating(cells, more)).to_vec();
         let lines = variants()[..number].iter().map(|(label, more)| ((*label).to_owned(), runs(more))).collect();
-        Figure { name, title, plot: Plot::SpeedAgainstError { quantity, phases: "", lines } }
+        Figure { name, title, plot: Plot::SpeedAgainstError { quantity, otherwise: None, phases: "", lines } }
     };
     let each = || variants().map(|(label, more)| (format!("{label}, 1/32"), oscillating(32, &more))).to_vec();
     let history = |name, title, column, is_log, marks| {

@@ -1,74 +1,13 @@
 //! The rows of `front`, and of `vortex` with grid-based particles: GBPM paper, section 4.
 
-use crate::scene::rows::{Figure, Measure, Plot, Quantity, Reach, Row, Rows, with};
+use super::cases::{
+    adaptive, balls, by_curvature, disk, dumbbell, front, levels, onward, optics, other_square, ring, rotated, square,
+    square_shape, still, still_sphere, three_spheres, translated, vortex, vortex_in_space,
+};
+use super::figures::figures;
+use crate::scene::rows::{Measure, Quantity, Reach, Row, Rows, with};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
-
-fn front(cells: u32, more: &Value) -> Value {
-    with(json!({"kind": "front", "spacing": 1.0 / f64::from(cells)}), more)
-}
-
-/// One resampling without motion.
-fn still(cells: u32, more: &Value) -> Value {
-    let rest = json!({"type": "flow", "flow": {"type": "translation", "velocity": [0, 0]}});
-    with(front(cells, &json!({"law": rest, "end_time": 0.01, "time_step": 0.01})), more)
-}
-
-fn still_sphere(cells: u32, more: &Value) -> Value {
-    let rest = json!({"type": "flow", "flow": {"type": "translation", "velocity": [0, 0, 0]}});
-    let sphere = json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25});
-    with(still(cells, &json!({"law": rest, "shape": sphere})), more)
-}
-
-fn translated(cells: u32, more: &Value) -> Value {
-    let law = json!({"type": "flow", "flow": {"type": "translation", "velocity": [1, 1]}});
-    let shape = json!({"type": "circle", "center": [0.25, 0.25], "radius": 0.2});
-    with(front(cells, &json!({"law": law, "shape": shape, "end_time": 0.5})), more)
-}
-
-fn rotated(cells: u32, shape: &Value, turns: f64, more: &Value) -> Value {
-    let law = json!({"type": "flow", "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 2}});
-    with(front(cells, &json!({"law": law, "shape": shape, "end_time": PI * turns})), more)
-}
-
-fn disk() -> Value {
-    json!({"type": "zalesak_disk", "center": [0.5, 0.75], "radius": 0.15, "slot_width": 0.05, "slot_depth": 0.25})
-}
-
-/// The vortex that turns back, by grid-based particles.
-fn vortex(cells: u32, period: f64, method: &Value) -> Value {
-    let method = with(json!({"type": "gbpm"}), method);
-    json!({
-        "kind": "vortex", "spacing": 1.0 / f64::from(cells), "flow": {"type": "single_vortex", "period": period},
-        "end_time": period, "method": method
-    })
-}
-
-fn vortex_in_space(cells: u32) -> Value {
-    json!({
-        "kind": "vortex", "spacing": 1.0 / f64::from(cells), "flow": "vortex_3d", "end_time": 2, "method": "gbpm",
-        "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15}
-    })
-}
-
-fn by_curvature(cells: u32, end_time: f64, more: &Value) -> Value {
-    let circle = json!({"type": "circle", "center": [0.5, 0.5], "radius": 0.4});
-    with(front(cells, &json!({"law": "mean_curvature", "shape": circle, "end_time": end_time})), more)
-}
-
-fn balls(cells: u32, kind: &str, end_time: f64, more: &Value) -> Value {
-    let ball = |c: f64| {
-        let center = if kind == "circle" { json!([c, c]) } else { json!([c, c, c]) };
-        json!({"type": kind, "center": center, "radius": 0.1})
-    };
-    let shape = json!({"type": "union", "of": [ball(0.4), ball(0.6)]});
-    with(front(cells, &json!({"shape": shape, "end_time": end_time})), more)
-}
-
-fn square(size: f64, speed: f64) -> Value {
-    let shape = json!({"type": "box", "center": [0.5, 0.5], "size": [size, size]});
-    front(256, &json!({"shape": shape, "end_time": 0.3, "law": {"type": "normal", "speed": speed}}))
-}
 
 fn end(name: &'static str, norm: &'static str) -> Measure {
     Measure::Error(Quantity::at_end(name, norm))
@@ -146,6 +85,30 @@ pub fn rows() -> Rows {
             row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(9.0), true);
         }
     }
+    for cfl in [8, 12, 16, 24] {
+        let run = || vec![adaptive(128, 8.0, cfl)];
+        let case = |what: &str| format!("single vortex, T = 8, adaptive 129² to 1025², step factor {cfl}: {what}");
+        let mean = Reach::Within { of: 0.15, by: 3e-4 };
+        row(case("mean radius"), ".1512", run(), end("radius", "mean"), mean, true);
+        row(case("deviation"), "3.0e-3", run(), end("radius", "deviation"), most(1e-3), true);
+        row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), true);
+        row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(9.0), true);
+    }
+    for cosine in [-0.3, 0.0, 0.5] {
+        let test = json!({"segment_test": {"type": "normals", "cosine": cosine}});
+        let run = || vec![vortex(256, 8.0, &test)];
+        let case = |what: &str| format!("single vortex, T = 8, 257², normals to {cosine}: {what}");
+        row(case("deviation"), "–", run(), end("radius", "deviation"), most(1e-3), true);
+        row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), true);
+    }
+    let both = || vec![onward(1024, &json!({})), onward(128, &levels(4))];
+    let case =
+        |what: &str| format!("single vortex without reversal, t = 3, adaptive 129² to 1025² by uniform 1025²: {what}");
+    let growth = |name, norm| Measure::Growth(Quantity::at_end(name, norm));
+    row(case("particles"), "2.0e4 by 2.4e4", both(), growth("front", "count"), most(0.5), true);
+    row(case("mean distance"), "picture", both(), growth("front", "mean"), most(1.0), true);
+    row(case("largest distance"), "picture", both(), growth("front", "max"), most(1.0), true);
+    row(case("CPU seconds"), "–", both(), Measure::SecondsShare("front/"), most(0.5), true);
     for (name, scene, mean, largest) in [
         ("square inward", square(0.8, -1.0), 1e-12, 1e-12),
         ("square outward", square(0.2, 1.0), 5e-4, 0.25 / 256.0),
@@ -167,6 +130,62 @@ pub fn rows() -> Rows {
             row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(0.4), false);
         }
     }
+    let refined = with(levels(3), &json!({"cfl": 20}));
+    let both = || vec![rotated(1024, &disk(), 1.0, &json!({"cfl": 20})), rotated(256, &disk(), 1.0, &refined)];
+    let case = |what: &str| format!("Zalesak disk, adaptive 257² to 1025², 1 revolution: {what}");
+    row(case("mean distance"), "picture", both(), end("front", "mean"), most(2e-4), false);
+    row(case("coverage"), "–", both(), end("front", "coverage_h"), most(1.5), false);
+    row(case("particles by uniform 1025²"), "picture", both(), growth("front", "count"), most(0.5), false);
+    for (name, shape, spacing, time) in [
+        ("square .5 on grid points", square_shape(0.5), 1.0 / 64.0, 0.25 / (2.0 * PI)),
+        ("square .503 beside them", square_shape(0.503), 1.0 / 64.0, 0.503 * 0.503 / (2.0 * PI)),
+        (
+            "ellipse (.2, .1)",
+            json!({"type": "ellipse", "center": [0.5, 0.5], "semi_axes": [0.2, 0.1]}),
+            1.0 / 128.0,
+            0.01,
+        ),
+    ] {
+        let run =
+            front(64, &json!({"law": "mean_curvature", "shape": shape, "spacing": spacing, "end_time": 1.1 * time}));
+        // Once it is smaller than a spacing or two nothing is left to resolve.
+        let reach = Reach::Within { of: time, by: 2.0 * spacing * spacing };
+        row(
+            format!("mean curvature, {name}: extinction at area/2π"),
+            "picture",
+            vec![run],
+            end("extinction", "time"),
+            reach,
+            false,
+        );
+    }
+    let sphere = json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.4});
+    let run = || vec![front(32, &json!({"law": "mean_curvature", "shape": sphere, "end_time": 0.045}))];
+    row(
+        "mean curvature, sphere .4, 33³: extinction".into(),
+        "picture",
+        run(),
+        end("extinction", "absolute"),
+        most(1e-3),
+        false,
+    );
+    let run = || vec![dumbbell()];
+    let reach = Reach::Within { of: 0.15 * 0.15 / 4.0, by: 6e-4 };
+    row(
+        "mean curvature, dumbbell, 51³: extinction of its balls".into(),
+        "–",
+        run(),
+        end("extinction", "time"),
+        reach,
+        false,
+    );
+    for cells in [64, 128, 256] {
+        let run = || vec![optics(cells, 0.4)];
+        let case = |what: &str| format!("geometrical optics, ellipse, {}³, t = .4: {what}", cells + 1);
+        let reach = if cells < 128 { Reach::Shown } else { most(1e-5) };
+        row(case("largest distance from the rays"), "picture", run(), end("front", "max"), reach, false);
+        row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), false);
+    }
     for (degree, figure) in [(2, 7e-6), (4, 1.5e-7)] {
         let law = json!({"type": "flow", "flow": {"type": "translation", "velocity": [0.5, 0.5, 0.5]}});
         let sphere = json!({"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15});
@@ -180,6 +199,16 @@ pub fn rows() -> Rows {
         row(case("deviation"), "6.4e-3", run(), end("radius", "deviation"), most(figure), cells > 90);
         row(case("coverage"), "–", run(), end("front", "coverage_h"), most(1.5), cells > 90);
         row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(seconds), cells > 90);
+    }
+    for (name, scene, far) in [
+        ("square .25 outward, 129², corners on grid points", other_square(128, 0.25, 1.0), 0.25 / 128.0),
+        ("square .503 outward, 65²", other_square(64, 0.503, 1.0), 0.25 / 64.0),
+        ("square .8 inward, 101², corners on grid points", other_square(100, 0.8, -1.0), 1e-12),
+        ("ring grows until it has no hole, 51³", ring(), 0.25 / 50.0),
+        ("three spheres merge, 51³", three_spheres(), 0.3 / 50.0),
+    ] {
+        row(format!("{name}: largest distance"), "–", vec![scene.clone()], end("front", "max"), most(far), false);
+        row(format!("{name}: coverage"), "–", vec![scene], end("front", "coverage_h"), most(1.5), false);
     }
     for (name, more) in [("merge", json!({})), ("cross", json!({"topology": "cross"}))] {
         let run = || vec![balls(50, "sphere", 0.125, &more)];
@@ -195,42 +224,6 @@ pub fn rows() -> Rows {
         row(format!("two spheres {name}, 51³: coverage"), "–", run(), end("front", "coverage_h"), most(1.5), false);
     }
     Rows { document: "front", rows, figures: figures() }
-}
-
-fn figures() -> Vec<Figure> {
-    let frames = |name, title, scene, every_time, chosen: &[usize]| Figure {
-        name,
-        title,
-        plot: Plot::Frames { scene, every_time, chosen: chosen.to_vec() },
-    };
-    let radius = Quantity::at_end("radius", "deviation");
-    let quartic = |cells| vortex(cells, 8.0, &json!({}));
-    let lines = vec![("quartic, step factor 10".to_owned(), [128, 192, 256, 384, 512].map(quartic).to_vec())];
-    let histories =
-        vec![("257²".to_owned(), vortex(256, 8.0, &json!({}))), ("513²".to_owned(), vortex(512, 8.0, &json!({})))];
-    let disk = rotated(256, &disk(), 1.0, &json!({"cfl": 20}));
-    vec![
-        Figure {
-            name: "front-vortex",
-            title: "Single vortex, T = 8: deviation of the radius",
-            plot: Plot::SpeedAgainstError { quantity: radius, phases: "front/", lines },
-        },
-        Figure {
-            name: "front-count",
-            title: "Single vortex, T = 8: foot-points over time (fig. 11)",
-            plot: Plot::History { column: "foot_points", is_log: false, lines: histories, marks: Vec::new() },
-        },
-        frames(
-            "front-spiral",
-            "Single vortex, T = 8, 513² (fig. 12)",
-            vortex(512, 8.0, &json!({})),
-            2.0,
-            &[0, 1, 2, 4],
-        ),
-        frames("front-merge", "Two circles merge (fig. 16)", balls(256, "circle", 0.4, &json!({})), 0.1, &[0, 1, 2, 4]),
-        frames("front-square", "Square inward (fig. 14)", square(0.8, -1.0), 0.1, &[0, 1, 2, 3]),
-        frames("front-zalesak", "Zalesak's disk, one revolution (fig. 7)", disk, PI / 2.0, &[0, 1, 2]),
-    ]
 }
 
 /// Short scenes by which a machine is measured.

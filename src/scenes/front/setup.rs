@@ -2,7 +2,7 @@
 
 use super::parameters::{Law, Written};
 use super::wavefront::{self, WavefrontScene};
-use crate::geometry::Surface;
+use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
@@ -275,11 +275,9 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             },
             Law::Normal { speed } if *speed > 0.0 => {
                 let parts = shapes::parts::<D>(&self.choice.shape, "/shape").unwrap_or_default();
-                let growth = |surface: &Box<dyn Surface<D>>| {
-                    let (low, high) = surface.bounding_box();
-                    1.0 + 2.0 * speed * self.choice.end_time / (high - low).max()
-                };
-                let most = parts.iter().map(growth).fold(1.0, f64::max).powi(D as i32 - 1);
+                let growth =
+                    |(low, high): (Vector<D>, Vector<D>)| 1.0 + 2.0 * speed * self.choice.end_time / (high - low).max();
+                let most = parts.iter().map(|part| growth(part.bounding_box())).fold(1.0, f64::max).powi(D as i32 - 1);
                 Stretch { mean: 0.5 * (1.0 + most), most }
             }
             _ => none,

@@ -227,6 +227,7 @@ pub fn rows() -> Rows {
         name: "redistance",
         title: "Ellipse, α = .3: max error of φ within 1/16",
         plot: Plot::SpeedAgainstError {
+            otherwise: None,
             quantity: PHI_MAX,
             phases: "redistancing",
             lines: vec![

@@ -314,7 +314,7 @@ fn figures() -> Vec<Figure> {
     let errors = |name, title, phases, lines| Figure {
         name,
         title,
-        plot: Plot::SpeedAgainstError { quantity: ERROR, phases, lines },
+        plot: Plot::SpeedAgainstError { quantity: ERROR, otherwise: None, phases, lines },
     };
     let solved = ["dirichlet", "zero_mean"].into_iter().flat_map(|condition| {
         [2, 4].map(|order| (format!("{condition}, order {order}"), series(&|count| poisson(count, order, condition))))
@@ -370,6 +370,7 @@ fn figures() -> Vec<Figure> {
             name: "surface-curvature",
             title: "Curvature of the ellipsoid: largest error (fig. 4)",
             plot: Plot::SpeedAgainstError {
+                otherwise: None,
                 quantity: Quantity::at_end("mean_curvature", "max"),
                 phases: "operators/construction",
                 lines: [2, 4].map(|order| (format!("order {order}"), curved(order))).to_vec(),

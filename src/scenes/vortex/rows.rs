@@ -128,7 +128,7 @@ pub fn rows() -> Rows {
     let figure = |name, title, quantity| Figure {
         name,
         title,
-        plot: Plot::SpeedAgainstError { quantity, phases: "redistancing", lines: lines() },
+        plot: Plot::SpeedAgainstError { quantity, otherwise: None, phases: "redistancing", lines: lines() },
     };
     let figures = vec![
         figure("vortex-end", "Single vortex, T = 8: RMS error of φ at T", END),

@@ -2,14 +2,14 @@
 
 use super::parameters::{Field, Redistance, Written};
 use crate::closest_point::PcpMethod;
-use crate::geometry;
+use crate::geometry::Flow;
 use crate::geometry::lattice::Lattice;
 use crate::scene::check;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::flow_work::{error_units, stretch};
-use crate::scenes::flows::{Flow, flow};
+use crate::scenes::flows::{self, flow};
 use crate::scenes::front::{FrontChoice, Law, understand_choice};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::{pcp_parameters, shapes, work_estimate};
@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 struct VortexScene<const D: usize> {
     resolved: Value,
     shape: Value,
-    flow: Flow,
+    flow: flows::Flow,
     lattice: Lattice,
     method: PcpMethod,
     chosen: BTreeMap<&'static str, String>,
@@ -299,10 +299,9 @@ impl<const D: usize> Scene for VortexScene<D> {
         let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, stretch, times, course);
         work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages));
         work.push(PhaseWork { phase: "measure", units: particles * times, course });
-        let errors = |flow: &Box<dyn geometry::Flow<D>>| {
-            error_units(surface.as_deref(), flow.as_ref(), self.lattice.spacing, particles, end_time)
-        };
-        work.push(PhaseWork::at_moments("errors", flow.as_ref().map_or(particles, errors)));
+        let errors =
+            |flow: &dyn Flow<D>| error_units(surface.as_deref(), flow, self.lattice.spacing, particles, end_time);
+        work.push(PhaseWork::at_moments("errors", flow.as_deref().map_or(particles, errors)));
         work.extend(work_estimate::around(particles, steps, end_time, plan));
         work
     }
