@@ -8,11 +8,13 @@
 mod basis;
 pub mod charts;
 pub mod construction;
+mod derivative_tensor;
 pub mod evaluation;
 pub mod fits;
 mod moment_fit;
 
 pub use charts::{Chart, FlatChart, Functional, NormalCopies, TangentChart};
 pub use construction::{Construction, construct};
+pub use derivative_tensor::{Tensor, derivative_tensor, divergence, sum_of_minors};
 pub use evaluation::Evaluation;
 pub use fits::{Soundness, Support};

@@ -84,7 +84,7 @@ fn bodies() -> Vec<Value> {
     bodies
 }
 
-/// Every law, topology, segment test and integrator of `front` in both dimensions, and grid-based particles in a vortex.
+/// Every law, topology, segment test, refinement and integrator of `front` in both dimensions, and grid-based particles in a vortex.
 fn front_bodies() -> Vec<Value> {
     let front = |more: Value| {
         let mut body = json!({"kind": "front", "spacing": 0.04, "end_time": 0.1, "time_step": 0.01});
@@ -111,6 +111,20 @@ fn front_bodies() -> Vec<Value> {
             "method": {"type": "gbpm", "degree": 3, "tube_radius_h": 1.4}, "integrator": "dopri5"
         }),
         json!({"kind": "vortex", "spacing": 0.03, "method": {"type": "gbpm", "cfl": 6}, "end_time": 3}),
+        json!({
+            "kind": "vortex", "spacing": 0.04, "end_time": 2,
+            "method": {"type": "gbpm", "cfl": 20, "adaptivity": {"levels": 3, "curvature_constant": 0.15}}
+        }),
+        json!({"kind": "vortex", "preset": "paper", "spacing": 0.03, "method": {"type": "gbpm", "degree": 3}, "end_time": 0.4}),
+        front(json!({"shape": spheres, "adaptivity": {"levels": 2}, "spacing": 0.05})),
+        front(json!({"shape": square, "adaptivity": {}, "end_time": 0.05})),
+        front(json!({
+            "law": "geometrical_optics", "shape": {"type": "ellipse", "center": [0.1, 0.2], "semi_axes": [1, 0.6]},
+            "spacing": 0.1, "end_time": 0.9, "time_step": 0.1
+        })),
+        front(
+            json!({"law": {"type": "geometrical_optics", "speed": -0.5}, "shape": "circle", "adaptivity": {"levels": 2}}),
+        ),
     ]
 }
 

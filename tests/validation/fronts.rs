@@ -2,7 +2,7 @@
 //! panic nor leave stray particles.
 
 use crate::support::{build, error, run};
-use meniscus::simulation::{FieldValues, OutputPlan, Simulation};
+use meniscus::simulation::{FieldValues, OutputPlan, Simulation, StepError};
 use serde_json::{Value, json};
 
 fn front(more: &Value) -> Value {
@@ -45,6 +45,121 @@ fn fronts_of_given_speed_merge_cross_and_keep_corners() {
         assert!(far <= largest, "{more}: {far:e}");
         assert!(coverage <= 1.0, "{more}: coverage {coverage}");
     }
+}
+
+/// However corners lie in the grid and however long the step is, an opening one becomes an arc and a closing one stays; thin
+/// bodies grow, and several that meet leave nothing inside.
+#[test]
+fn corners_and_meetings_do_not_depend_on_the_grid() {
+    let square = |center: f64, size: f64| json!({"type": "box", "center": [center, 0.5], "size": [size, size]});
+    let inward = |size: f64| json!({"shape": square(0.5, size), "law": {"type": "normal", "speed": -1}, "end_time": 0.2, "spacing": 0.01});
+    let outward = |size: f64, cfl: f64| json!({"shape": square(0.503, size), "end_time": 0.1, "cfl": cfl});
+    let thin = json!({"type": "box", "center": [0.5, 0.5], "size": [0.6, 0.004]});
+    let disk =
+        json!({"type": "zalesak_disk", "center": [0.5, 0.5], "radius": 0.3, "slot_width": 0.1, "slot_depth": 0.4});
+    let ball = |kind: &str, x: f64, y: f64| {
+        let center = if kind == "circle" { json!([x, y]) } else { json!([x, y, 0.5]) };
+        json!({"type": kind, "center": center, "radius": 0.1})
+    };
+    let three = |kind: &str| json!({"type": "union", "of": [ball(kind, 0.4, 0.4), ball(kind, 0.7, 0.4), ball(kind, 0.55, 0.65)]});
+    let ring = json!({"type": "torus", "center": [0.5, 0.5, 0.5], "major_radius": 0.25, "minor_radius": 0.1});
+    let touching = json!({"type": "union", "of": [ball("circle", 0.4, 0.5), ball("circle", 0.6, 0.5)]});
+    let cube = json!({"type": "box", "center": [0.5, 0.5, 0.5], "size": [0.2, 0.2, 0.2]});
+    let h = 1.0 / 128.0;
+    for (more, largest) in [
+        (inward(0.8), 1e-12),
+        (inward(0.53), 1e-12),
+        (json!({"shape": square(0.5, 0.25), "end_time": 0.1}), 0.25 * h),
+        (outward(0.21, 0.2), 0.3 * h),
+        (outward(0.21, 1.0), 0.25 * h),
+        (outward(0.21, 3.0), 0.25 * h),
+        (json!({"shape": thin, "end_time": 0.1}), 0.25 * h),
+        (json!({"shape": disk, "end_time": 0.25}), 0.25 * h),
+        (json!({"shape": three("circle"), "end_time": 0.3}), 0.3 * h),
+        (json!({"shape": balls("circle"), "end_time": 0.4, "spacing": 0.03}), 0.15 * 0.03),
+        (json!({"shape": touching, "end_time": 0.2}), 0.15 * h),
+        (json!({"shape": three("sphere"), "end_time": 0.15, "spacing": 0.02}), 0.3 * 0.02),
+        (json!({"shape": ring, "end_time": 0.4, "spacing": 0.02}), 0.25 * 0.02),
+        (json!({"shape": cube, "end_time": 0.05, "spacing": 0.01}), 0.25 * 0.01),
+    ] {
+        let report = run(&front(&more));
+        let (far, coverage) = (error(&report, "front", "max", None), error(&report, "front", "coverage_h", None));
+        assert!(far <= largest, "{more}: {far:e}");
+        assert!(coverage <= 1.0, "{more}: coverage {coverage}");
+    }
+}
+
+/// A square loses area at the rate 2π, a dumbbell breaks at its neck, and nothing is left of any.
+#[test]
+fn bodies_round_break_and_die_by_their_curvature() {
+    let square = |size: f64| json!({"type": "box", "center": [0.5, 0.5], "size": [size, size]});
+    for size in [0.25, 0.4, 0.503] {
+        let time = size * size / std::f64::consts::TAU;
+        let body =
+            json!({"shape": square(size), "law": "mean_curvature", "end_time": 1.1 * time, "spacing": 1.0 / 64.0});
+        let report = run(&front(&body));
+        let off = error(&report, "extinction", "time", None) - time;
+        assert!(off.abs() < 3.0 / 64.0 / 64.0, "{size}: {off:e}");
+    }
+    let dumbbell = json!({
+        "type": "dumbbell", "center": [0.5, 0.5, 0.5], "separation": 0.5, "radius": 0.15, "neck_radius": 0.06
+    });
+    let body = |end_time: f64| {
+        at_end(&front(&json!({"shape": dumbbell, "law": "mean_curvature", "end_time": end_time, "spacing": 0.02})))
+    };
+    let places: Vec<f64> = body(0.003).fields().points.iter().map(|x| x[0]).collect();
+    assert!(places.iter().all(|x| (x - 0.5).abs() > 0.05), "the neck is gone");
+    assert!(places.iter().any(|x| *x < 0.3) && places.iter().any(|x| *x > 0.7), "both balls are there");
+    assert_eq!(body(0.0065).particle_count(), 0);
+}
+
+/// GBPM 3.5: refined where it turns, with fewer particles and no less exact; and what the paper's open problem was, closed.
+#[test]
+fn a_refined_grid_follows_thin_filaments() {
+    let vortex = |spacing: f64, method: Value| {
+        let flow = json!({"type": "single_vortex", "period": 4});
+        run(&json!({"kind": "vortex", "spacing": spacing, "flow": flow, "end_time": 4, "method": method}))
+    };
+    let refined = vortex(1.0 / 64.0, json!({"type": "gbpm", "cfl": 16, "adaptivity": {"levels": 3}}));
+    let uniform = vortex(1.0 / 256.0, json!({"type": "gbpm", "cfl": 16}));
+    let at = |report, name, norm, time| error(report, name, norm, Some(time));
+    for report in [&refined, &uniform] {
+        assert!(at(report, "front", "gap_h", 4.0) < 1.5);
+        assert!(at(report, "radius", "deviation", 4.0) < 3e-4);
+    }
+    assert!(at(&refined, "front", "count", 2.0) < 0.5 * at(&uniform, "front", "count", 2.0));
+    assert!(at(&refined, "front", "mean", 2.0) < 2.0 * at(&uniform, "front", "mean", 2.0));
+}
+
+/// GBPM 4.6, through the focus: past t = .47 the front crosses itself in the plane.
+#[test]
+fn wave_fronts_follow_their_rays() {
+    let pi = std::f64::consts::PI;
+    let shape = json!({"type": "ellipse", "center": [0, 0], "semi_axes": [0.6 * pi, 0.3 * pi]});
+    for (end_time, speed) in [(0.4, 1.0), (1.2, 1.0), (0.4, -1.0)] {
+        let law = json!({"type": "geometrical_optics", "speed": speed});
+        let body = json!({"kind": "front", "law": law, "shape": shape, "spacing": pi / 64.0, "end_time": end_time});
+        let report = run(&body);
+        assert!(error(&report, "front", "max", None) < 1e-5, "{body}");
+        assert!(error(&report, "front", "gap_h", None) < 1.5, "{body}");
+    }
+}
+
+/// Nothing that runs ends well with figures of nothing.
+#[test]
+fn what_cannot_be_followed_is_said() {
+    let gone =
+        json!({"shape": {"type": "circle", "radius": 0.05}, "law": {"type": "normal", "speed": -1}, "end_time": 0.1});
+    let report = run(&front(&gone));
+    assert!(!report.errors.iter().any(|e| e.quantity == "front" && e.norm != "count"), "{:?}", report.errors);
+    assert!(error(&report, "front", "count", None).abs() < 1e-12);
+    // So thin that its tips are far below the grid.
+    let thin = json!({"type": "ellipse", "center": [0.5, 0.5], "semi_axes": [0.4, 0.02]});
+    let mut open = at_end(&front(&json!({"shape": thin, "law": "mean_curvature", "end_time": 0.002})));
+    assert!(open.take_findings().iter().any(|finding| finding.name == "front_open"));
+    let fast = front(&json!({"law": {"type": "normal", "speed": 1e308}, "time_step": 10, "end_time": 20}));
+    let mut lost = build(&fast, OutputPlan { every_time: None, series_every_steps: 1000 });
+    assert!(matches!(lost.step(), Err(StepError::NonFinite { .. })));
 }
 
 /// The rows' bounds for 257², at 129² by what order 4 makes of it; and no gap.

@@ -4,6 +4,7 @@
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
+use crate::operators::{derivative_tensor, divergence, sum_of_minors};
 use crate::schemes::measured_errors::against_exact;
 use crate::simulation::state::check_length;
 use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
@@ -46,22 +47,9 @@ impl<const D: usize> Problem<D> for Curvature {
             return Ok(());
         }
         phases.measure("operators/application", || {
-            // (∇_S n)_ab = G_a n_b; H is its trace's share, K the sum of its principal minors.
-            let mut tensor = vec![[[0.0; D]; D]; cloud.rows];
-            let mut derivative = vec![0.0; cloud.rows];
-            for b in 0..D {
-                let component: Vec<f64> = cloud.normals.iter().map(|n| n[b]).collect();
-                for (a, operator) in operators.rows.iter().enumerate() {
-                    operator.apply(&component, &mut derivative);
-                    tensor.iter_mut().zip(&derivative).for_each(|(s, value)| s[a][b] = *value);
-                }
-            }
-            for (i, s) in tensor.iter().enumerate() {
-                let trace: f64 = (0..D).map(|a| s[a][a]).sum();
-                self.mean[i] = share(D) * trace;
-                let pairs = (0..D).flat_map(|a| (a + 1..D).map(move |b| (a, b)));
-                self.gauss[i] =
-                    if D == 3 { pairs.map(|(a, b)| s[a][a] * s[b][b] - s[a][b] * s[b][a]).sum() } else { 0.0 };
+            for (i, shape) in derivative_tensor(&operators.rows, &cloud.normals).iter().enumerate() {
+                self.mean[i] = share(D) * divergence(shape);
+                self.gauss[i] = if D == 3 { sum_of_minors(shape) } else { 0.0 };
             }
         });
         Ok(())
