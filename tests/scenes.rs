@@ -123,7 +123,7 @@ fn front_bodies() -> Vec<Value> {
             "spacing": 0.1, "end_time": 0.9, "time_step": 0.1
         })),
         front(
-            json!({"law": {"type": "geometrical_optics", "speed": -0.5}, "shape": "circle", "adaptivity": {"levels": 2}}),
+            json!({"law": {"type": "geometrical_optics", "speed": -0.5}, "shape": {"type": "circle", "radius": 0.3}, "adaptivity": {"levels": 2}}),
         ),
     ]
 }

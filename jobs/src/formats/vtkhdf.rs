@@ -86,7 +86,9 @@ pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
         if data.dataset("grid_point").is_err() {
             return Ok(None);
         }
-        if points.iter().chain(&normals).all(|x| x[2] == 0.0) {
+        // That of a wave front, a curve in (x, y, θ), is drawn in the plane too.
+        if normals.iter().all(|n| n[2] == 0.0) {
+            let points: Vec<[f64; 3]> = points.iter().map(|x| [x[0], x[1], 0.0]).collect();
             let phi = vec![0.0; points.len()];
             let surface = points.iter().copied().zip(normals).collect();
             return Ok(Some(FrameView { time, points, phi, surface }));

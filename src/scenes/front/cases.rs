@@ -95,6 +95,11 @@ pub(super) fn onward(cells: u32, method: &Value) -> Value {
     with(vortex(cells, 3.0, method), &json!({"flow": flow}))
 }
 
+/// Four levels, and as few resamplings as four levels stand.
+pub(super) fn coarsened() -> Value {
+    json!({"cfl": 24, "adaptivity": {"levels": 4, "curvature_constant": 0.1}})
+}
+
 /// A ring that grows until it has no hole.
 pub(super) fn ring() -> Value {
     let shape = json!({"type": "torus", "center": [0.5, 0.5, 0.5], "major_radius": 0.25, "minor_radius": 0.1});

@@ -1,8 +1,8 @@
 //! The paper's figures, and what stands beside them.
 
 use super::cases::{
-    adaptive, balls, disk, dumbbell, front, levels, onward, optics, rotated, square, square_shape, still, translated,
-    vortex,
+    adaptive, balls, coarsened, disk, dumbbell, front, levels, onward, optics, rotated, square, square_shape, still,
+    translated, vortex,
 };
 use crate::scene::rows::{Figure, Plot, Quantity, with};
 use serde_json::{Value, json};
@@ -106,7 +106,7 @@ pub(super) fn figures() -> Vec<Figure> {
         history(
             "front-count-onward",
             "Single vortex without reversal: foot-points over time (fig. 11)",
-            vec![("1025²", onward(1024, &json!({}))), ("129² to 1025²", onward(128, &levels(4)))],
+            vec![("1025²", onward(1024, &json!({}))), ("129² to 1025²", onward(128, &coarsened()))],
         ),
         history(
             "front-count-zalesak",
@@ -121,7 +121,7 @@ pub(super) fn figures() -> Vec<Figure> {
         frames(
             "front-adaptive",
             "Single vortex without reversal, 129² to 1025² (fig. 10)",
-            onward(128, &levels(4)),
+            onward(128, &coarsened()),
             1.0,
             &[0, 1, 2, 3],
         ),

@@ -127,9 +127,7 @@ impl<const D: usize> ExactFrontMotion<D> {
         interrupt: &Interrupt,
     ) -> Result<Option<FrontErrors>, Interrupted> {
         let ball = self.ball(ball, time);
-        // The finest that there is.
-        let level = feet.nodes.iter().map(|node| Grid::level(*node)).max().unwrap_or(0);
-        let spacing = grid.spacing_at(level);
+        let spacing = feet.finest_spacing(grid);
         let mut chains = Vec::new();
         let mut loose = Vec::new();
         let distances: Vec<f64> = if let Some(ball) = &ball {

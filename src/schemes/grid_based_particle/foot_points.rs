@@ -1,6 +1,6 @@
 //! The particles of a front: one foot-point a grid point.
 
-use super::grid::Node;
+use super::grid::{Grid, Node};
 use crate::geometry::Vector;
 use crate::simulation::state::check_length;
 use crate::simulation::{RestoreError, State};
@@ -42,6 +42,11 @@ impl<const D: usize> FootPoints<D> {
     #[must_use]
     pub fn len(&self) -> usize {
         self.positions.len()
+    }
+
+    /// The spacing of the finest level that any is of.
+    pub(super) fn finest_spacing(&self, grid: &Grid) -> f64 {
+        grid.spacing_at(self.nodes.iter().map(|node| Grid::level(*node)).max().unwrap_or(0))
     }
 
     /// Whether there is none.

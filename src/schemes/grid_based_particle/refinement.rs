@@ -30,6 +30,15 @@ const COARSENED: f64 = 0.7;
 /// A cell is split for every particle within so many of its edges, so that the levels of neighbours differ by one.
 const GRADED: f64 = 2.5;
 
+/// Cells of a level about a particle, and how far its grid points may be from it across the front and along it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Window<const D: usize> {
+    pub low: [i64; D],
+    pub high: [i64; D],
+    pub across: f64,
+    pub along: f64,
+}
+
 /// The cells that are split, of all levels, in order.
 #[derive(Debug, Default)]
 pub(super) struct Refinement {
@@ -76,7 +85,37 @@ impl Refinement {
 
     /// Whether a cell has parts.
     pub fn is_split(&self, node: Node) -> bool {
-        self.split.binary_search(&node).is_ok()
+        !self.split.is_empty() && self.split.binary_search(&node).is_ok()
+    }
+
+    /// Calls for the cells without parts, of all levels, in the window of their level; where the grid ends there is no window.
+    pub fn for_each_leaf_in<const D: usize>(
+        &self,
+        window: impl Fn(u32) -> Option<Window<D>>,
+        mut visit: impl FnMut(&[i64; D], u32, &Window<D>),
+    ) {
+        let Some(first) = window(0) else { return };
+        self.descend(&first, (&first.low, &first.high), 0, &window, &mut visit);
+    }
+
+    fn descend<const D: usize>(
+        &self,
+        here: &Window<D>,
+        (low, high): (&[i64; D], &[i64; D]),
+        level: u32,
+        window: &impl Fn(u32) -> Option<Window<D>>,
+        visit: &mut impl FnMut(&[i64; D], u32, &Window<D>),
+    ) {
+        let mut parts = None;
+        Grid::for_each_in(low, high, |at| {
+            if !self.is_split(Grid::node(at, level)) {
+                visit(at, level, here);
+            } else if let Some(below) = parts.get_or_insert_with(|| window(level + 1)) {
+                let low = std::array::from_fn(|d| (2 * at[d]).max(below.low[d]));
+                let high = std::array::from_fn(|d| (2 * at[d] + 1).min(below.high[d]));
+                self.descend(below, (&low, &high), level + 1, window, visit);
+            }
+        });
     }
 
     /// Whether a cell is there and has no parts.

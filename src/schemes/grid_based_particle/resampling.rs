@@ -6,6 +6,7 @@
 use super::foot_points::FootPoint;
 use super::grid::{Grid, Node};
 use super::reconstruction::{Failure, Reconstruction, Room};
+use super::refinement::Window;
 use super::system::FrontSystem;
 use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
@@ -112,24 +113,23 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             }
             let own = grid.spacing_of(self.feet.nodes[i]);
             let farthest = own * if self.at_gap[i] { self.parts.law.widest_bridge() } else { ALONG };
-            for level in 0..levels {
+            let window = |level: u32| {
                 let spacing = grid.spacing_at(level);
                 let (across, along) = (width * spacing, farthest.max(ALONG * spacing));
                 let reach = across.hypot(along);
                 let corner = |side: f64| grid.nearest(&y.add_scalar(side), level);
-                let (Some(low), Some(high)) = (corner(-reach), corner(reach)) else { continue };
-                Grid::for_each_in(&low, &high, |at| {
-                    let d = grid.center(at, level) - y;
-                    // Of the squares along the direction and across it, one is that along the front.
-                    let by_direction = d.dot(n).powi(2);
-                    let rest = d.norm_squared() - by_direction;
-                    let (height, way) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
-                    let is_near = height <= across * across && way <= along * along;
-                    if is_near && self.refinement.is_leaf(at, level) {
-                        self.candidates.push(Grid::node(at, level));
-                    }
-                });
-            }
+                Some(Window { low: corner(-reach)?, high: corner(reach)?, across, along })
+            };
+            self.refinement.for_each_leaf_in(window, |at, level, window| {
+                let d = grid.center(at, level) - y;
+                // Of the squares along the direction and across it, one is that along the front.
+                let by_direction = d.dot(n).powi(2);
+                let rest = d.norm_squared() - by_direction;
+                let (height, way) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
+                if height <= window.across * window.across && way <= window.along * window.along {
+                    self.candidates.push(Grid::node(at, level));
+                }
+            });
         }
         self.candidates.sort_unstable();
         self.candidates.dedup();
@@ -197,7 +197,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// Moved particles without a new foot-point of their segment close by stay as they are.
     fn keep_unreplaced(&mut self) {
         let grid = self.parts.grid;
-        self.fresh_cells.rebuild(self.fresh.positions.iter().copied(), grid.spacing);
+        let edge = self.fresh.finest_spacing(&grid);
+        self.fresh_cells.rebuild(self.fresh.positions.iter().copied(), edge);
         let order = self.fresh_cells.order();
         for i in 0..self.feet.len() {
             let foot = self.feet.get(i);

@@ -175,7 +175,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     }
 
     pub(super) fn sort_cells(&mut self) {
-        self.cells.rebuild(self.feet.positions.iter().copied(), self.parts.grid.spacing);
+        let edge = self.feet.finest_spacing(&self.parts.grid);
+        self.cells.rebuild(self.feet.positions.iter().copied(), edge);
     }
 
     /// Moves and renews the foot-points; returns the longest way in spacings.
