@@ -27,7 +27,8 @@ const TURN_REACH: f64 = 1.5;
 const CLEARANCE: f64 = 2.0;
 /// A level is given up where the coarser one fulfils the criterion with so much of its c: so levels do not flicker.
 const COARSENED: f64 = 0.7;
-/// A cell is split for every particle within so many of its edges, so that the levels of neighbours differ by one.
+/// A cell is split for every particle within so many of its edges: no support of a coarse cell may reach to where the front needs
+/// finer ones.
 const GRADED: f64 = 2.5;
 
 /// Cells of a level about a particle, and how far its grid points may be from it across the front and along it.
