@@ -2,7 +2,7 @@
 
 use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
-use crate::schemes::grid_based_particle::{self as gbpm, FrontMethod, MOST_LEVELS, Topology};
+use crate::schemes::grid_based_particle::{self as gbpm, FrontMethod, MOST_LEVELS, Segments, Topology};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
@@ -106,13 +106,22 @@ static SEGMENT_TESTS: &[Variant] = &[
     },
     Variant {
         name: "parameter",
-        doc: "by the part of the front at the start that they belong to, carried along, and the angle of their normals",
-        parameters: &[Parameter::new(
-            "cosine",
-            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space, −.2 and −.05 under mean_curvature",
-            COSINE,
-            DefaultValue::Absent,
-        )],
+        doc: "by the part of the front at the start that they belong to, and in the plane by how far along it they are, from 0 to 1 \
+              round it, both carried along by the fits; and by the angle of their normals",
+        parameters: &[
+            Parameter::new(
+                "cosine",
+                "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space, −.2 and −.05 under mean_curvature",
+                COSINE,
+                DefaultValue::Absent,
+            ),
+            Parameter::new(
+                "difference",
+                "parameters of one segment differ by less",
+                Kind::Number { above: Some(0.0), least: None, below: None, most: Some(0.5) },
+                DefaultValue::Json("0.1"),
+            ),
+        ],
     },
 ];
 
@@ -164,7 +173,7 @@ struct Adaptivity {
 #[serde(tag = "type", rename_all = "snake_case")]
 enum SegmentTest {
     Normals { cosine: Option<f64> },
-    Parameter { cosine: Option<f64> },
+    Parameter { cosine: Option<f64>, difference: f64 },
 }
 
 /// What they mean.
@@ -174,8 +183,8 @@ pub struct Chosen {
     pub method: FrontMethod,
     /// Where segments meet.
     pub topology: Topology,
-    /// Whether parts are told apart.
-    pub by_part: bool,
+    /// How segments are told apart beside their normals.
+    pub segments: Segments,
 }
 
 /// The method of checked parameters, and the parameters with what was left open.
@@ -208,9 +217,14 @@ pub fn understand(
         return Err(Violation::new(format!("{pointer}/neighbors"), "range", detail, &json!(neighbors), allowed));
     }
     let topology = if written.topology.as_deref() == Some("cross") { Topology::Cross } else { Topology::Merge };
-    let (by_part, cosine, name) = match written.segment_test {
-        SegmentTest::Normals { cosine } => (topology == Topology::Cross, cosine, "normals"),
-        SegmentTest::Parameter { cosine } => (true, cosine, "parameter"),
+    let is_crossing = topology == Topology::Cross;
+    let (segments, cosine) = match written.segment_test {
+        SegmentTest::Normals { cosine } => (Segments { by_part: is_crossing, parameter: None }, cosine),
+        SegmentTest::Parameter { cosine, difference } => {
+            // Outlines are known in the plane alone.
+            let parameter = (dimension == 2).then_some(difference);
+            (Segments { by_part: true, parameter }, cosine)
+        }
     };
     // By its curvature a corner becomes round at once, so its two sides must find each other.
     let cosine = cosine.unwrap_or(match (dimension, is_by_curvature) {
@@ -223,11 +237,11 @@ pub fn understand(
     resolved["degree"] = json!(degree);
     resolved["neighbors"] = json!(neighbors);
     resolved["weight"] = json!(weight);
-    resolved["segment_test"] = json!({"type": name, "cosine": cosine});
+    resolved["segment_test"]["cosine"] = json!(cosine);
     let (tube_radius, min_separation) = (written.tube_radius_h, written.min_separation_h);
     let adaptivity = written
         .adaptivity
         .map(|Adaptivity { levels, curvature_constant }| gbpm::Adaptivity { levels, curvature_constant });
     let method = FrontMethod { degree, neighbors, weight, tube_radius, min_separation, cosine, adaptivity };
-    Ok((Chosen { method, topology, by_part }, resolved))
+    Ok((Chosen { method, topology, segments }, resolved))
 }

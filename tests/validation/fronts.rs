@@ -131,6 +131,47 @@ fn a_refined_grid_follows_thin_filaments() {
     assert!(at(&refined, "front", "mean", 2.0) < 2.0 * at(&uniform, "front", "mean", 2.0));
 }
 
+/// GBPM 3.3.3: the parameter of every new foot-point is that of its place, in a flow and after it has crossed another part.
+#[test]
+fn a_parameter_is_carried_along_and_redistributed() {
+    let test = json!({"type": "parameter"});
+    let turning = json!({"type": "flow", "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 1}});
+    let crossing = json!({
+        "shape": balls("circle"), "end_time": 0.2, "topology": "cross", "segment_test": test
+    });
+    let turned = json!({"law": turning, "segment_test": test, "end_time": 1.0, "cfl": 1});
+    // Centre of part k at the end, and how far all of it has turned.
+    for (more, centers, angle) in [(turned, vec![0.5], 1.0), (crossing, vec![0.4, 0.6], 0.0)] {
+        let (before, after) = (front(&more), at_end(&front(&more)));
+        let start = build(&before, OutputPlan { every_time: None, series_every_steps: 1000 });
+        let column = |simulation: &dyn Simulation, name: &str| {
+            let fields = simulation.fields();
+            let column = fields.columns.iter().find(|column| column.name == name).unwrap();
+            let FieldValues::Scalar(values) = &column.values else { panic!("a number") };
+            values.clone()
+        };
+        let angles = |simulation: &dyn Simulation, back: f64| -> Vec<f64> {
+            let parts = column(simulation, "segment");
+            let points = simulation.fields().points;
+            let center = |part: &f64| centers[*part as usize];
+            let angle = |x: &[f64; 3], part: &f64| (x[1] - center(part)).atan2(x[0] - center(part)) - back;
+            points.iter().zip(&parts).map(|(x, part)| angle(x, part) / std::f64::consts::TAU).collect()
+        };
+        let offsets = |simulation: &dyn Simulation, back: f64| -> Vec<f64> {
+            let parameters = column(simulation, "parameter");
+            // The outline may run either way round.
+            let shares = angles(simulation, back);
+            parameters.iter().zip(shares).map(|(parameter, share)| (parameter - share).rem_euclid(1.0)).collect()
+        };
+        let (first, last) = (offsets(start.as_ref(), 0.0), offsets(after.as_ref(), angle));
+        let reference = first[0];
+        let off = |offset: &f64| (offset - reference - (offset - reference).round()).abs();
+        assert!(first.iter().all(|offset| off(offset) < 1e-4), "{more}");
+        assert!(last.iter().all(|offset| off(offset) < 2e-4), "{more}");
+        assert!(error(&after.report(), "front", "coverage_h", None) < 1.0);
+    }
+}
+
 /// GBPM 4.6, through the focus: past t = .47 the front crosses itself in the plane.
 #[test]
 fn wave_fronts_follow_their_rays() {

@@ -95,6 +95,11 @@ pub(super) fn onward(cells: u32, method: &Value) -> Value {
     with(vortex(cells, 3.0, method), &json!({"flow": flow}))
 }
 
+/// Crossing by a parameter that is carried along.
+pub(super) fn by_parameter() -> Value {
+    json!({"topology": "cross", "segment_test": "parameter"})
+}
+
 /// Four levels, and as few resamplings as four levels stand.
 pub(super) fn coarsened() -> Value {
     json!({"cfl": 24, "adaptivity": {"levels": 4, "curvature_constant": 0.1}})

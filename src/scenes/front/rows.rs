@@ -1,8 +1,9 @@
 //! The rows of `front`, and of `vortex` with grid-based particles: GBPM paper, section 4.
 
 use super::cases::{
-    adaptive, balls, by_curvature, coarsened, disk, dumbbell, front, levels, onward, optics, other_square, ring,
-    rotated, square, square_shape, still, still_sphere, three_spheres, translated, vortex, vortex_in_space,
+    adaptive, balls, by_curvature, by_parameter, coarsened, disk, dumbbell, front, levels, onward, optics,
+    other_square, ring, rotated, square, square_shape, still, still_sphere, three_spheres, translated, vortex,
+    vortex_in_space,
 };
 use super::figures::figures;
 use crate::scene::rows::{Measure, Quantity, Reach, Row, Rows, with};
@@ -115,6 +116,7 @@ pub fn rows() -> Rows {
         ("square outward", square(0.2, 1.0), 5e-4, 0.25 / 256.0),
         ("two circles merge", balls(256, "circle", 0.4, &json!({})), 0.15 / 256.0, 0.15 / 256.0),
         ("two circles cross", balls(256, "circle", 0.2, &json!({"topology": "cross"})), 2e-8, 2e-8),
+        ("two circles cross, by their parameter", balls(256, "circle", 0.2, &by_parameter()), 2e-8, 2e-8),
     ] {
         let run = || vec![scene.clone()];
         row(format!("{name}, 257²: mean distance"), "picture", run(), end("front", "mean"), most(mean), false);

@@ -2,7 +2,7 @@
 
 use super::parameters::{Law, Written};
 use super::wavefront::{self, WavefrontScene};
-use crate::geometry::{Surface, Vector};
+use crate::geometry::Vector;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
@@ -35,6 +35,10 @@ const STEPS_A_TURN: f64 = 32.0;
 const DRAWN_OUT: f64 = 4.0;
 /// Resident bytes a foot-point: its columns twice, its outcome, cells, a frame and a checkpoint in the making.
 const BYTES: u64 = 1200;
+/// The same on a refined grid, with the cells that are split in the making.
+const REFINED_BYTES: u64 = 5000;
+/// The longest wave front, in spacings.
+const MOST_CURVE: f64 = 1e6;
 /// Foot-points up to which an estimate counts them.
 const COUNTED: u64 = 20_000;
 /// Steps at most.
@@ -139,9 +143,15 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         violations.push(Violation::new("/cfl", "conflict", detail, &json!(written.cfl), Value::Null));
     }
     let finest = choice.spacing / f64::from(1_u32 << (written.levels() - 1));
-    if let Ok(surface) = &surface
-        && !is_within_grid(surface.as_ref(), choice.spacing, written.levels())
-    {
+    let is_inside = match (&surface, &wavefront) {
+        (_, Some(Ok(front))) => {
+            let is_short = front.length() < MOST_CURVE * choice.spacing;
+            is_short && is_within_grid(front.bounding_box(choice.end_time), choice.spacing, written.levels())
+        }
+        (Ok(surface), None) => is_within_grid(surface.bounding_box(), choice.spacing, written.levels()),
+        _ => true,
+    };
+    if !is_inside {
         let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
         violations.push(Violation::new("/spacing", "range", detail, &json!(choice.spacing), json!("a larger number")));
     }
@@ -210,18 +220,18 @@ pub(super) fn labels(chosen: &Chosen, fixed: FixedStep) -> BTreeMap<&'static str
     said
 }
 
-/// Whether a grid reaches around a shape.
-fn is_within_grid<const D: usize>(surface: &dyn Surface<D>, spacing: f64, levels: u32) -> bool {
-    let (low, high) = surface.bounding_box();
+/// Whether a grid reaches around a box: with three levels more, for lattices that are finer still.
+fn is_within_grid<const D: usize>((low, high): (Vector<D>, Vector<D>), spacing: f64, levels: u32) -> bool {
     let grid = Grid { spacing };
     let margin = 8.0 * spacing;
-    [low.add_scalar(-margin), high.add_scalar(margin)].iter().all(|x| grid.nearest(x, levels - 1).is_some())
+    [low.add_scalar(-margin), high.add_scalar(margin)].iter().all(|x| grid.nearest(x, levels + 2).is_some())
 }
 
 /// A few more steps where the end is a whole number of half turns, so that each of these ends a step: errors are asked for there.
 fn landing_on_turns(fixed: FixedStep, end_time: f64, turn: Option<f64>) -> FixedStep {
     let halves = turn.map_or(0.0, |turn| 2.0 * end_time / turn);
     let is_whole = (halves - halves.round()).abs() < 1e-9 && halves >= 1.0 && halves < fixed.steps as f64;
+    let is_whole = is_whole && fixed.steps <= MOST_STEPS;
     if !is_whole {
         return fixed;
     }
@@ -257,7 +267,7 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             law: self.law()?,
             integrator: self.choice.integrator,
             topology: self.chosen.topology,
-            by_part: self.chosen.by_part,
+            segments: self.chosen.segments,
             interrupt,
         };
         let surfaces = shapes::parts::<D>(&self.choice.shape, "/shape")?;
@@ -314,15 +324,17 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         if D == 3 {
             names.push("gauss_curvature");
         }
+        if self.chosen.segments.parameter.is_some() {
+            names.push("parameter");
+        }
         names
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
-        // As if it were refined everywhere; what is, is counted.
-        let finest = self.choice.spacing / f64::from(1_u32 << (self.chosen.method.levels() - 1));
-        let reach = self.chosen.method.tube_radius * finest;
+        // On the coarsest level; where there are not many, as it is refined.
+        let reach = self.chosen.method.tube_radius * self.choice.spacing;
         let about = shapes::surface::<D>(&self.choice.shape, "/shape")
-            .map_or(0, |surface| band_particles(surface.as_ref(), reach, finest));
+            .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.choice.spacing));
         // Corners without foot-points matter where there are few.
         let counted = if about < COUNTED { self.system(Interrupt::default()).ok() } else { None };
         let at_start = counted.map_or(about, |system| system.particle_count() as u64);
@@ -332,7 +344,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             steps: self.fixed.steps,
             time_step: self.fixed.time_step,
             end_time: self.choice.end_time,
-            memory_bytes: most.saturating_mul(BYTES),
+            memory_bytes: most.saturating_mul(if self.chosen.method.levels() > 1 { REFINED_BYTES } else { BYTES }),
         }
     }
 
@@ -343,7 +355,8 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             Law::Flow { .. } => "flow",
             Law::GeometricalOptics { .. } => "optics",
         };
-        format!("front/{D}/{law}/{}", self.chosen.method.degree)
+        let refined = if self.chosen.method.levels() > 1 { "/refined" } else { "" };
+        format!("front/{D}/{law}/{}{refined}", self.chosen.method.degree)
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
@@ -351,7 +364,8 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         let number = particles as f64 * self.stretch().mean * steps as f64;
         let exact = match (&self.choice.law, shapes::surface::<D>(&self.choice.shape, "/shape")) {
             (Law::Flow { flow: of }, Ok(surface)) => flow::<D>(of).map_or(0.0, |flow| {
-                error_units(Some(surface.as_ref()), flow.as_ref(), self.choice.spacing, particles as f64, end_time)
+                let finest = self.choice.spacing / f64::from(1_u32 << (self.chosen.method.levels() - 1));
+                error_units(Some(surface.as_ref()), flow.as_ref(), finest, particles as f64, end_time)
             }),
             _ => particles as f64,
         };

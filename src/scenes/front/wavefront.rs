@@ -52,7 +52,7 @@ impl WavefrontScene {
             law: Law::Flow(Box::new(Rays { speed: self.front.speed })),
             integrator: self.choice.integrator,
             topology: self.chosen.topology,
-            by_part: self.chosen.by_part,
+            segments: self.chosen.segments,
             interrupt,
         };
         FrontSystem::of(self.front.foot_points(&parts.grid, &parts.method), parts)
@@ -65,7 +65,11 @@ impl Scene for WavefrontScene {
     }
 
     fn field_names(&self) -> Vec<&'static str> {
-        vec!["normal", "curvature", "velocity", "grid_point", "level", "segment", "particle_id"]
+        let mut names = vec!["normal", "curvature", "velocity", "grid_point", "level", "segment", "particle_id"];
+        if self.chosen.segments.parameter.is_some() {
+            names.push("parameter");
+        }
+        names
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
@@ -97,6 +101,10 @@ impl Scene for WavefrontScene {
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
         let system = self.system(context.interrupt);
+        if system.particle_count() <= 2 {
+            let detail = "no grid point of this spacing has a foot-point on the curve";
+            return Err(vec![Violation::new("/spacing", "range", detail, &json!(self.choice.spacing), Value::Null)]);
+        }
         let said = labels(&self.chosen, self.fixed);
         let exact = ExactFrontMotion::Rays(self.front);
         Ok(Box::new(GridBasedParticles::new(system, exact, None, self.fixed, context.cpu_clock, said)))

@@ -18,9 +18,11 @@ pub struct FootPoint<const D: usize> {
     pub gauss_curvature: f64,
     /// Which of the closed parts of the front at the start it belongs to.
     pub part: u32,
+    /// How far along that part, from 0 to 1 round it; 0 where nothing asks for it.
+    pub parameter: f64,
 }
 
-/// All foot-points, in the order of their grid points.
+/// All foot-points, in the order of their grid points; at the start and where moved ones stay others follow.
 #[derive(Debug, Clone, Default)]
 pub struct FootPoints<const D: usize> {
     /// p.
@@ -35,6 +37,8 @@ pub struct FootPoints<const D: usize> {
     pub gauss_curvatures: Vec<f64>,
     /// Part of the front at the start.
     pub parts: Vec<u32>,
+    /// How far along it.
+    pub parameters: Vec<f64>,
 }
 
 impl<const D: usize> FootPoints<D> {
@@ -63,6 +67,7 @@ impl<const D: usize> FootPoints<D> {
         self.curvatures.clear();
         self.gauss_curvatures.clear();
         self.parts.clear();
+        self.parameters.clear();
     }
 
     /// Adds one.
@@ -73,6 +78,7 @@ impl<const D: usize> FootPoints<D> {
         self.curvatures.push(foot.curvature);
         self.gauss_curvatures.push(foot.gauss_curvature);
         self.parts.push(foot.part);
+        self.parameters.push(foot.parameter);
     }
 
     /// One of them.
@@ -84,6 +90,7 @@ impl<const D: usize> FootPoints<D> {
             curvature: self.curvatures[i],
             gauss_curvature: self.gauss_curvatures[i],
             part: self.parts[i],
+            parameter: self.parameters[i],
         }
     }
 
@@ -102,6 +109,7 @@ impl<const D: usize> FootPoints<D> {
         thin(&mut self.curvatures, keep);
         thin(&mut self.gauss_curvatures, keep);
         thin(&mut self.parts, keep);
+        thin(&mut self.parameters, keep);
     }
 
     /// Adds all columns to a state.
@@ -110,6 +118,7 @@ impl<const D: usize> FootPoints<D> {
         state.push_vectors("normal", &self.normals);
         state.push_reals("curvature", &self.curvatures);
         state.push_reals("gauss_curvature", &self.gauss_curvatures);
+        state.push_reals("parameter", &self.parameters);
         state.push_counts("grid_point", self.nodes.clone());
         state.push_counts("part", self.parts.iter().map(|part| u64::from(*part)).collect());
     }
@@ -124,7 +133,8 @@ impl<const D: usize> FootPoints<D> {
         };
         let nodes = state.counts("grid_point")?.to_vec();
         let n = nodes.len();
-        for (name, components) in [("position", D), ("normal", D), ("curvature", 1), ("gauss_curvature", 1)] {
+        let scalars = ["curvature", "gauss_curvature", "parameter"].map(|name| (name, 1));
+        for (name, components) in [("position", D), ("normal", D)].into_iter().chain(scalars) {
             check_length(name, state.reals(name)?.len(), n * components)?;
         }
         check_length("part", state.counts("part")?.len(), n)?;
@@ -134,6 +144,7 @@ impl<const D: usize> FootPoints<D> {
             normals: vectors("normal")?,
             curvatures: state.reals("curvature")?.to_vec(),
             gauss_curvatures: state.reals("gauss_curvature")?.to_vec(),
+            parameters: state.reals("parameter")?.to_vec(),
             parts: state.counts("part")?.iter().map(|part| *part as u32).collect(),
         })
     }

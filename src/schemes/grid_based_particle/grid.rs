@@ -9,8 +9,8 @@ pub type Node = u64;
 
 /// Bits of the level.
 const LEVEL_BITS: u32 = 4;
-/// The levels that there can be.
-pub const MOST_LEVELS: u32 = 1 << LEVEL_BITS;
+/// The levels that a front may ask for: each is twice as long to walk over.
+pub const MOST_LEVELS: u32 = 8;
 
 /// Bits of one coordinate.
 const fn bits<const D: usize>() -> u32 {

@@ -10,8 +10,12 @@ pub(super) const MOST_DEGREE: usize = 4;
 const MOST_TERMS: usize = 15;
 /// Directions across a front at most: of a curve in space two.
 pub(super) const MOST_ACROSS: usize = 2;
-/// Coordinates along the tangent plane, and heights over it.
-pub(super) type LocalPoint<const M: usize> = ([f64; M], [f64; MOST_ACROSS]);
+/// What a point has beside its coordinates: heights over the tangent plane, and the parameter.
+const QUANTITIES: usize = MOST_ACROSS + 1;
+/// Which of these is the parameter along the front.
+pub(super) const PARAMETER: usize = MOST_ACROSS;
+/// Coordinates along the tangent plane, and what is fitted over it.
+pub(super) type LocalPoint<const M: usize> = ([f64; M], [f64; QUANTITIES]);
 
 /// Newton's steps to a closest point at most.
 const MOST_ITERATIONS: usize = 30;
@@ -60,12 +64,12 @@ impl<const M: usize> Terms<M> {
         LocalGraph { terms: self, coefficients: [0.0; MOST_TERMS] }
     }
 
-    /// The least-squares fit to the heights of one direction at s_j with weights exp(−k |s_j|²), or None where the
+    /// The least-squares fit to one quantity at s_j with weights exp(−k |s_j|²), or None where the
     /// points do not determine it.
     pub fn fit(
         &self,
         points: &[LocalPoint<M>],
-        direction: usize,
+        quantity: usize,
         k: f64,
         room: &mut LeastSquares,
     ) -> Option<LocalGraph<'_, M>> {
@@ -75,14 +79,14 @@ impl<const M: usize> Terms<M> {
         }
         room.reset(points.len(), n);
         let mut row = [0.0; MOST_TERMS];
-        for (j, (s, heights)) in points.iter().enumerate() {
+        for (j, (s, quantities)) in points.iter().enumerate() {
             let square: f64 = s.iter().map(|s| s * s).sum();
             let root = (-0.5 * k * square).exp();
             let powers = powers(s);
             for (value, index) in row.iter_mut().zip(&self.indices) {
                 *value = root * product(&powers, index);
             }
-            room.set_row(j, &row[..n], root * heights[direction]);
+            room.set_row(j, &row[..n], root * quantities[quantity]);
         }
         let (found, solution) = room.solve();
         if found.rank < n || found.condition > WORST_CONDITION {
@@ -269,7 +273,7 @@ mod tests {
         let points: Vec<LocalPoint<2>> = (0..12)
             .map(|k| {
                 let (x, y) = (f64::from(k % 4) - 1.3, f64::from(k / 4) - 0.8);
-                ([x, y], [f(x, y), 0.0])
+                ([x, y], [f(x, y), 0.0, 0.0])
             })
             .collect();
         let terms = Terms::<2>::new(2);
@@ -294,8 +298,10 @@ mod tests {
 
     #[test]
     fn the_closest_point_is_across_the_graph() {
-        let points: Vec<LocalPoint<1>> =
-            (0..8).map(|k| f64::from(k) * 0.5 - 1.8).map(|x| ([x], [(9.0 - x * x).sqrt() - 3.0, 0.3 * x])).collect();
+        let points: Vec<LocalPoint<1>> = (0..8)
+            .map(|k| f64::from(k) * 0.5 - 1.8)
+            .map(|x| ([x], [(9.0 - x * x).sqrt() - 3.0, 0.3 * x, 0.0]))
+            .collect();
         let terms = Terms::<1>::new(4);
         let mut room = LeastSquares::default();
         let graph = terms.fit(&points, 0, 1.0, &mut room).unwrap();
@@ -313,7 +319,7 @@ mod tests {
         assert!((aside.value - 0.3 * s[0]).abs() < 1e-12);
         assert!((s[0] - 0.4 + (up.value - 1.0) * up.first[0] + (aside.value + 0.5) * aside.first[0]).abs() < 1e-12);
         assert!(terms.fit(&points[..4], 0, 1.0, &mut room).is_none());
-        let same = [([0.1], [0.0; 2]); 9];
+        let same = [([0.1], [0.0; 3]); 9];
         assert!(terms.fit(&same, 0, 1.0, &mut room).is_none());
     }
 }

@@ -2,9 +2,10 @@
 
 use super::foot_points::{FootPoint, FootPoints};
 use super::grid::Grid;
-use super::local_graph::{GraphJet, LocalPoint, MOST_ACROSS, Terms, closest};
+use super::local_graph::{GraphJet, LocalPoint, MOST_ACROSS, PARAMETER, Terms, closest};
 use super::method::FrontMethod;
 use super::motion::Law;
+use super::segments::{Segments, turned};
 use super::topology::{height_over, may_pass};
 use crate::geometry::Vector;
 use crate::geometry::frame::{self, Frame};
@@ -55,8 +56,8 @@ pub(super) struct Reconstruction<'a, const D: usize, const M: usize> {
     /// Of the degree asked for, and of the quadratic that takes its place where that does not do.
     pub terms: &'a Terms<M>,
     pub quadratic: &'a Terms<M>,
-    /// Whether segments are told apart by the part of the front beside their normals.
-    pub by_part: bool,
+    /// How segments are told apart beside their normals.
+    pub segments: Segments,
     pub grid: Grid,
     pub law: &'a Law<D>,
     /// Whether nothing may be drawn from in front of another segment to behind it.
@@ -132,7 +133,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
 
     /// Whether two particles are of one segment (GBPM 3.3.2).
     pub fn agrees(&self, i: usize, j: usize) -> bool {
-        (!self.by_part || self.feet.parts[i] == self.feet.parts[j])
+        self.segments.match_labels(self.feet, i, j)
             && self.feet.normals[i].dot(&self.feet.normals[j]) > self.method.cosine
     }
 
@@ -249,14 +250,19 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let inverse = 1.0 / unit;
         let local = |x: &Vector<D>| -> LocalPoint<M> {
             let d = (x - origin) * inverse;
-            let mut heights = [0.0; MOST_ACROSS];
-            for (height, up) in heights.iter_mut().zip(&frame.across) {
+            let mut point: LocalPoint<M> = (frame.along.map(|t| t.dot(&d)), Default::default());
+            for (height, up) in point.1.iter_mut().zip(&frame.across) {
                 *height = up.dot(&d);
             }
-            (frame.along.map(|t| t.dot(&d)), heights)
+            point
         };
+        let parameters = &self.feet.parameters;
         room.points.clear();
-        room.points.extend(room.chosen.iter().map(|j| local(&self.feet.positions[*j])));
+        room.points.extend(room.chosen.iter().map(|j| {
+            let mut point = local(&self.feet.positions[*j]);
+            point.1[PARAMETER] = turned(parameters[*j] - parameters[base]);
+            point
+        }));
         let mut graphs = [terms.nothing(); C];
         for (c, graph) in graphs.iter_mut().enumerate() {
             let fitted = terms.fit(&room.points, c, self.method.weight, &mut room.squares);
@@ -293,8 +299,15 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if self.merges && self.passes_another(base, &position, room) {
             return Err(Failure::Swept);
         }
+        // Lagrangian quantities are carried by the same fit (GBPM 3.3.3).
+        let mut parameter = parameters[base];
+        if self.segments.parameter.is_some() {
+            let fitted = terms.fit(&room.points, PARAMETER, self.method.weight, &mut room.squares);
+            parameter = (parameter + fitted.ok_or(Failure::Undetermined)?.jet(&s).value).rem_euclid(1.0);
+        }
         let (curvature, gauss_curvature) = (shape.curvature / unit, shape.gauss_curvature / (unit * unit));
-        Ok(FootPoint { position, normal: shape.direction, curvature, gauss_curvature, part: self.feet.parts[base] })
+        let part = self.feet.parts[base];
+        Ok(FootPoint { position, normal: shape.direction, curvature, gauss_curvature, part, parameter })
     }
 }
 

@@ -7,6 +7,7 @@
 use super::foot_points::FootPoints;
 use super::grid::{Grid, Node};
 use super::method::FrontMethod;
+use super::segments::Segments;
 use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
@@ -21,15 +22,16 @@ pub struct Adaptivity {
     pub curvature_constant: f64,
 }
 
-/// Within so many spacings a turn of the normals counts as curvature: a corner is one.
-const TURN_REACH: f64 = 1.5;
+/// Between so many spacings a turn of the normals counts as curvature: a corner is one. Closer by, rounding and the errors of fits turn
+/// normals as much as the front does.
+const TURN_REACH: [f64; 2] = [0.25, 1.5];
 /// Spacings that another segment is away at least.
 const CLEARANCE: f64 = 2.0;
 /// A level is given up where the coarser one fulfils the criterion with so much of its c: so levels do not flicker.
 const COARSENED: f64 = 0.7;
-/// A cell is split for every particle within so many of its edges: no support of a coarse cell may reach to where the front needs
-/// finer ones.
-const GRADED: f64 = 2.5;
+/// So many rings of cells about the cell of a particle that needs finer ones are split: no support of a coarse cell may reach to where
+/// the front turns faster.
+const RINGS: i64 = 3;
 
 /// Cells of a level about a particle, and how far its grid points may be from it across the front and along it.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +48,8 @@ pub(super) struct Refinement {
     split: Vec<Node>,
     /// The level that each particle needs.
     needs: Vec<u32>,
+    /// Cells with particles that need finer ones.
+    occupied: Vec<Node>,
 }
 
 impl Refinement {
@@ -55,7 +59,7 @@ impl Refinement {
         feet: &FootPoints<D>,
         cells: &CellList<D>,
         (grid, method): (&Grid, &FrontMethod),
-        by_part: bool,
+        segments: Segments,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         self.split.clear();
@@ -67,21 +71,43 @@ impl Refinement {
                 if interrupt.is_raised() {
                     return;
                 }
-                *need = needed_level(feet, cells, (grid, method.cosine), adaptivity, by_part, block * BLOCK + k);
+                *need = needed_level(feet, cells, (grid, method.cosine), adaptivity, segments, block * BLOCK + k);
             }
         });
         interrupt.check()?;
-        for (x, need) in feet.positions.iter().zip(&self.needs) {
-            for level in 0..*need {
-                let margin = GRADED * grid.spacing_at(level);
-                let corner = |side: f64| grid.nearest(&x.add_scalar(side), level);
-                let (Some(low), Some(high)) = (corner(-margin), corner(margin)) else { continue };
+        // Level by level the cells that particles with finer needs lie in, each once, and the rings about them.
+        for level in 0..adaptivity.levels - 1 {
+            interrupt.check()?;
+            self.occupied.clear();
+            for (x, need) in feet.positions.iter().zip(&self.needs) {
+                if *need > level
+                    && let Some(at) = grid.nearest(x, level)
+                {
+                    self.occupied.push(Grid::node(&at, level));
+                }
+            }
+            self.occupied.sort_unstable();
+            self.occupied.dedup();
+            for node in &self.occupied {
+                let at = Grid::coordinates::<D>(*node);
+                let (low, high) = (at.map(|c| c - RINGS), at.map(|c| c + RINGS));
                 Grid::for_each_in(&low, &high, |at| self.split.push(Grid::node(at, level)));
             }
         }
         self.split.sort_unstable();
         self.split.dedup();
         Ok(())
+    }
+
+    /// Whether any cell of a level has parts.
+    pub fn splits_level(&self, level: u32) -> bool {
+        let place = self.split.partition_point(|node| Grid::level(*node) < level);
+        self.split.get(place).is_some_and(|node| Grid::level(*node) == level)
+    }
+
+    /// How many cells have parts.
+    pub fn count(&self) -> usize {
+        self.split.len()
     }
 
     /// Whether a cell has parts.
@@ -144,19 +170,18 @@ fn needed_level<const D: usize>(
     cells: &CellList<D>,
     (grid, cosine): (&Grid, f64),
     adaptivity: Adaptivity,
-    by_part: bool,
+    segments: Segments,
     i: usize,
 ) -> u32 {
     let own = Grid::level(feet.nodes[i]);
     let (x, n, spacing) = (&feet.positions[i], &feet.normals[i], grid.spacing_at(own));
-    let (turn_square, reach) = ((TURN_REACH * spacing).powi(2), CLEARANCE * 2.0 * spacing);
+    let (turn_squares, reach) = (TURN_REACH.map(|reach| (reach * spacing).powi(2)), CLEARANCE * 2.0 * spacing);
     // Squares: of the curvature, and of the distance to another segment.
     let (mut bend, mut clear) = (0.0_f64, f64::INFINITY);
     cells.for_each_within(x, reach, |j, _, square| {
-        let is_other = by_part && feet.parts[i] != feet.parts[j];
-        if is_other || feet.normals[j].dot(n) <= cosine {
+        if !segments.match_labels(feet, i, j) || feet.normals[j].dot(n) <= cosine {
             clear = clear.min(square);
-        } else if j != i && square <= turn_square && square > 0.0 {
+        } else if square >= turn_squares[0] && square <= turn_squares[1] {
             bend = bend.max((feet.normals[j] - n).norm_squared() / square);
         }
     });

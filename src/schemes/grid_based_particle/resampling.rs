@@ -38,7 +38,7 @@ pub struct Removals {
     pub swept: u64,
     /// Moved particles that stayed, since no reconstruction took their place.
     pub kept: u64,
-    /// Particles beyond the end of the grid, which counts a million points from the origin.
+    /// Particles beyond the end of the grid, which counts half a billion cells from the origin in the plane, half a million in space.
     pub outside: u64,
 }
 
@@ -96,7 +96,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// Splits the cells where the particles need it.
     pub(super) fn refine(&mut self) -> Result<(), Interrupted> {
         let Self { refinement, feet, cells, parts, .. } = self;
-        refinement.renew(feet, cells, (&parts.grid, &parts.method), parts.by_part, &parts.interrupt)
+        refinement.renew(feet, cells, (&parts.grid, &parts.method), parts.segments, &parts.interrupt)
     }
 
     /// The grid points that the particles have about them, each once and in order: of each level those of cells without parts.
@@ -108,7 +108,8 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         for i in 0..self.feet.len() {
             let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
             if grid.nearest(y, levels - 1).is_none() {
-                self.removals.outside += 1;
+                // Where particles are exact by themselves it is looked at again below.
+                self.removals.outside += u64::from(!self.parts.law.keeps_particles_exact());
                 continue;
             }
             let own = grid.spacing_of(self.feet.nodes[i]);
@@ -160,8 +161,11 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
         let frame = if D - M == 1 { tangents::<D, M>(n) } else { [*n; M] };
         let mut has_neighbor = [[false; 2]; M];
-        self.cells.for_each_within(y, ALONG * spacing, |j, d, square| {
-            if j != i && self.feet.normals[j].dot(n) > self.parts.method.cosine {
+        // The coarser side of a border between levels has its neighbours farther away.
+        let coarser = if self.parts.method.levels() > 1 { 2.0 } else { 1.0 };
+        self.cells.for_each_within(y, coarser * ALONG * spacing, |j, d, square| {
+            let reach = ALONG * spacing.max(self.parts.grid.spacing_of(self.feet.nodes[j]));
+            if j != i && square <= reach * reach && self.feet.normals[j].dot(n) > self.parts.method.cosine {
                 for (has, t) in has_neighbor.iter_mut().zip(&frame) {
                     // Within 60° of the direction, so that in space somebody is on every side.
                     let ahead = t.dot(d);
@@ -202,7 +206,10 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         let order = self.fresh_cells.order();
         for i in 0..self.feet.len() {
             let foot = self.feet.get(i);
-            let Some(node) = self.refinement.leaf_at(&grid, &foot.position) else { continue };
+            let Some(node) = self.refinement.leaf_at(&grid, &foot.position) else {
+                self.removals.outside += 1;
+                continue;
+            };
             let spacing = grid.spacing_of(node).max(grid.spacing_of(self.feet.nodes[i]));
             let covered = if self.at_gap[i] { SAME } else { COVERED[M - 1] };
             let is_replaced = self.fresh_cells.any_within(&foot.position, covered * spacing, |place| {

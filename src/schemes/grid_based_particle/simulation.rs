@@ -17,8 +17,8 @@ use crate::simulation::{
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
 
-/// Foot-points under mean curvature, by those at the start, beyond which a run has gone astray.
-const MOST_GROWTH: usize = 2;
+/// The measure of a front under mean curvature, by that at the start, beyond which a run has gone astray.
+const MOST_GROWTH: f64 = 2.0;
 
 /// A front as a simulation, M = D − 1.
 pub struct GridBasedParticles<const D: usize, const M: usize> {
@@ -26,8 +26,8 @@ pub struct GridBasedParticles<const D: usize, const M: usize> {
     exact: ExactFrontMotion<D>,
     /// The front at the start, where it is a ball.
     ball: Option<Ball<D>>,
-    /// Foot-points at the start.
-    start_count: usize,
+    /// The measure of the front at the start.
+    start_measure: f64,
     fixed: FixedStep,
     step: u64,
     max_cfl: f64,
@@ -51,7 +51,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
         method: BTreeMap<&'static str, String>,
     ) -> Self {
         Self {
-            start_count: system.particle_count(),
+            start_measure: system.measure(),
             system,
             exact,
             ball,
@@ -77,21 +77,26 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
 
     /// By its mean curvature a front only shrinks.
     fn check_growth(&self, Clock { step, time }: Clock) -> Result<(), StepError> {
-        let count = self.system.particle_count();
-        if !matches!(self.system.parts.law, Law::MeanCurvature) || count <= MOST_GROWTH * self.start_count {
+        let is_by_curvature = matches!(self.system.parts.law, Law::MeanCurvature);
+        let growth = if is_by_curvature { self.system.measure() / self.start_measure } else { 0.0 };
+        if growth <= MOST_GROWTH {
             return Ok(());
         }
         let reason = format!(
-            "{count} foot-points where {} were at the start, though a front only shrinks by its mean curvature: the time step              ({}) is too long or the spacing too coarse",
-            self.start_count, self.fixed.time_step
+            "the front is {growth:.1} times as large as at the start, though by its mean curvature it only shrinks: the time \
+             step ({}) is too long or the spacing too coarse",
+            self.fixed.time_step
         );
         Err(StepError::Unsolved { reason, step, time })
     }
 
     /// A closed front has no ends: by its mean curvature even corners become round at once.
     fn look_for_ends(&mut self, time: f64) {
+        if !matches!(self.system.parts.law, Law::MeanCurvature) {
+            return;
+        }
         let ends = self.system.ends();
-        if let (Law::MeanCurvature, Some(first)) = (&self.system.parts.law, ends.first()) {
+        if let Some(first) = ends.first() {
             let place: Vec<String> = self.system.feet.positions[*first].iter().map(|c| format!("{c:.4}")).collect();
             let message = format!(
                 "{} of {} foot-points are at open ends, the first at ({}): the front is finer there than its spacing",
@@ -186,6 +191,9 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         fields.vector("velocity", (0..feet.len()).map(|i| self.velocity(i)));
         fields.vector("grid_point", feet.nodes.iter().map(|node| grid.place::<D>(*node)));
         fields.scalar("level", feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
+        if self.system.parts.segments.parameter.is_some() {
+            fields.scalar("parameter", feet.parameters.clone());
+        }
         fields.scalar("segment", feet.parts.iter().map(|part| f64::from(*part)).collect());
         fields.id("particle_id", (0..feet.len() as u64).collect());
         fields

@@ -9,6 +9,7 @@ use super::motion::{self, Law};
 use super::reconstruction::{Failure, Reconstruction, Room};
 use super::refinement::Refinement;
 use super::resampling::{Outcome, Removals, fill};
+use super::segments::{Course, Segments};
 use super::topology::{Topology, mark_unswept};
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::CellList;
@@ -28,8 +29,8 @@ pub struct FrontParts<const D: usize> {
     pub integrator: PathIntegrator,
     /// What happens where segments meet.
     pub topology: Topology,
-    /// Whether segments are also told apart by the part of the front that they belonged to at the start.
-    pub by_part: bool,
+    /// How segments are told apart beside their normals.
+    pub segments: Segments,
     /// Asks a running step to be dropped.
     pub interrupt: Interrupt,
 }
@@ -69,8 +70,9 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         let mut system = Self::of(FootPoints::default(), parts);
         system.place_on(surfaces);
         for _ in 1..levels {
+            let before = system.refinement.count();
             system.sort_cells();
-            if system.refine().is_err() {
+            if system.refine().is_err() || system.refinement.count() == before {
                 break;
             }
             system.place_on(surfaces);
@@ -106,7 +108,10 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     fn place_on(&mut self, surfaces: &[Box<dyn Surface<D>>]) {
         let Self { parts, feet, refinement, .. } = self;
         let mut near: Vec<(Node, FootPoint<D>)> = Vec::new();
-        for level in 0..parts.method.levels() {
+        // Levels below one without parts have no cells.
+        let has_cells = |level: &u32| refinement.splits_level(*level);
+        let levels = 1 + (0..parts.method.levels() - 1).take_while(has_cells).count() as u32;
+        for level in 0..levels {
             let radius = parts.method.tube_radius * parts.grid.spacing_at(level);
             for (part, surface) in surfaces.iter().enumerate() {
                 for_each_near(surface.as_ref(), radius, (&parts.grid, level), |at, place| {
@@ -114,7 +119,14 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                     let is_active = exact.distance.abs() <= radius && refinement.is_leaf(at, level);
                     if let Some(normal) = exact.normal.filter(|_| is_active) {
                         let (position, curvature) = (exact.point, exact.curvature.unwrap_or(0.0));
-                        let foot = FootPoint { position, normal, curvature, gauss_curvature: 0.0, part: part as u32 };
+                        let foot = FootPoint {
+                            position,
+                            normal,
+                            curvature,
+                            gauss_curvature: 0.0,
+                            part: part as u32,
+                            parameter: 0.0,
+                        };
                         near.push((Grid::node(at, level), foot));
                     }
                 });
@@ -128,7 +140,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         for (node, foot) in &near {
             feet.push(*node, foot);
         }
-        for level in 0..parts.method.levels() {
+        for level in 0..levels {
             for (part, surface) in surfaces.iter().enumerate() {
                 let opens = |distance: f64| parts.law.opens_corners(distance);
                 let mut fans = Vec::new();
@@ -140,9 +152,18 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                     let leaf = refinement.leaf_at(&parts.grid, &position);
                     if let Some(node) = leaf.filter(|node| Grid::level(*node) == level) {
                         let (curvature, gauss_curvature) = (0.0, 0.0);
-                        feet.push(node, &FootPoint { position, normal, curvature, gauss_curvature, part: part as u32 });
+                        let (part, parameter) = (part as u32, 0.0);
+                        feet.push(node, &FootPoint { position, normal, curvature, gauss_curvature, part, parameter });
                     }
                 }
+            }
+        }
+        if parts.segments.parameter.is_some() {
+            let finest = parts.grid.spacing_at(parts.method.levels() - 1);
+            let courses: Vec<_> = surfaces.iter().map(|surface| Course::of(surface.as_ref(), 0.25 * finest)).collect();
+            for i in 0..feet.len() {
+                let course = courses.get(feet.parts[i] as usize).and_then(Option::as_ref);
+                feet.parameters[i] = course.map_or(0.0, |course| course.parameter(&feet.positions[i]));
             }
         }
     }
@@ -151,6 +172,16 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     #[must_use]
     pub fn particle_count(&self) -> usize {
         self.feet.len()
+    }
+
+    /// The length or area of the front by its foot-points, up to a factor: each stands for its own spacing.
+    pub(super) fn measure(&self) -> f64 {
+        self.feet.nodes.iter().map(|node| self.parts.grid.spacing_of(*node).powi(M as i32)).sum()
+    }
+
+    /// h of the finest level.
+    fn finest(&self) -> f64 {
+        self.parts.grid.spacing_at(self.parts.method.levels() - 1)
     }
 
     /// The foot-points that have nobody of their segment on some side.
@@ -167,7 +198,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             method: &self.parts.method,
             terms: &self.terms,
             quadratic: &self.quadratic,
-            by_part: self.parts.by_part,
+            segments: self.parts.segments,
             grid: self.parts.grid,
             law: &self.parts.law,
             merges: self.merges(),
@@ -185,7 +216,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     pub(super) fn advance(&mut self, from: Clock, to: Clock, step: f64, phases: &mut Phases) -> Result<f64, StepError> {
         let clock = phases.clock();
         let start = clock();
-        let spacing = self.parts.grid.spacing;
+        let spacing = self.finest();
         let way = match &self.parts.law {
             Law::Flow(flow) => motion::carry::<D, M>(
                 &mut self.feet,
@@ -278,7 +309,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             self.feet.positions[i] = self.starts[i] + self.slopes[i] * step;
             longest = longest.max(self.slopes[i].norm());
         }
-        Ok(longest * step / self.parts.grid.spacing)
+        Ok(longest * step / self.finest())
     }
 
     /// Normals and curvatures at the particles where they stand; where a reconstruction fails the last ones stay.

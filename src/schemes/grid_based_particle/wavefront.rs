@@ -76,8 +76,23 @@ impl EllipticalWavefront {
     }
 
     fn number(&self, spacing: f64) -> usize {
+        (self.length() / spacing).ceil().max(64.0) as usize
+    }
+
+    /// A bound of the curve's length at the start, by how fast places and directions change.
+    #[must_use]
+    pub fn length(&self) -> f64 {
         let [a, b] = self.semi_axes;
-        (TURN * (a.max(b) + a.max(b) / a.min(b)) / spacing).ceil().max(64.0) as usize
+        TURN * (a.max(b) + a.max(b) / a.min(b))
+    }
+
+    /// The corners of a box about the curve until a time.
+    #[must_use]
+    pub fn bounding_box(&self, time: f64) -> (Vector<3>, Vector<3>) {
+        let way = (self.speed * time).abs();
+        let reach = Vector::<3>::new(self.semi_axes[0] + way, self.semi_axes[1] + way, TURN);
+        let center = Vector::<3>::new(self.center[0], self.center[1], TURN);
+        (center - reach, center + reach)
     }
 
     /// The foot-points of all grid points within the tube, and the two ends of the curve.
@@ -114,6 +129,7 @@ impl EllipticalWavefront {
                 curvature: across.norm() / square,
                 gauss_curvature: 0.0,
                 part: 0,
+                parameter: phi / TURN,
             };
             feet.push(node, &foot);
         }
