@@ -2,6 +2,8 @@
 //! panic nor leave stray particles.
 
 use crate::support::{build, error, run};
+use meniscus::scene::understand;
+use meniscus::scenes::SCENES;
 use meniscus::simulation::{FieldValues, OutputPlan, Simulation, StepError};
 use serde_json::{Value, json};
 
@@ -129,6 +131,46 @@ fn a_refined_grid_follows_thin_filaments() {
     }
     assert!(at(&refined, "front", "count", 2.0) < 0.5 * at(&uniform, "front", "count", 2.0));
     assert!(at(&refined, "front", "mean", 2.0) < 2.0 * at(&uniform, "front", "mean", 2.0));
+}
+
+/// Levels follow the front, not the rounding of its normals; and a front by mean curvature may be refined.
+#[test]
+fn a_resting_front_keeps_its_levels() {
+    let ellipse = json!({"type": "ellipse", "center": [0, 0], "semi_axes": [0.5, 0.2]});
+    let body = json!({
+        "shape": ellipse, "spacing": 0.05, "law": {"type": "normal", "speed": 1e-9}, "time_step": 1, "end_time": 6,
+        "adaptivity": {"levels": 4, "curvature_constant": 0.1}
+    });
+    let mut simulation = build(&front(&body), OutputPlan { every_time: None, series_every_steps: 1000 });
+    let mut counts = Vec::new();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+        counts.push(simulation.particle_count());
+    }
+    assert!(counts.windows(2).all(|pair| pair[0] == pair[1]), "{counts:?}");
+    let sphere = json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.4});
+    let refined = at_end(&front(&json!({
+        "shape": sphere, "spacing": 0.079, "law": "mean_curvature", "end_time": 0.01, "adaptivity": {"levels": 2}
+    })));
+    let deviation = error(&refined.report(), "front", "max", None);
+    assert!(deviation < 0.01, "{deviation:e}");
+    assert!(error(&refined.report(), "front", "coverage_h", None) < 1.5);
+}
+
+/// What would take more than there is is refused when it is read, not found out later.
+#[test]
+fn set_ups_beyond_measure_are_refused() {
+    let needle = json!({"type": "ellipse", "center": [0, 0], "semi_axes": [1, 1e-9]});
+    let vortex = json!({"type": "flow", "flow": {"type": "single_vortex", "period": 2}});
+    for body in [
+        json!({"law": "geometrical_optics", "shape": needle, "spacing": 0.05}),
+        json!({"law": "geometrical_optics", "spacing": 1e-9}),
+        json!({"shape": {"type": "circle", "center": [1e7, 0], "radius": 0.25}}),
+        json!({"law": vortex, "end_time": 2, "cfl": 1e-300}),
+        json!({"adaptivity": {"levels": 9}}),
+    ] {
+        assert!(understand(&front(&body), SCENES).is_err(), "{body}");
+    }
 }
 
 /// GBPM 3.3.3: the parameter of every new foot-point is that of its place, in a flow and after it has crossed another part.
