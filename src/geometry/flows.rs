@@ -31,4 +31,12 @@ pub trait Flow<const D: usize>: Send + Sync {
 
     /// The time at which the flow has brought every point back to its start, if it does.
     fn return_time(&self) -> Option<f64>;
+
+    /// Whether the flow has brought every point back to its start.
+    fn is_back(&self, time: f64) -> bool {
+        self.return_time().is_some_and(|period| {
+            let turns = time / period;
+            (turns - turns.round()).abs() < 1e-9
+        })
+    }
 }

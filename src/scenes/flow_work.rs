@@ -60,10 +60,8 @@ pub fn error_units<const D: usize>(
     particles: f64,
     end_time: f64,
 ) -> f64 {
-    let turn = flow.return_time();
-    let halfway = turn.map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
-    let is_returned = turn.is_some_and(|turn| (end_time / turn - (end_time / turn).round()).abs() < 1e-9);
-    let at_end = if is_returned { 0.0 } else { end_time };
+    let halfway = flow.return_time().map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
+    let at_end = if flow.is_back(end_time) { 0.0 } else { end_time };
     let path = if flow.is_rigid() { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
     let points = surface.filter(|_| D == 2).map_or(0.0, |surface| {
         let (low, high) = surface.bounding_box();

@@ -81,7 +81,7 @@ static ADAPTIVITY_PARAMETERS: &[Parameter] = &[
 /// Step.
 pub const CFL: Parameter = Parameter::new(
     "cfl",
-    "dt · max speed/h, h that of the finest level; when neither it nor a step is given, 10 in a flow, .75 with a given speed, and dt = .5 h² under \
+    "dt · max speed/h, h that of the finest level; when neither it nor a step is given, 10 in a flow, 2 of rays, .75 with a given speed, and dt = .5 h² under \
      mean_curvature",
     POSITIVE,
     DefaultValue::Absent,
@@ -91,30 +91,22 @@ pub const CFL: Parameter = Parameter::new(
 pub static PARAMETERS: &[Parameter] =
     &[DEGREE, NEIGHBORS, WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, ADAPTIVITY, CFL];
 
-const COSINE: Kind = Kind::Number { above: Some(-1.0), least: None, below: Some(1.0), most: None };
+const COSINE: Parameter = Parameter::new(
+    "cosine",
+    "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space, −.2 and −.05 under \
+     mean_curvature",
+    Kind::Number { above: Some(-1.0), least: None, below: Some(1.0), most: None },
+    DefaultValue::Absent,
+);
 
 static SEGMENT_TESTS: &[Variant] = &[
-    Variant {
-        name: "normals",
-        doc: "by the angle of their normals",
-        parameters: &[Parameter::new(
-            "cosine",
-            "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space, −.2 and −.05 under mean_curvature",
-            COSINE,
-            DefaultValue::Absent,
-        )],
-    },
+    Variant { name: "normals", doc: "by the angle of their normals", parameters: &[COSINE] },
     Variant {
         name: "parameter",
         doc: "by the part of the front at the start that they belong to, and in the plane by how far along it they are, from 0 to 1 \
               round it, both carried along by the fits; and by the angle of their normals",
         parameters: &[
-            Parameter::new(
-                "cosine",
-                "normals of one segment have a larger scalar product; when not given, .2 in the plane and .5 in space, −.2 and −.05 under mean_curvature",
-                COSINE,
-                DefaultValue::Absent,
-            ),
+            COSINE,
             Parameter::new(
                 "difference",
                 "parameters of one segment differ by less",

@@ -71,15 +71,6 @@ impl<const D: usize> ExactMotion<D> {
         self.flow.as_ref()
     }
 
-    /// Whether the flow has brought every point back to its start.
-    #[must_use]
-    pub fn is_back(&self, time: f64) -> bool {
-        self.flow.return_time().is_some_and(|period| {
-            let turns = time / period;
-            (turns - turns.round()).abs() < 1e-9
-        })
-    }
-
     /// The surface at a time, resolved for particles of a spacing; None where it is not known.
     ///
     /// # Errors
@@ -91,7 +82,7 @@ impl<const D: usize> ExactMotion<D> {
         interrupt: &Interrupt,
     ) -> Result<Option<ExactFront<'_, D>>, Interrupted> {
         let Some(surface) = self.surface() else { return Ok(None) };
-        let by_formula = time == 0.0 || self.is_back(time) || self.flow.is_rigid();
+        let by_formula = time == 0.0 || self.flow.is_back(time) || self.flow.is_rigid();
         if by_formula {
             return Ok(Some(ExactFront { motion: self, surface, time, advected: None }));
         }

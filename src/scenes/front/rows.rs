@@ -107,8 +107,7 @@ pub fn rows() -> Rows {
         |what: &str| format!("single vortex without reversal, t = 3, adaptive 129² to 1025² by uniform 1025²: {what}");
     let growth = |name, norm| Measure::Growth(Quantity::at_end(name, norm));
     row(case("particles"), "2.0e4 by 2.4e4", both(), growth("front", "count"), most(0.5), true);
-    // The same, within what depends on how steps fall.
-    row(case("mean distance"), "picture", both(), growth("front", "mean"), most(1.1), true);
+    row(case("mean distance"), "picture", both(), growth("front", "mean"), most(1.0), true);
     row(case("largest distance"), "picture", both(), growth("front", "max"), most(1.0), true);
     row(case("CPU seconds"), "–", both(), Measure::SecondsShare("front/"), most(0.5), true);
     for (name, scene, mean, largest) in [

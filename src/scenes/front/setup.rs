@@ -142,7 +142,7 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         let detail = "motion by curvature has no speed to measure a step by; give time_step";
         violations.push(Violation::new("/cfl", "conflict", detail, &json!(written.cfl), Value::Null));
     }
-    let finest = choice.spacing / f64::from(1_u32 << (written.levels() - 1));
+    let finest = Grid { spacing: choice.spacing }.spacing_at(written.levels() - 1);
     let is_inside = match (&surface, &wavefront) {
         (_, Some(Ok(front))) => {
             let is_short = front.length() < MOST_CURVE * choice.spacing;
@@ -364,7 +364,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         let number = particles as f64 * self.stretch().mean * steps as f64;
         let exact = match (&self.choice.law, shapes::surface::<D>(&self.choice.shape, "/shape")) {
             (Law::Flow { flow: of }, Ok(surface)) => flow::<D>(of).map_or(0.0, |flow| {
-                let finest = self.choice.spacing / f64::from(1_u32 << (self.chosen.method.levels() - 1));
+                let finest = Grid { spacing: self.choice.spacing }.spacing_at(self.chosen.method.levels() - 1);
                 error_units(Some(surface.as_ref()), flow.as_ref(), finest, particles as f64, end_time)
             }),
             _ => particles as f64,

@@ -92,7 +92,7 @@ impl<const D: usize> ExactFrontMotion<D> {
         let ball = ball?;
         match self {
             Self::Flow(motion) => {
-                let back = motion.is_back(time).then_some(ball.center);
+                let back = motion.flow().is_back(time).then_some(ball.center);
                 let center = motion.flow().rigid_path(&ball.center, time).or(back)?;
                 Some(Ball { center, radius: ball.radius })
             }
