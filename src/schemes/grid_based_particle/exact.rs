@@ -1,7 +1,8 @@
 //! Where the front is exactly, and how far the foot-points are from it: errors, coverage and gaps.
 //!
 //! Distances of foot-points alone flatter a front with holes, so coverage (the largest distance from the exact front to a
-//! foot-point) and the largest gap along it stand beside every error.
+//! foot-point) and the largest gap along it stand beside every error. Means are over the front, not over its foot-points, which are
+//! crowded where a grid is refined.
 
 use super::foot_points::FootPoints;
 use super::grid::Grid;
@@ -161,12 +162,9 @@ impl<const D: usize> ExactFrontMotion<D> {
             }
         };
         interrupt.check()?;
-        let mut norms = ErrorNorms::default();
-        let mut sum = 0.0;
-        for distance in &distances {
-            norms.add(*distance);
-            sum += distance.abs();
-        }
+        let spacings = feet.nodes.iter().map(|node| grid.spacing_of(*node));
+        let dimension = if let Self::Rays(_) = self { 1 } else { D as i32 - 1 };
+        let norms = along_front(&distances, spacings.clone().map(|own| (own / spacing).powi(dimension)));
         let count = feet.len() as f64;
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(feet.positions.iter().copied(), spacing);
@@ -176,7 +174,6 @@ impl<const D: usize> ExactFrontMotion<D> {
             let far = samples.map(|x| cells.nearest(x, f64::INFINITY).map_or(f64::INFINITY, far));
             far.fold(f64::NAN, f64::max)
         };
-        let spacings = feet.nodes.iter().map(|node| grid.spacing_of(*node));
         let gap = if chains.is_empty() { f64::NAN } else { largest_gap(&chains, &feet.positions, spacings) };
         let mut values = [f64::NAN; ENTRIES.len()];
         values[9] = count;
@@ -184,7 +181,7 @@ impl<const D: usize> ExactFrontMotion<D> {
             // Norms of nothing are no norms: that nothing is there is the error.
             return Ok(Some(FrontErrors { time, values }));
         }
-        values[..3].copy_from_slice(&[sum / count, norms.rms(), norms.max()]);
+        values[..3].copy_from_slice(&norms);
         (values[4], values[5]) = (coverage, gap);
         if let Some(ball) = &ball {
             let mean = distances.iter().sum::<f64>() / count;
@@ -200,6 +197,18 @@ impl<const D: usize> ExactFrontMotion<D> {
         }
         Ok(Some(FrontErrors { time, values }))
     }
+}
+
+/// Mean, root mean square and maximum over the front, of which every foot-point stands for as much as a cell of its level covers.
+fn along_front(distances: &[f64], shares: impl Iterator<Item = f64>) -> [f64; 3] {
+    let (mut all, mut sum, mut squares, mut norms) = (0.0, 0.0, 0.0, ErrorNorms::default());
+    for (distance, share) in distances.iter().zip(shares) {
+        all += share;
+        sum += share * distance.abs();
+        squares += share * distance * distance;
+        norms.add(*distance);
+    }
+    [sum / all, (squares / all).sqrt(), norms.max()]
 }
 
 /// A vector of another number of components; those of a wave front are three either way.

@@ -2,7 +2,7 @@
 
 use super::foot_points::{FootPoint, FootPoints};
 use super::grid::Grid;
-use super::local_graph::{GraphJet, LocalPoint, MOST_ACROSS, PARAMETER, Terms, closest};
+use super::local_graph::{GraphJet, LocalGraph, LocalPoint, MOST_ACROSS, PARAMETER, Terms, closest};
 use super::method::FrontMethod;
 use super::motion::Law;
 use super::segments::{Segments, turned};
@@ -23,6 +23,9 @@ const TURNED: f64 = 0.7;
 const MOST_LONELY: f64 = 1.0;
 /// The largest |κ| h of a front that its particles resolve.
 const SHARPEST: f64 = 2.0;
+/// How far the directions of a graph may be from those of its particles, root mean square, where particles are exact by themselves:
+/// whatever two sides of a sharp tip or the ends of a gap are made to share is not the front.
+const MOST_MISFIT: f64 = 0.05;
 /// How far behind a segment still counts as on it, in spacings.
 const NOTHING: f64 = 1e-6;
 /// Segments that are tried at one place.
@@ -296,6 +299,9 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if nearest > (most * unit).powi(2) {
             return Err(Failure::Extrapolated);
         }
+        if self.law.keeps_particles_exact() && self.misfit(frame, &graphs, room) > MOST_MISFIT {
+            return Err(Failure::Unresolved);
+        }
         if self.merges && self.passes_another(base, &position, room) {
             return Err(Failure::Swept);
         }
@@ -308,6 +314,25 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let (curvature, gauss_curvature) = (shape.curvature / unit, shape.gauss_curvature / (unit * unit));
         let part = self.feet.parts[base];
         Ok(FootPoint { position, normal: shape.direction, curvature, gauss_curvature, part, parameter })
+    }
+}
+
+impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
+    /// √(Σ w |n_graph − n|² / Σ w) over the particles of a fit, with its weights.
+    fn misfit<const C: usize>(
+        &self,
+        frame: &Frame<D, M, C>,
+        graphs: &[LocalGraph<'_, M>; C],
+        room: &Room<D, M>,
+    ) -> f64 {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (j, (s, _)) in room.chosen.iter().zip(&room.points) {
+            let weight = (-self.method.weight * s.iter().map(|s| s * s).sum::<f64>()).exp();
+            let jets = std::array::from_fn(|c| graphs[c].jet(s));
+            sum += weight * (shape_of(frame, &jets).direction - self.feet.normals[*j]).norm_squared();
+            weights += weight;
+        }
+        (sum / weights).sqrt()
     }
 }
 
