@@ -16,7 +16,7 @@ pub const DEGREE: Parameter = Parameter::new(
 /// Particles of a reconstruction.
 pub const NEIGHBORS: Parameter = Parameter::new(
     "neighbors",
-    "particles of a reconstruction; when not given, 8 (6 of degree 2, 14 of degree 4 under mean_curvature) in the plane, 24 (16 of degree 2) in space",
+    "particles of a reconstruction; when not given, 8 (6 of degree 2, 14 of degree 4 under mean_curvature) in the plane; in space as many as coefficients where normals take part, 16 (24 of degree 4) else",
     Kind::Integer { least: 3, most: 60 },
     DefaultValue::Absent,
 );
@@ -24,6 +24,13 @@ pub const NEIGHBORS: Parameter = Parameter::new(
 pub const WEIGHT: Parameter = Parameter::new(
     "weight",
     "k in the weights exp(−k t²), t the distance along the front in h; when not given, 1 for degree 4 in the plane, 0 else and under mean_curvature",
+    Kind::Number { above: None, least: Some(0.0), below: None, most: Some(10.0) },
+    DefaultValue::Absent,
+);
+/// λ.
+pub const NORMAL_WEIGHT: Parameter = Parameter::new(
+    "normal_weight",
+    "weight of the particles' normals beside their positions in a reconstruction, in a flow; when not given, .1 in space, 0 in the plane",
     Kind::Number { above: None, least: Some(0.0), below: None, most: Some(10.0) },
     DefaultValue::Absent,
 );
@@ -89,7 +96,7 @@ pub const CFL: Parameter = Parameter::new(
 
 /// All of them.
 pub static PARAMETERS: &[Parameter] =
-    &[DEGREE, NEIGHBORS, WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, ADAPTIVITY, CFL];
+    &[DEGREE, NEIGHBORS, WEIGHT, NORMAL_WEIGHT, TUBE_RADIUS, MIN_SEPARATION, SEGMENT_TEST, ADAPTIVITY, CFL];
 
 const COSINE: Parameter = Parameter::new(
     "cosine",
@@ -126,6 +133,7 @@ fn segment_tests() -> &'static [Variant] {
 pub fn lay_paper_method(preset: &mut Map<String, Value>, given: Option<&Map<String, Value>>, is_in_space: bool) {
     preset.insert("degree".into(), json!(2));
     preset.insert("weight".into(), json!(0));
+    preset.insert("normal_weight".into(), json!(0));
     if given.and_then(|given| given.get("degree")).is_none_or(|degree| *degree == json!(2)) {
         preset.insert("neighbors".into(), json!(if is_in_space { 10 } else { 6 }));
     }
@@ -137,6 +145,7 @@ pub struct Written {
     degree: Option<usize>,
     neighbors: Option<usize>,
     weight: Option<f64>,
+    normal_weight: Option<f64>,
     tube_radius_h: f64,
     min_separation_h: f64,
     segment_test: SegmentTest,
@@ -179,30 +188,49 @@ pub struct Chosen {
     pub segments: Segments,
 }
 
+/// What moves the front, as far as it matters to reconstructions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// A flow: particles and their normals are exact by themselves.
+    Flow,
+    /// Its mean curvature.
+    Curvature,
+    /// A given speed, or rays.
+    Speed,
+}
+
 /// The method of checked parameters, and the parameters with what was left open.
 ///
 /// # Errors
-/// Where there are fewer particles than coefficients.
+/// Where there are fewer particles than coefficients, and where normals cannot take part.
 pub fn understand(
     written: &Written,
     json: &Value,
     pointer: &str,
     dimension: usize,
-    is_by_curvature: bool,
+    motion: Motion,
 ) -> Result<(Chosen, Value), Violation> {
+    let is_by_curvature = motion == Motion::Curvature;
     let is_low = is_by_curvature || dimension == 3;
     let degree = written.degree.unwrap_or(if is_low { 2 } else { 4 });
+    let terms = if dimension == 2 { degree + 1 } else { (degree + 1) * (degree + 2) / 2 };
+    if let Some(given) = written.normal_weight.filter(|given| *given > 0.0 && motion != Motion::Flow) {
+        let detail = "normals take part in reconstructions in a flow, which carries them along exactly";
+        return Err(Violation::new(format!("{pointer}/normal_weight"), "conflict", detail, &json!(given), json!(0)));
+    }
+    let has_normals = dimension == 3 && motion == Motion::Flow;
+    let normal_weight = written.normal_weight.unwrap_or(if has_normals { 0.1 } else { 0.0 });
     let neighbors = written.neighbors.unwrap_or(match (dimension, degree) {
         (2, 2) => 6,
         (2, 3) => 7,
         // Narrower quartics blow up slowly under curvature.
         (2, _) if is_by_curvature => 14,
         (2, _) => 8,
+        (_, _) if normal_weight > 0.0 => terms,
         (_, 2 | 3) => 16,
         _ => 24,
     });
     let weight = written.weight.unwrap_or(if degree == 4 && dimension == 2 && !is_by_curvature { 1.0 } else { 0.0 });
-    let terms = if dimension == 2 { degree + 1 } else { (degree + 1) * (degree + 2) / 2 };
     if neighbors < terms {
         let detail = format!("a reconstruction of degree {degree} has {terms} coefficients");
         let allowed = json!(format!("a whole number ≥ {terms}"));
@@ -229,11 +257,13 @@ pub fn understand(
     resolved["degree"] = json!(degree);
     resolved["neighbors"] = json!(neighbors);
     resolved["weight"] = json!(weight);
+    resolved["normal_weight"] = json!(normal_weight);
     resolved["segment_test"]["cosine"] = json!(cosine);
     let (tube_radius, min_separation) = (written.tube_radius_h, written.min_separation_h);
     let adaptivity = written
         .adaptivity
         .map(|Adaptivity { levels, curvature_constant }| gbpm::Adaptivity { levels, curvature_constant });
-    let method = FrontMethod { degree, neighbors, weight, tube_radius, min_separation, cosine, adaptivity };
+    let method =
+        FrontMethod { degree, neighbors, weight, normal_weight, tube_radius, min_separation, cosine, adaptivity };
     Ok((Chosen { method, topology, segments }, resolved))
 }

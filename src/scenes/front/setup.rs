@@ -9,7 +9,7 @@ use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::flow_work::{Stretch, error_units, stretch};
 use crate::scenes::flows::{Flow, flow, top_speed};
-use crate::scenes::gbpm_parameters::{self, Chosen};
+use crate::scenes::gbpm_parameters::{self, Chosen, Motion};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::{shapes, work_estimate};
 use crate::schemes::exact_motion::ExactMotion;
@@ -121,7 +121,12 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         Law::Flow { flow: of } => flow::<D>(of).ok().and_then(|flow| flow.return_time()),
         _ => None,
     };
-    let is_by_curvature = matches!(choice.law, Law::MeanCurvature);
+    let motion = match &choice.law {
+        Law::Flow { .. } => Motion::Flow,
+        Law::MeanCurvature => Motion::Curvature,
+        Law::Normal { .. } | Law::GeometricalOptics { .. } => Motion::Speed,
+    };
+    let is_by_curvature = motion == Motion::Curvature;
     if is_by_curvature && let PathIntegrator::Dopri5 { .. } = choice.integrator {
         let detail = "error control is for prescribed flows";
         let allowed = json!(["rk4", "tvd_rk2"]);
@@ -130,7 +135,7 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
     let method_json = resolved.pointer(choice.pointer).cloned().unwrap_or_default();
     let written: gbpm_parameters::Written = serde_json::from_value(method_json.clone())
         .map_err(|error| vec![Violation::new(choice.pointer, "type", error.to_string(), &method_json, Value::Null)])?;
-    let understood = gbpm_parameters::understand(&written, &method_json, choice.pointer, D, is_by_curvature);
+    let understood = gbpm_parameters::understand(&written, &method_json, choice.pointer, D, motion);
     let given = [written.cfl.is_some(), choice.time_step.is_some(), choice.steps.is_some()];
     if given.iter().filter(|is_given| **is_given).count() > 1 {
         let detail = "a step is given in more than one way; give one of cfl, time_step and steps";
@@ -209,8 +214,8 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
 pub(super) fn labels(chosen: &Chosen, fixed: FixedStep) -> BTreeMap<&'static str, String> {
     let method = &chosen.method;
     let reconstruction = format!(
-        "degree {}, {} particles, weight {}, normals to {}",
-        method.degree, method.neighbors, method.weight, method.cosine
+        "degree {}, {} particles, weight {}, that of normals {}, normals to {}",
+        method.degree, method.neighbors, method.weight, method.normal_weight, method.cosine
     );
     let mut said = BTreeMap::from([("reconstruction", reconstruction), ("time_step", format!("{}", fixed.time_step))]);
     if let Some(adaptivity) = method.adaptivity {

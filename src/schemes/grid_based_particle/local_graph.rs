@@ -64,20 +64,22 @@ impl<const M: usize> Terms<M> {
         LocalGraph { terms: self, coefficients: [0.0; MOST_TERMS] }
     }
 
-    /// The least-squares fit to one quantity at s_j with weights exp(−k |s_j|²), or None where the
-    /// points do not determine it.
+    /// The least-squares fit to one quantity at s_j with weights exp(−k |s_j|²), and with λ times as much weight to its slopes
+    /// there, where there are any (one for each point then, None where the front is too steep); None where the points do not
+    /// determine it.
     pub fn fit(
         &self,
         points: &[LocalPoint<M>],
         quantity: usize,
         k: f64,
+        (slopes, lambda): (&[Option<[f64; M]>], f64),
         room: &mut LeastSquares,
     ) -> Option<LocalGraph<'_, M>> {
         let n = self.count();
         if points.len() < n {
             return None;
         }
-        room.reset(points.len(), n);
+        room.reset(points.len() + M * slopes.len(), n);
         let mut row = [0.0; MOST_TERMS];
         for (j, (s, quantities)) in points.iter().enumerate() {
             let square: f64 = s.iter().map(|s| s * s).sum();
@@ -87,6 +89,16 @@ impl<const M: usize> Terms<M> {
                 *value = root * product(&powers, index);
             }
             room.set_row(j, &row[..n], root * quantities[quantity]);
+            let Some(slope) = slopes.get(j) else { continue };
+            // A row of zeros asks for nothing.
+            let (root, slope) = slope.map_or((0.0, [0.0; M]), |slope| (lambda * root, slope));
+            for (a, slope) in slope.iter().enumerate() {
+                for (value, index) in row.iter_mut().zip(&self.indices) {
+                    let term = lowered(index, a).map(|(factor, lower)| factor * product(&powers, &lower));
+                    *value = root * term.unwrap_or(0.0);
+                }
+                room.set_row(points.len() + M * j + a, &row[..n], root * slope);
+            }
         }
         let (found, solution) = room.solve();
         if found.rank < n || found.condition > WORST_CONDITION {
@@ -278,7 +290,7 @@ mod tests {
             .collect();
         let terms = Terms::<2>::new(2);
         let mut room = LeastSquares::default();
-        let graph = terms.fit(&points, 0, 0.7, &mut room).unwrap();
+        let graph = terms.fit(&points, 0, 0.7, (&[], 0.0), &mut room).unwrap();
         let jet = graph.jet(&[0.2, -0.1]);
         assert!((jet.value - f(0.2, -0.1)).abs() < 1e-13);
         assert!((jet.first[0] - (0.1 + 0.8 * 0.2 - 0.015)).abs() < 1e-13);
@@ -297,6 +309,26 @@ mod tests {
     }
 
     #[test]
+    fn slopes_determine_what_heights_on_a_line_do_not() {
+        let f = |x: f64, y: f64| 0.3 + 0.1 * x - 0.2 * y + 0.4 * x * x + 0.15 * x * y - 0.3 * y * y;
+        let (points, slopes): (Vec<LocalPoint<2>>, Vec<_>) = (0..6)
+            .map(|k| (0.5 * f64::from(k) - 1.2, 0.3))
+            .map(|(x, y)| (([x, y], [f(x, y), 0.0, 0.0]), Some([0.1 + 0.8 * x + 0.15 * y, -0.2 + 0.15 * x - 0.6 * y])))
+            .unzip();
+        let terms = Terms::<2>::new(2);
+        let mut room = LeastSquares::default();
+        assert!(terms.fit(&points, 0, 0.7, (&[], 0.0), &mut room).is_none());
+        // −.3 y² is seen by no height and no slope along y alone.
+        assert!(terms.fit(&points, 0, 0.7, (&slopes, 0.1), &mut room).is_none());
+        let aside = ([0.4, -0.5], [f(0.4, -0.5), 0.0, 0.0]);
+        let points: Vec<_> = points.into_iter().chain([aside]).collect();
+        let slopes: Vec<_> = slopes.into_iter().chain([None]).collect();
+        let graph = terms.fit(&points, 0, 0.7, (&slopes, 0.1), &mut room).unwrap();
+        assert!((graph.jet(&[0.2, -0.1]).value - f(0.2, -0.1)).abs() < 1e-13);
+        assert!((graph.jet(&[0.2, -0.1]).second[1][1] + 0.6).abs() < 1e-12);
+    }
+
+    #[test]
     fn the_closest_point_is_across_the_graph() {
         let points: Vec<LocalPoint<1>> = (0..8)
             .map(|k| f64::from(k) * 0.5 - 1.8)
@@ -304,7 +336,7 @@ mod tests {
             .collect();
         let terms = Terms::<1>::new(4);
         let mut room = LeastSquares::default();
-        let graph = terms.fit(&points, 0, 1.0, &mut room).unwrap();
+        let graph = terms.fit(&points, 0, 1.0, (&[], 0.0), &mut room).unwrap();
         for (p, height) in [(0.4, 1.0), (-0.6, -1.1), (0.0, 0.3)] {
             let (s, [jet]) = closest(&[graph], &[p], &[height], [0.0]).unwrap();
             assert!((s[0] - p + (jet.value - height) * jet.first[0]).abs() < 1e-13);
@@ -314,12 +346,12 @@ mod tests {
             assert!((jet.curvature() - 1.0 / 3.0).abs() < 1e-2);
         }
         // As a curve in space, on a plane inclined by .3: its closest point to a place is across its tangent.
-        let inclined = terms.fit(&points, 1, 1.0, &mut room).unwrap();
+        let inclined = terms.fit(&points, 1, 1.0, (&[], 0.0), &mut room).unwrap();
         let (s, [up, aside]) = closest(&[graph, inclined], &[0.4], &[1.0, -0.5], [0.0]).unwrap();
         assert!((aside.value - 0.3 * s[0]).abs() < 1e-12);
         assert!((s[0] - 0.4 + (up.value - 1.0) * up.first[0] + (aside.value + 0.5) * aside.first[0]).abs() < 1e-12);
-        assert!(terms.fit(&points[..4], 0, 1.0, &mut room).is_none());
+        assert!(terms.fit(&points[..4], 0, 1.0, (&[], 0.0), &mut room).is_none());
         let same = [([0.1], [0.0; 3]); 9];
-        assert!(terms.fit(&same, 0, 1.0, &mut room).is_none());
+        assert!(terms.fit(&same, 0, 1.0, (&[], 0.0), &mut room).is_none());
     }
 }

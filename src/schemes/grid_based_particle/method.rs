@@ -11,6 +11,8 @@ pub struct FrontMethod {
     pub neighbors: usize,
     /// k in the weights exp(−k t²), t the distance from the base point along the front.
     pub weight: f64,
+    /// λ, the weight of the particles' normals beside their positions: the slopes that they ask of the polynomial, times λ.
+    pub normal_weight: f64,
     /// γ/h.
     pub tube_radius: f64,
     /// Distance that particles of one reconstruction keep from each other.

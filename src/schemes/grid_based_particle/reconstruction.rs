@@ -24,8 +24,10 @@ const MOST_LONELY: f64 = 1.0;
 /// The largest |κ| h of a front that its particles resolve.
 const SHARPEST: f64 = 2.0;
 /// How far the directions of a graph may be from those of its particles, root mean square, where particles are exact by themselves:
-/// whatever two sides of a sharp tip or the ends of a gap are made to share is not the front.
-const MOST_MISFIT: f64 = 0.05;
+/// whatever two sides of a sharp tip or the ends of a gap are made to share is not the front. On a curve, and on a surface.
+const MOST_MISFIT: [f64; 2] = [0.05, 0.2];
+/// Cosine between the normal of a particle and the upward direction below which it asks for no slope.
+const STEEPEST: f64 = 0.2;
 /// How far behind a segment still counts as on it, in spacings.
 const NOTHING: f64 = 1e-6;
 /// Segments that are tried at one place.
@@ -74,6 +76,7 @@ pub(super) struct Room<const D: usize, const M: usize> {
     chosen: Vec<usize>,
     bases: Vec<usize>,
     points: Vec<LocalPoint<M>>,
+    slopes: Vec<Option<[f64; M]>>,
     squares: LeastSquares,
 }
 
@@ -84,6 +87,7 @@ impl<const D: usize, const M: usize> Default for Room<D, M> {
             chosen: Vec::new(),
             bases: Vec::new(),
             points: Vec::new(),
+            slopes: Vec::new(),
             squares: LeastSquares::default(),
         }
     }
@@ -266,9 +270,11 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
             point.1[PARAMETER] = turned(parameters[*j] - parameters[base]);
             point
         }));
+        self.note_slopes(frame, room);
+        let slopes = (&room.slopes[..], self.method.normal_weight);
         let mut graphs = [terms.nothing(); C];
         for (c, graph) in graphs.iter_mut().enumerate() {
-            let fitted = terms.fit(&room.points, c, self.method.weight, &mut room.squares);
+            let fitted = terms.fit(&room.points, c, self.method.weight, slopes, &mut room.squares);
             *graph = fitted.ok_or(Failure::Undetermined)?;
         }
         let (across, heights) = local(p);
@@ -299,7 +305,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if nearest > (most * unit).powi(2) {
             return Err(Failure::Extrapolated);
         }
-        if self.law.keeps_particles_exact() && self.misfit(frame, &graphs, room) > MOST_MISFIT {
+        if self.law.keeps_particles_exact() && self.misfit(frame, &graphs, room) > MOST_MISFIT[M - 1] {
             return Err(Failure::Unresolved);
         }
         if self.merges && self.passes_another(base, &position, room) {
@@ -308,7 +314,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         // Lagrangian quantities are carried by the same fit (GBPM 3.3.3).
         let mut parameter = parameters[base];
         if self.segments.parameter.is_some() {
-            let fitted = terms.fit(&room.points, PARAMETER, self.method.weight, &mut room.squares);
+            let fitted = terms.fit(&room.points, PARAMETER, self.method.weight, (&[], 0.0), &mut room.squares);
             parameter = (parameter + fitted.ok_or(Failure::Undetermined)?.jet(&s).value).rem_euclid(1.0);
         }
         let (curvature, gauss_curvature) = (shape.curvature / unit, shape.gauss_curvature / (unit * unit));
@@ -318,6 +324,19 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
 }
 
 impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
+    /// The slopes that the normals of the chosen particles ask of a graph, where they take part.
+    fn note_slopes<const C: usize>(&self, frame: &Frame<D, M, C>, room: &mut Room<D, M>) {
+        room.slopes.clear();
+        if C > 1 || self.method.normal_weight == 0.0 {
+            return;
+        }
+        room.slopes.extend(room.chosen.iter().map(|j| {
+            let n = &self.feet.normals[*j];
+            let up = frame.across[0].dot(n);
+            (up > STEEPEST).then(|| frame.along.map(|t| -t.dot(n) / up))
+        }));
+    }
+
     /// √(Σ w |n_graph − n|² / Σ w) over the particles of a fit, with its weights.
     fn misfit<const C: usize>(
         &self,
