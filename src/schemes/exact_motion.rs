@@ -36,6 +36,9 @@ const ROUGH: PathIntegrator = PathIntegrator::Dopri5 { tolerance: 1e-7 };
 /// Distance from the surface beyond which the end of a rough path is on the right side: a thousand times the error of
 /// such a path in the flows here.
 const ROUGH_SIDE: f64 = 1e-2;
+/// The same for distances to first order, and the offset of the points by which the gradient of the backward map is found.
+const NEARBY: PathIntegrator = PathIntegrator::Dopri5 { tolerance: 1e-9 };
+const OFFSET: f64 = 1e-5;
 /// Points of the front at most.
 const MOST_POINTS: f64 = 2e5;
 /// Points of the front per spacing of the particles, so that the chords' error stays far below the method's.
@@ -69,6 +72,27 @@ impl<const D: usize> ExactMotion<D> {
     #[must_use]
     pub fn flow(&self) -> &dyn Flow<D> {
         self.flow.as_ref()
+    }
+
+    /// The signed distance of a point close to the surface at a time, to first order: φ(X)/|∇φ(X)|, X the backward map and φ the distance
+    /// at the start. In space, where the surface has no outline to carry along.
+    #[must_use]
+    pub fn distance_nearby(&self, x: &Vector<D>, time: f64) -> Option<f64> {
+        let surface = self.surface()?;
+        let start = |x: &Vector<D>| surface.signed_distance(&NEARBY.advance(self.flow.as_ref(), x, time, -time));
+        let here = start(x);
+        let gradient = Vector::<D>::from_fn(|d, _| {
+            let mut aside = *x;
+            aside[d] += OFFSET;
+            (start(&aside) - here) / OFFSET
+        });
+        Some(here / gradient.norm())
+    }
+
+    /// Roughly where a point of the start is at a time.
+    #[must_use]
+    pub fn place_about(&self, start: &Vector<D>, time: f64) -> Vector<D> {
+        ROUGH.advance(self.flow.as_ref(), start, 0.0, time)
     }
 
     /// The surface at a time, resolved for particles of a spacing; None where it is not known.
@@ -200,6 +224,20 @@ mod tests {
         let motion = ExactMotion::new(ball(), Box::new(SingleVortex { period: Some(8.0) }));
         let front = motion.front(8.0, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         assert!((front.signed_distance(&Vector::<2>::new(0.5, 1.0)) - 0.1).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_distance_nearby_agrees_with_the_advected_front() {
+        let motion = ExactMotion::new(ball(), Box::new(SingleVortex { period: Some(2.0) }));
+        let front = motion.front(0.7, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
+        for k in 0..8 {
+            let angle = 0.8 * f64::from(k);
+            let start = Vector::<2>::new(0.5 + 0.15 * angle.cos(), 0.75 + 0.15 * angle.sin());
+            let near = motion.place_about(&start, 0.7) + Vector::<2>::new(3e-4, -2e-4);
+            let distance = front.signed_distance(&near);
+            let nearby = motion.distance_nearby(&near, 0.7).unwrap();
+            assert!((nearby - distance).abs() < 2e-2 * distance.abs() + 1e-6, "{nearby} {distance}");
+        }
     }
 
     #[test]

@@ -51,6 +51,11 @@ pub(super) fn vortex_in_space(cells: u32) -> Value {
     })
 }
 
+/// The same without reversal, to t = 1.
+pub(super) fn onward_in_space(cells: u32) -> Value {
+    with(vortex_in_space(cells), &json!({"flow": {"type": "vortex_3d", "period": null}, "end_time": 1}))
+}
+
 pub(super) fn by_curvature(cells: u32, end_time: f64, more: &Value) -> Value {
     let circle = json!({"type": "circle", "center": [0.5, 0.5], "radius": 0.4});
     with(front(cells, &json!({"law": "mean_curvature", "shape": circle, "end_time": end_time})), more)
@@ -92,7 +97,12 @@ pub(super) fn adaptive(cells: u32, period: f64, cfl: u32) -> Value {
 /// The vortex that never turns, to t = 3.
 pub(super) fn onward(cells: u32, method: &Value) -> Value {
     let flow = json!({"type": "single_vortex", "period": null});
-    with(vortex(cells, 3.0, method), &json!({"flow": flow}))
+    along_exact_paths(&with(vortex(cells, 3.0, method), &json!({"flow": flow})))
+}
+
+/// With the paths' error controlled: what a step of many spacings then costs is the resampling's alone.
+pub(super) fn along_exact_paths(scene: &Value) -> Value {
+    with(scene.clone(), &json!({"integrator": {"type": "dopri5", "tolerance": 1e-9}}))
 }
 
 /// Crossing by a parameter that is carried along.
@@ -102,7 +112,7 @@ pub(super) fn by_parameter() -> Value {
 
 /// Four levels, and as few resamplings as four levels stand.
 pub(super) fn coarsened() -> Value {
-    json!({"cfl": 24, "adaptivity": {"levels": 4, "curvature_constant": 0.1}})
+    json!({"cfl": 24, "adaptivity": {"levels": 4, "curvature_constant": 0.05}})
 }
 
 /// A ring that grows until it has no hole.

@@ -1,8 +1,8 @@
 //! The paper's figures, and what stands beside them.
 
 use super::cases::{
-    adaptive, balls, coarsened, disk, dumbbell, front, levels, onward, optics, rotated, square, square_shape, still,
-    translated, vortex,
+    adaptive, along_exact_paths, balls, coarsened, disk, dumbbell, front, levels, onward, onward_in_space, optics,
+    rotated, square, square_shape, still, translated, vortex, vortex_in_space,
 };
 use crate::scene::rows::{Figure, Plot, Quantity, with};
 use serde_json::{Value, json};
@@ -26,6 +26,8 @@ pub(super) fn figures() -> Vec<Figure> {
     let quartic = |cells| vortex(cells, 8.0, &json!({}));
     let uniform = || [128, 192, 256, 384, 512].map(quartic).to_vec();
     let refined = || [32, 64, 128].map(|cells| adaptive(cells, 8.0, 24)).to_vec();
+    let far = |cells| along_exact_paths(&vortex(cells, 8.0, &json!({"cfl": 24})));
+    let few = |cells| along_exact_paths(&adaptive(cells, 8.0, 40));
     let particles = || [64, 128, 256].map(|n| json!({"kind": "vortex", "spacing": 1.0 / f64::from(n)})).to_vec();
     let overwritten = || {
         let scene = |n: u32| json!({"kind": "vortex", "field": "overwrite", "spacing": 1.0 / f64::from(n)});
@@ -35,6 +37,7 @@ pub(super) fn figures() -> Vec<Figure> {
         vec![
             ("GBPM, uniform", uniform()),
             ("GBPM, four levels", refined()),
+            ("GBPM, four levels, dopri5", [32, 64, 128].map(few).to_vec()),
             ("PCP, material fits", particles()),
             ("PCP, overwritten", overwritten()),
         ]
@@ -80,7 +83,12 @@ pub(super) fn figures() -> Vec<Figure> {
             Quantity::at_end("radius", "deviation"),
             None,
             "front/",
-            vec![("uniform, step factor 10", uniform()), ("four levels, step factor 24", refined())],
+            vec![
+                ("uniform, step factor 10", uniform()),
+                ("four levels, step factor 24", refined()),
+                ("uniform, 24, dopri5", [128, 192, 256, 384, 512].map(far).to_vec()),
+                ("four levels, 40, dopri5", [32, 64, 128].map(few).to_vec()),
+            ],
         ),
         against(
             "front-pcp-end",
@@ -148,6 +156,21 @@ pub(super) fn figures() -> Vec<Figure> {
             by_curvature(square_shape(0.8), 0.1),
             0.02,
             &[0, 1, 2, 4],
+        ),
+        frames("front-vortex-space", "3D vortex, T = 2, 91³", vortex_in_space(90), 0.5, &[0, 1, 2, 4]),
+        frames(
+            "front-vortex-space-onward",
+            "3D vortex without reversal, 91³",
+            onward_in_space(90),
+            0.25,
+            &[0, 1, 2, 4],
+        ),
+        frames(
+            "front-spheres",
+            "Two spheres merge (fig. 17)",
+            balls(50, "sphere", 0.125, &json!({})),
+            0.025,
+            &[0, 1, 2, 5],
         ),
         frames("front-dumbbell", "Dumbbell by its mean curvature", dumbbell(), 0.001, &[0, 1, 2, 4]),
         frames("front-wavefront", "Elliptical wave front in the plane (fig. 22)", optics(128, 1.2), 0.4, &[0, 1, 2, 3]),

@@ -1,9 +1,9 @@
 //! The rows of `front`, and of `vortex` with grid-based particles: GBPM paper, section 4.
 
 use super::cases::{
-    adaptive, balls, by_curvature, by_parameter, coarsened, disk, dumbbell, front, levels, onward, optics,
-    other_square, ring, rotated, square, square_shape, still, still_sphere, three_spheres, translated, vortex,
-    vortex_in_space,
+    adaptive, along_exact_paths, balls, by_curvature, by_parameter, coarsened, disk, dumbbell, front, levels, onward,
+    onward_in_space, optics, other_square, ring, rotated, square, square_shape, still, still_sphere, three_spheres,
+    translated, vortex, vortex_in_space,
 };
 use super::figures::figures;
 use crate::scene::rows::{Measure, Quantity, Reach, Row, Rows, with};
@@ -92,6 +92,18 @@ pub fn rows() -> Rows {
         let mean = Reach::Within { of: 0.15, by: 3e-4 };
         row(case("mean radius"), ".1512", run(), end("radius", "mean"), mean, true);
         row(case("deviation"), "3.0e-3", run(), end("radius", "deviation"), most(1e-3), true);
+        row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), true);
+        row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(9.0), true);
+    }
+    for (name, run) in [
+        ("257², step factor 24", vortex(256, 8.0, &json!({"cfl": 24}))),
+        ("257², step factor 48", vortex(256, 8.0, &json!({"cfl": 48}))),
+        ("513², step factor 32", vortex(512, 8.0, &json!({"cfl": 32}))),
+        ("adaptive 129² to 1025², step factor 40", adaptive(128, 8.0, 40)),
+    ] {
+        let run = || vec![along_exact_paths(&run)];
+        let case = |what: &str| format!("single vortex, T = 8, dopri5, {name}: {what}");
+        row(case("deviation"), "3.0e-3", run(), end("radius", "deviation"), most(1e-4), true);
         row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), true);
         row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(9.0), true);
     }
@@ -201,6 +213,14 @@ pub fn rows() -> Rows {
         row(case("deviation"), "6.4e-3", run(), end("radius", "deviation"), most(figure), cells > 90);
         row(case("coverage"), "–", run(), end("front", "coverage_h"), most(1.5), cells > 90);
         row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(seconds), cells > 90);
+    }
+    for cells in [50, 90] {
+        let run = || vec![onward_in_space(cells)];
+        let case = |what: &str| format!("3D vortex without reversal, t = 1, {}³: {what}", cells + 1);
+        let far = if cells < 90 { 0.03 } else { 0.01 } / f64::from(cells);
+        row(case("mean distance"), "picture", run(), end("front", "mean"), most(far), cells > 50);
+        row(case("largest distance"), "picture", run(), end("front", "max"), Reach::Shown, cells > 50);
+        row(case("coverage"), "–", run(), end("front", "coverage_h"), most(1.5), cells > 50);
     }
     for (name, scene, far) in [
         ("square .25 outward, 129², corners on grid points", other_square(128, 0.25, 1.0), 0.25 / 128.0),

@@ -57,6 +57,9 @@ pub(in crate::scenes) struct FrontChoice {
     pub pointer: &'static str,
 }
 
+/// Paths of an error in space by particle, by the cost of one of the plane: its own and three beside it, and those of samples.
+const PATHS_IN_SPACE: f64 = 8.0;
+
 struct FrontScene<const D: usize, const M: usize> {
     resolved: Value,
     choice: FrontChoice,
@@ -370,7 +373,8 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         let exact = match (&self.choice.law, shapes::surface::<D>(&self.choice.shape, "/shape")) {
             (Law::Flow { flow: of }, Ok(surface)) => flow::<D>(of).map_or(0.0, |flow| {
                 let finest = Grid { spacing: self.choice.spacing }.spacing_at(self.chosen.method.levels() - 1);
-                error_units(Some(surface.as_ref()), flow.as_ref(), finest, particles as f64, end_time)
+                let paths = if D == 3 { PATHS_IN_SPACE } else { 1.0 };
+                error_units(Some(surface.as_ref()), flow.as_ref(), finest, paths * particles as f64, end_time)
             }),
             _ => particles as f64,
         };

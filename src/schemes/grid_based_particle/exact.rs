@@ -84,6 +84,8 @@ impl FrontErrors {
 
 /// Spacing of the lattice from which points of an exact surface come, by that of the front.
 const SAMPLE: f64 = 0.53;
+/// The same by that again where a flow is going to carry the points along.
+const DRAWN_APART: f64 = 0.5;
 /// Points of the exact curve per spacing.
 const POINTS_PER_SPACING: f64 = 20.0;
 
@@ -140,12 +142,21 @@ impl<const D: usize> ExactFrontMotion<D> {
         } else {
             match self {
                 Self::Flow(motion) => {
-                    let Some(front) = motion.front(time, spacing, interrupt)? else { return Ok(None) };
-                    chains = front.chains(spacing / POINTS_PER_SPACING);
-                    if let (true, Some(surface)) = (chains.is_empty(), motion.surface()) {
-                        sample(surface, spacing, |x| loose.extend(front.place_by_formula(&x)));
+                    let Some(surface) = motion.surface() else { return Ok(None) };
+                    if let Some(front) = motion.front(time, spacing, interrupt)? {
+                        chains = front.chains(spacing / POINTS_PER_SPACING);
+                        if chains.is_empty() {
+                            sample(surface, spacing, |x| loose.extend(front.place_by_formula(&x)));
+                        }
+                        each(&feet.positions, interrupt, f64::NAN, |x| front.signed_distance(x))
+                    } else {
+                        // The flow draws the samples apart.
+                        sample(surface, DRAWN_APART * spacing, |x| loose.push(x));
+                        loose = each(&loose, interrupt, Vector::zeros(), |x| motion.place_about(x, time));
+                        each(&feet.positions, interrupt, f64::NAN, |x| {
+                            motion.distance_nearby(x, time).unwrap_or(f64::NAN)
+                        })
                     }
-                    feet.positions.par_iter().map(|x| front.signed_distance(x)).collect()
                 }
                 Self::Offset { surfaces, speed, topology } => {
                     let way = speed * time;
@@ -197,6 +208,16 @@ impl<const D: usize> ExactFrontMotion<D> {
         }
         Ok(Some(FrontErrors { time, values }))
     }
+}
+
+/// Something of each point; of no use after an interrupt.
+fn each<const D: usize, T: Copy + Send + Sync>(
+    points: &[Vector<D>],
+    interrupt: &Interrupt,
+    nothing: T,
+    find: impl Fn(&Vector<D>) -> T + Sync,
+) -> Vec<T> {
+    points.par_iter().map(|x| if interrupt.is_raised() { nothing } else { find(x) }).collect()
 }
 
 /// Mean, root mean square and maximum over the front, of which every foot-point stands for as much as a cell of its level covers.
