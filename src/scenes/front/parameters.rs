@@ -33,6 +33,7 @@ pub(super) static PARAMETERS: &[Parameter] = &[
     gbpm_parameters::DEGREE,
     gbpm_parameters::NEIGHBORS,
     gbpm_parameters::WEIGHT,
+    gbpm_parameters::NORMAL_WEIGHT,
     gbpm_parameters::TUBE_RADIUS,
     gbpm_parameters::MIN_SEPARATION,
     gbpm_parameters::SEGMENT_TEST,

@@ -12,13 +12,17 @@ use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
 use crate::neighbors::NeighborSearch;
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
-use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
+use rayon::prelude::{
+    IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator, ParallelSlice, ParallelSliceMut,
+};
 
 /// Reach along the front within which a particle proposes grid points, in spacings: half the largest gap that a motion may
 /// open before grid points in its middle are missed.
 const ALONG: f64 = 1.4;
 /// How much farther than γ across the front, in spacings: for the bend of the front.
 const MARGIN: f64 = 0.35;
+/// Particles whose proposals are put in order together.
+const PROPOSING: usize = 256;
 /// A moved particle with a new foot-point of its segment within so many spacings needs not stay: half the largest distance between
 /// neighbours, on a curve and on a surface. Less would keep particles that nothing misses, which distort reconstructions.
 const COVERED: [f64; 2] = [0.55, 1.0];
@@ -64,6 +68,13 @@ impl Removals {
     }
 }
 
+/// Grid points that a block of particles has about it.
+#[derive(Debug, Default)]
+pub(super) struct Proposals {
+    nodes: Vec<Node>,
+    outside: u64,
+}
+
 /// What became of a grid point near the front.
 pub(super) type Outcome<const D: usize> = Result<FootPoint<D>, Failure>;
 
@@ -101,48 +112,69 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
 
     /// The grid points that the particles have about them, each once and in order: of each level those of cells without parts.
     fn propose(&mut self) {
-        let grid = self.parts.grid;
         let width = self.parts.method.tube_radius + MARGIN;
         let levels = self.parts.method.levels();
-        self.candidates.clear();
-        for i in 0..self.feet.len() {
-            let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
-            if grid.nearest(y, levels - 1).is_none() {
-                // Where particles are exact by themselves it is looked at again below.
-                self.removals.outside += u64::from(!self.parts.law.keeps_particles_exact());
-                continue;
+        let mut proposals = std::mem::take(&mut self.proposals);
+        proposals.resize_with(self.feet.len().div_ceil(PROPOSING).max(proposals.len()), Proposals::default);
+        proposals.par_iter_mut().enumerate().for_each(|(block, proposals)| {
+            *proposals = Proposals { nodes: std::mem::take(&mut proposals.nodes), outside: 0 };
+            proposals.nodes.clear();
+            let end = ((block + 1) * PROPOSING).min(self.feet.len());
+            for i in block * PROPOSING..end {
+                self.propose_about(i, (width, levels), proposals);
             }
-            let own = grid.spacing_of(self.feet.nodes[i]);
-            let farthest = own * if self.at_gap[i] { self.parts.law.widest_bridge() } else { ALONG };
-            let window = |level: u32| {
-                let spacing = grid.spacing_at(level);
-                let (across, along) = (width * spacing, farthest.max(ALONG * spacing));
-                let reach = across.hypot(along);
-                let corner = |side: f64| grid.nearest(&y.add_scalar(side), level);
-                Some(Window { low: corner(-reach)?, high: corner(reach)?, across, along })
-            };
-            self.refinement.for_each_leaf_in(window, |at, level, window| {
-                let d = grid.center(at, level) - y;
-                // Of the squares along the direction and across it, one is that along the front.
-                let by_direction = d.dot(n).powi(2);
-                let rest = d.norm_squared() - by_direction;
-                let (height, way) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
-                if height <= window.across * window.across && way <= window.along * window.along {
-                    self.candidates.push(Grid::node(at, level));
-                }
-            });
+            proposals.nodes.sort_unstable();
+            proposals.nodes.dedup();
+        });
+        self.candidates.clear();
+        for proposals in &proposals {
+            self.candidates.extend_from_slice(&proposals.nodes);
+            self.removals.outside += proposals.outside;
         }
-        self.candidates.sort_unstable();
+        self.proposals = proposals;
+        self.candidates.par_sort_unstable();
         self.candidates.dedup();
     }
 
-    /// Which particles are next to a gap or at an end.
+    /// Those about one particle.
+    fn propose_about(&self, i: usize, (width, levels): (f64, u32), proposals: &mut Proposals) {
+        let grid = self.parts.grid;
+        let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
+        if grid.nearest(y, levels - 1).is_none() {
+            // Where particles are exact by themselves it is looked at again below.
+            proposals.outside += u64::from(!self.parts.law.keeps_particles_exact());
+            return;
+        }
+        let own = grid.spacing_of(self.feet.nodes[i]);
+        let farthest = own * if self.at_gap[i] { self.parts.law.widest_bridge() } else { ALONG };
+        let window = |level: u32| {
+            let spacing = grid.spacing_at(level);
+            let (across, along) = (width * spacing, farthest.max(ALONG * spacing));
+            let reach = across.hypot(along);
+            let corner = |side: f64| grid.nearest(&y.add_scalar(side), level);
+            Some(Window { low: corner(-reach)?, high: corner(reach)?, across, along })
+        };
+        self.refinement.for_each_leaf_in(window, |at, level, window| {
+            let d = grid.center(at, level) - y;
+            // Of the squares along the direction and across it, one is that along the front.
+            let by_direction = d.dot(n).powi(2);
+            let rest = d.norm_squared() - by_direction;
+            let (height, way) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
+            if height <= window.across * window.across && way <= window.along * window.along {
+                proposals.nodes.push(Grid::node(at, level));
+            }
+        });
+    }
+
+    /// Which particles are next to a gap or at an end, in a flow.
     fn find_gaps(&mut self) -> Result<(), Interrupted> {
         let mut at_gap = std::mem::take(&mut self.at_gap);
         at_gap.clear();
         at_gap.resize(self.feet.len(), false);
+        // Only a flow draws particles apart that nothing else replaces.
+        let looked_at = if self.parts.law.keeps_particles_exact() { &mut at_gap[..] } else { &mut [] };
         let interrupt = &self.parts.interrupt;
-        at_gap.par_chunks_mut(BLOCK).enumerate().for_each(|(block, at_gap)| {
+        looked_at.par_chunks_mut(BLOCK).enumerate().for_each(|(block, at_gap)| {
             for (k, is_at_gap) in at_gap.iter_mut().enumerate() {
                 if interrupt.is_raised() {
                     return;
@@ -200,26 +232,39 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
 
     /// Moved particles without a new foot-point of their segment close by stay as they are.
     fn keep_unreplaced(&mut self) {
-        let grid = self.parts.grid;
-        let edge = self.fresh.finest_spacing(&grid);
+        let edge = self.fresh.finest_spacing(&self.parts.grid);
         self.fresh_cells.rebuild(self.fresh.positions.iter().copied(), edge);
-        let order = self.fresh_cells.order();
-        for i in 0..self.feet.len() {
+        let mut keep = std::mem::take(&mut self.keep);
+        keep.clear();
+        keep.resize(self.feet.len(), false);
+        keep.par_chunks_mut(BLOCK).enumerate().for_each(|(block, keep)| {
+            for (k, keep) in keep.iter_mut().enumerate() {
+                *keep = !self.is_replaced(block * BLOCK + k);
+            }
+        });
+        for i in (0..self.feet.len()).filter(|i| keep[*i]) {
             let foot = self.feet.get(i);
-            let Some(node) = self.refinement.leaf_at(&grid, &foot.position) else {
-                self.removals.outside += 1;
-                continue;
-            };
-            let spacing = grid.spacing_of(node).max(grid.spacing_of(self.feet.nodes[i]));
-            let covered = if self.at_gap[i] { SAME } else { COVERED[M - 1] };
-            let is_replaced = self.fresh_cells.any_within(&foot.position, covered * spacing, |place| {
-                self.fresh.normals[order[place]].dot(&foot.normal) > self.parts.method.cosine
-            });
-            if !is_replaced {
+            if let Some(node) = self.refinement.leaf_at(&self.parts.grid, &foot.position) {
                 self.fresh.push(node, &foot);
                 self.removals.kept += 1;
+            } else {
+                self.removals.outside += 1;
             }
         }
+        self.keep = keep;
+    }
+
+    /// Whether a new foot-point of its segment is close to a moved particle.
+    fn is_replaced(&self, i: usize) -> bool {
+        let grid = &self.parts.grid;
+        let (position, normal) = (&self.feet.positions[i], &self.feet.normals[i]);
+        let Some(node) = self.refinement.leaf_at(grid, position) else { return false };
+        let spacing = grid.spacing_of(node).max(grid.spacing_of(self.feet.nodes[i]));
+        let covered = if self.at_gap[i] { SAME } else { COVERED[M - 1] };
+        let order = self.fresh_cells.order();
+        self.fresh_cells.any_within(position, covered * spacing, |place| {
+            self.fresh.normals[order[place]].dot(normal) > self.parts.method.cosine
+        })
     }
 }
 

@@ -8,7 +8,7 @@ use super::method::FrontMethod;
 use super::motion::{self, Law};
 use super::reconstruction::{Failure, Reconstruction, Room};
 use super::refinement::Refinement;
-use super::resampling::{Outcome, Removals, fill};
+use super::resampling::{Outcome, Proposals, Removals, fill};
 use super::segments::{Course, Segments};
 use super::topology::{Topology, mark_unswept};
 use crate::geometry::{Domain, Surface, Vector};
@@ -45,6 +45,8 @@ pub struct FrontSystem<const D: usize, const M: usize> {
     pub(super) fresh_cells: CellList<D>,
     pub(super) terms: Terms<M>,
     pub(super) quadratic: Terms<M>,
+    /// Grid points that the particles propose, block by block, and all of them together.
+    pub(super) proposals: Vec<Proposals>,
     pub(super) candidates: Vec<Node>,
     pub(super) outcomes: Vec<Outcome<D>>,
     pub(super) rooms: PerThread<Room<D, M>>,
@@ -52,7 +54,8 @@ pub struct FrontSystem<const D: usize, const M: usize> {
     /// Of every moved particle, whether it is next to a gap or at the end of its segment.
     pub(super) at_gap: Vec<bool>,
     pub(super) removals: Removals,
-    keep: Vec<bool>,
+    /// Which particles stay.
+    pub(super) keep: Vec<bool>,
     /// Positions at the start of a step, and the sum of its stages' velocities.
     starts: Vec<Vector<D>>,
     slopes: Vec<Vector<D>>,
@@ -92,6 +95,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             fresh_cells: CellList::new(Domain::unbounded()),
             terms,
             quadratic,
+            proposals: Vec::new(),
             candidates: Vec::new(),
             outcomes: Vec::new(),
             rooms: PerThread::new(),
