@@ -31,10 +31,12 @@ const CURVATURE_STEP: f64 = 0.5;
 const MOST_CURVATURE_STEP: f64 = 1.0;
 /// Steps in the period of a flow that turns back, at least.
 const STEPS_A_TURN: f64 = 32.0;
+/// Paths of an error in space by particle, by the cost of one of the plane: its own and three beside it, and those of samples.
+const PATHS_IN_SPACE: f64 = 8.0;
 /// How much larger a vortex makes a surface, about.
 const DRAWN_OUT: f64 = 4.0;
 /// Resident bytes a foot-point: its columns twice, its outcome, cells, a frame and a checkpoint in the making.
-const BYTES: u64 = 1200;
+pub(super) const BYTES: u64 = 1200;
 /// The same on a refined grid, with the cells that are split in the making.
 const REFINED_BYTES: u64 = 5000;
 /// The longest wave front, in spacings.
@@ -56,9 +58,6 @@ pub(in crate::scenes) struct FrontChoice {
     /// Where the parameters of the method are.
     pub pointer: &'static str,
 }
-
-/// Paths of an error in space by particle, by the cost of one of the plane: its own and three beside it, and those of samples.
-const PATHS_IN_SPACE: f64 = 8.0;
 
 struct FrontScene<const D: usize, const M: usize> {
     resolved: Value,

@@ -1,6 +1,6 @@
 //! A wave front of geometrical optics: a curve in (x, y, θ).
 
-use super::setup::{FrontChoice, labels};
+use super::setup::{BYTES, FrontChoice, labels};
 use crate::geometry::flows::Rays;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
@@ -11,13 +11,9 @@ use crate::scenes::work_estimate;
 use crate::schemes::grid_based_particle::{
     EllipticalWavefront, ExactFrontMotion, FrontParts, FrontSystem, Grid, GridBasedParticles, Law,
 };
-
 use crate::simulation::{OutputPlan, Simulation};
 use crate::time::FixedStep;
 use serde_json::{Value, json};
-
-/// Resident bytes a foot-point.
-const BYTES: u64 = 1200;
 
 pub(super) struct WavefrontScene {
     pub resolved: Value,
