@@ -69,6 +69,17 @@ fn steps_allocate_nothing_after_warm_up() {
             "kind": "front", "spacing": 0.02, "end_time": 0.0024, "time_step": 2e-4, "law": "mean_curvature",
             "shape": {"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25}
         }),
+        // In a flow particles at corners and ends stay, and gaps ask for more.
+        json!({
+            "kind": "front", "spacing": 0.005, "end_time": 0.24, "time_step": 0.02,
+            "law": {"type": "flow", "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 2}},
+            "shape": {"type": "box", "center": [0.5, 0.6], "size": [0.3, 0.3]}
+        }),
+        json!({
+            "kind": "front", "spacing": 0.03, "end_time": 0.24, "time_step": 0.02,
+            "law": {"type": "flow", "flow": {"type": "translation", "velocity": [1, 0.5, 0.25]}},
+            "shape": {"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25}
+        }),
     ];
     let plan = meniscus::simulation::OutputPlan { every_time: None, series_every_steps: 1000 };
     for body in bodies {

@@ -106,6 +106,8 @@ fn front_bodies() -> Vec<Value> {
         front(json!({"shape": spheres, "topology": "cross"})),
         front(json!({"shape": spheres, "segment_test": {"type": "parameter", "cosine": 0.4}})),
         front(json!({"shape": sphere(0.35), "law": vortex, "end_time": 0.4, "degree": 4, "time_step": 0.04})),
+        // Several blocks of proposals.
+        front(json!({"shape": sphere(0.35), "law": vortex, "end_time": 0.4, "spacing": 0.015, "time_step": 0.08})),
         json!({
             "kind": "vortex", "spacing": 0.02, "end_time": 2, "steps": 20, "flow": {"type": "single_vortex", "period": 2},
             "method": {"type": "gbpm", "degree": 3, "tube_radius_h": 1.4}, "integrator": "dopri5"

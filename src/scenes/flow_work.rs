@@ -60,12 +60,18 @@ pub fn error_units<const D: usize>(
     particles: f64,
     end_time: f64,
 ) -> f64 {
-    let halfway = flow.return_time().map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
-    let at_end = if flow.is_back(end_time) { 0.0 } else { end_time };
-    let path = if flow.is_rigid() { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
     let points = surface.filter(|_| D == 2).map_or(0.0, |surface| {
         let (low, high) = surface.bounding_box();
         front_points((high - low).max(), spacing)
     });
-    particles + (points + particles) * path * PATH
+    particles + path_units(flow, points + particles, end_time)
+}
+
+/// Units of work of tight paths to the moments of errors.
+#[must_use]
+pub fn path_units<const D: usize>(flow: &dyn Flow<D>, paths: f64, end_time: f64) -> f64 {
+    let halfway = flow.return_time().map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
+    let at_end = if flow.is_back(end_time) { 0.0 } else { end_time };
+    let length = if flow.is_rigid() { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
+    paths * length * PATH
 }

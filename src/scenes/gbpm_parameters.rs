@@ -16,7 +16,7 @@ pub const DEGREE: Parameter = Parameter::new(
 /// Particles of a reconstruction.
 pub const NEIGHBORS: Parameter = Parameter::new(
     "neighbors",
-    "particles of a reconstruction; when not given, 8 (6 of degree 2, 14 of degree 4 under mean_curvature) in the plane; in space as many as coefficients where normals take part, 16 (24 of degree 4) else",
+    "particles of a reconstruction; when not given, 8 (6 of degree 2, 14 of degree 4 under mean_curvature) in the plane; in space as many as coefficients where normals weigh .1 or more, 16 (24 of degree 4) else",
     Kind::Integer { least: 3, most: 60 },
     DefaultValue::Absent,
 );
@@ -30,7 +30,8 @@ pub const WEIGHT: Parameter = Parameter::new(
 /// λ.
 pub const NORMAL_WEIGHT: Parameter = Parameter::new(
     "normal_weight",
-    "weight of the particles' normals beside their positions in a reconstruction, in a flow; when not given, .1 in space, 0 in the plane",
+    "λ in the rows λ ∂f = slope that the particles' normals add to those of their positions in a reconstruction, in a flow; when not given, .1 in \
+     space, 0 in the plane",
     Kind::Number { above: None, least: Some(0.0), below: None, most: Some(10.0) },
     DefaultValue::Absent,
 );
@@ -128,7 +129,7 @@ fn segment_tests() -> &'static [Variant] {
     SEGMENT_TESTS
 }
 
-/// Adds what the paper reconstructs by: quadratics of 6 particles, in space of 10, without weights; where another degree is
+/// Adds what the paper reconstructs by: quadratics of 6 particles, in space of 10, without weights and normals; where another degree is
 /// given the number of particles is left to it.
 pub fn lay_paper_method(preset: &mut Map<String, Value>, given: Option<&Map<String, Value>>, is_in_space: bool) {
     preset.insert("degree".into(), json!(2));
@@ -188,6 +189,9 @@ pub struct Chosen {
     pub segments: Segments,
 }
 
+/// λ from which on the normals do what more particles would: with less, few particles are unstable.
+const NORMALS_DETERMINE: f64 = 0.1;
+
 /// What moves the front, as far as it matters to reconstructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motion {
@@ -209,14 +213,21 @@ pub fn understand(
     pointer: &str,
     dimension: usize,
     motion: Motion,
-) -> Result<(Chosen, Value), Violation> {
+) -> Result<(Chosen, Value), Vec<Violation>> {
+    let mut violations = Vec::new();
     let is_by_curvature = motion == Motion::Curvature;
     let is_low = is_by_curvature || dimension == 3;
     let degree = written.degree.unwrap_or(if is_low { 2 } else { 4 });
     let terms = if dimension == 2 { degree + 1 } else { (degree + 1) * (degree + 2) / 2 };
     if let Some(given) = written.normal_weight.filter(|given| *given > 0.0 && motion != Motion::Flow) {
-        let detail = "normals take part in reconstructions in a flow, which carries them along exactly";
-        return Err(Violation::new(format!("{pointer}/normal_weight"), "conflict", detail, &json!(given), json!(0)));
+        let detail = "normals of a surface take part in reconstructions in a flow, which carries them along exactly";
+        violations.push(Violation::new(
+            format!("{pointer}/normal_weight"),
+            "conflict",
+            detail,
+            &json!(given),
+            json!(0),
+        ));
     }
     let has_normals = dimension == 3 && motion == Motion::Flow;
     let normal_weight = written.normal_weight.unwrap_or(if has_normals { 0.1 } else { 0.0 });
@@ -226,7 +237,7 @@ pub fn understand(
         // Narrower quartics blow up slowly under curvature.
         (2, _) if is_by_curvature => 14,
         (2, _) => 8,
-        (_, _) if normal_weight > 0.0 => terms,
+        (_, _) if normal_weight >= NORMALS_DETERMINE => terms,
         (_, 2 | 3) => 16,
         _ => 24,
     });
@@ -234,7 +245,10 @@ pub fn understand(
     if neighbors < terms {
         let detail = format!("a reconstruction of degree {degree} has {terms} coefficients");
         let allowed = json!(format!("a whole number ≥ {terms}"));
-        return Err(Violation::new(format!("{pointer}/neighbors"), "range", detail, &json!(neighbors), allowed));
+        violations.push(Violation::new(format!("{pointer}/neighbors"), "range", detail, &json!(neighbors), allowed));
+    }
+    if !violations.is_empty() {
+        return Err(violations);
     }
     let topology = if written.topology.as_deref() == Some("cross") { Topology::Cross } else { Topology::Merge };
     let is_crossing = topology == Topology::Cross;

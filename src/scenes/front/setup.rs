@@ -7,7 +7,7 @@ use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
-use crate::scenes::flow_work::{Stretch, error_units, stretch};
+use crate::scenes::flow_work::{Stretch, error_units, path_units, stretch};
 use crate::scenes::flows::{Flow, flow, top_speed};
 use crate::scenes::gbpm_parameters::{self, Chosen, Motion};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
@@ -31,7 +31,7 @@ const CURVATURE_STEP: f64 = 0.5;
 const MOST_CURVATURE_STEP: f64 = 1.0;
 /// Steps in the period of a flow that turns back, at least.
 const STEPS_A_TURN: f64 = 32.0;
-/// Paths of an error in space by particle, by the cost of one of the plane: its own and three beside it, and those of samples.
+/// Paths of an error in space by particle, by the cost of a tight one, beside that: three, and those of samples.
 const PATHS_IN_SPACE: f64 = 8.0;
 /// How much larger a vortex makes a surface, about.
 const DRAWN_OUT: f64 = 4.0;
@@ -191,7 +191,7 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         Ok(understood) if violations.is_empty() => understood,
         Ok(_) => return Err(violations),
         Err(found) => {
-            violations.push(found);
+            violations.extend(found);
             return Err(violations);
         }
     };
@@ -372,14 +372,17 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         let exact = match (&self.choice.law, shapes::surface::<D>(&self.choice.shape, "/shape")) {
             (Law::Flow { flow: of }, Ok(surface)) => flow::<D>(of).map_or(0.0, |flow| {
                 let finest = Grid { spacing: self.choice.spacing }.spacing_at(self.chosen.method.levels() - 1);
-                let paths = if D == 3 { PATHS_IN_SPACE } else { 1.0 };
-                error_units(Some(surface.as_ref()), flow.as_ref(), finest, paths * particles as f64, end_time)
+                let beside = if D == 3 { PATHS_IN_SPACE * particles as f64 } else { 0.0 };
+                error_units(Some(surface.as_ref()), flow.as_ref(), finest, particles as f64, end_time)
+                    + path_units(flow.as_ref(), beside, end_time)
             }),
             _ => particles as f64,
         };
+        // Of a fit, for each of its particles.
+        let rows = if self.chosen.method.normal_weight > 0.0 { 1 + M } else { 1 };
         let mut work = vec![
             PhaseWork::every_step("front/motion", number),
-            PhaseWork::every_step("front/resampling", number * self.chosen.method.neighbors as f64),
+            PhaseWork::every_step("front/resampling", number * (self.chosen.method.neighbors * rows) as f64),
             PhaseWork::every_step("front/topology", number),
             PhaseWork::at_moments("errors", exact),
         ];

@@ -64,7 +64,7 @@ impl<const M: usize> Terms<M> {
         LocalGraph { terms: self, coefficients: [0.0; MOST_TERMS] }
     }
 
-    /// The least-squares fit to one quantity at s_j with weights exp(−k |s_j|²), and with λ times as much weight to its slopes
+    /// The least-squares fit to one quantity at s_j with weights exp(−k |s_j|²), and with λ² times as much weight to its slopes
     /// there, where there are any (one for each point then, None where the front is too steep); None where the points do not
     /// determine it.
     pub fn fit(

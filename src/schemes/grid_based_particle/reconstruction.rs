@@ -47,7 +47,7 @@ pub enum Failure {
     Undetermined,
     /// The closest point lies beyond the particles.
     Extrapolated,
-    /// The front turns too sharply for the spacing.
+    /// The front turns too sharply for the spacing, or the polynomial has not the directions of its particles.
     Unresolved,
     /// The closest point lies behind another segment, its particles do not.
     Swept,

@@ -36,7 +36,7 @@ pub struct Removals {
     pub starved: u64,
     /// Grid points whose foot-point would lie beyond all particles.
     pub extrapolated: u64,
-    /// Grid points where the front turns too sharply for the spacing.
+    /// Grid points where the front turns too sharply for the spacing, or where a fit in a flow misses its particles' directions.
     pub unresolved: u64,
     /// Particles that another segment has passed.
     pub swept: u64,
@@ -81,8 +81,7 @@ pub(super) type Outcome<const D: usize> = Result<FootPoint<D>, Failure>;
 impl<const D: usize, const M: usize> FrontSystem<D, M> {
     /// 1. The moved particles are sorted into cells, and the grid is refined where they need it. 2. Each proposes the grid points
     ///    about it. 3. Each of these gets the closest point of its local reconstruction. 4. Those within the tube are the new
-    ///    foot-points. 5. Where every particle is exact by itself, in a flow and with a given speed, one that nothing has
-    ///    replaced stays.
+    ///    foot-points. 5. Where every particle is exact by itself, in a flow, one that nothing has replaced stays.
     pub(super) fn resample(&mut self) -> Result<(), Interrupted> {
         self.sort_cells();
         self.refine()?;

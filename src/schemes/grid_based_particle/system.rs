@@ -51,7 +51,7 @@ pub struct FrontSystem<const D: usize, const M: usize> {
     pub(super) outcomes: Vec<Outcome<D>>,
     pub(super) rooms: PerThread<Room<D, M>>,
     pub(super) refinement: Refinement,
-    /// Of every moved particle, whether it is next to a gap or at the end of its segment.
+    /// Of every moved particle, whether it is next to a gap or at the end of its segment, in a flow.
     pub(super) at_gap: Vec<bool>,
     pub(super) removals: Removals,
     /// Which particles stay.
