@@ -111,16 +111,14 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
 
     /// The grid points that the particles have about them, each once and in order: of each level those of cells without parts.
     fn propose(&mut self) {
-        let width = self.parts.method.tube_radius + MARGIN;
-        let levels = self.parts.method.levels();
         let mut proposals = std::mem::take(&mut self.proposals);
         proposals.resize_with(self.feet.len().div_ceil(PROPOSING).max(proposals.len()), Proposals::default);
         proposals.par_iter_mut().enumerate().for_each(|(block, proposals)| {
-            *proposals = Proposals { nodes: std::mem::take(&mut proposals.nodes), outside: 0 };
             proposals.nodes.clear();
+            proposals.outside = 0;
             let end = ((block + 1) * PROPOSING).min(self.feet.len());
             for i in block * PROPOSING..end {
-                self.propose_about(i, (width, levels), proposals);
+                self.propose_about(i, proposals);
             }
             proposals.nodes.sort_unstable();
             proposals.nodes.dedup();
@@ -136,10 +134,11 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     }
 
     /// Those about one particle.
-    fn propose_about(&self, i: usize, (width, levels): (f64, u32), proposals: &mut Proposals) {
+    fn propose_about(&self, i: usize, proposals: &mut Proposals) {
         let grid = self.parts.grid;
+        let width = self.parts.method.tube_radius + MARGIN;
         let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
-        if grid.nearest(y, levels - 1).is_none() {
+        if grid.nearest(y, self.parts.method.levels() - 1).is_none() {
             // Where particles are exact by themselves it is looked at again below.
             proposals.outside += u64::from(!self.parts.law.keeps_particles_exact());
             return;
