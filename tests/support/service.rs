@@ -282,12 +282,13 @@ pub fn eventually<R>(what: &str, patience: Duration, mut look: impl FnMut() -> O
     }
 }
 
-/// A job of about two seconds with frames, series and many checkpoints, whose physics feeds back into itself.
+/// A job of up to two seconds with frames, series and twelve checkpoints on any machine, whose physics feeds back into
+/// itself.
 pub fn steady_job() -> Value {
     json!({
         "scene": {"kind": "redistance", "spacing": 0.03125, "repeat": 240},
         "output": {"every_time": 60, "series_every_steps": 7},
-        "checkpoint": {"every_wall_s": 0.05}
+        "checkpoint": {"every_steps": 20}
     })
 }
 

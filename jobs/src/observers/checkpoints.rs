@@ -71,3 +71,20 @@ impl Checkpoints {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn they_are_due_by_the_clock_by_steps_and_on_request_but_once_a_step() {
+        let new = |every, steps| Checkpoints::new(PathBuf::new(), String::new(), Value::Null, every, steps);
+        let (always, later) = (new(Some(0.0), None), new(Some(3600.0), None));
+        assert!(always.is_due(1, false) && !later.is_due(1, false) && later.is_due(1, true));
+        assert!(!always.is_due(0, false), "the initial state is not worth one");
+        let mut by_steps = new(None, Some(20));
+        assert_eq!((0..=60).filter(|step| by_steps.is_due(*step, false)).collect::<Vec<_>>(), [20, 40, 60]);
+        by_steps.last_step = Some(40);
+        assert!(!by_steps.is_due(40, true));
+    }
+}

@@ -33,6 +33,9 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     if mesh.points.is_empty() {
         return Err("there are no points".to_owned());
     }
+    if !mesh.normals.is_empty() && mesh.normals.len() != mesh.points.len() {
+        return Err(format!("{} of {} points have normals", mesh.normals.len(), mesh.points.len()));
+    }
     if let Some(k) = mesh.points.iter().chain(&mesh.normals).position(|p| p.iter().any(|c| !c.is_finite())) {
         return Err(format!("coordinate {} is not finite", k % mesh.points.len()));
     }
@@ -86,9 +89,6 @@ fn xyz(text: &str) -> Result<Mesh, String> {
             }
             other => return Err(format!("line {} has {} numbers; 2, 3 or 6 are understood", k + 1, other.len())),
         }
-    }
-    if !mesh.normals.is_empty() && mesh.normals.len() != mesh.points.len() {
-        return Err(format!("{} of {} points have normals", mesh.normals.len(), mesh.points.len()));
     }
     Ok(mesh)
 }
@@ -356,6 +356,13 @@ mod tests {
             ("nan 0 0\n", "not finite"),
             ("v 0 0 0\nf 1 2 3\n", "line 2"),
             ("", "no points"),
+            ("0 0 0\n1 0 0 0 0 1\n", "1 of 2 points have normals"),
+            (
+                "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nproperty int nx\n\
+                 property int ny\nproperty int nz\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\n\
+                 end_header\n0 0 0 1 0 0\n1 0 0\n",
+                "1 of 2 points have normals",
+            ),
             ("ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n", "at most"),
             ("ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nend_header\n1\n", "too soon"),
         ] {

@@ -4,7 +4,7 @@ use crate::common::Expected;
 use crate::support::{Service, chance, eventually, signal, steady_job};
 use rustix::process::Signal;
 use serde_json::json;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Kills of the service under load: no acknowledged job is lost, doubled or stuck, and all data are those of an
 /// undisturbed run.
@@ -55,7 +55,10 @@ pub fn of_workers(count: u64, seed: u64) -> String {
     let directory = tempfile::tempdir().unwrap();
     let service = Service::start(directory.path(), &["--slots", "2", "--threads", "2"]);
     let body = steady_job();
+    let start = Instant::now();
     let expected = Expected::of(&service, &body);
+    // Moments are parts of what a run takes here: on a faster machine too, most of them come before its end.
+    let whole = start.elapsed().as_secs_f64();
     let mut kills = 0;
     let mut round = 0;
     let mut repeated = 0_u64;
@@ -68,7 +71,7 @@ pub fn of_workers(count: u64, seed: u64) -> String {
                 let attempt = service.job(id)["attempt"].as_u64().unwrap().max(1);
                 service.wait_for(id, &["running", "succeeded"]);
                 let moment = chance(seed, round * 100 + 10 * k as u64 + death);
-                std::thread::sleep(Duration::from_secs_f64(0.5 * moment));
+                std::thread::sleep(Duration::from_secs_f64(0.6 * whole * moment));
                 if let Some(pid) = service.worker(id) {
                     signal(pid, Signal::KILL);
                     kills += 1;
