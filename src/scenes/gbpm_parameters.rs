@@ -9,14 +9,14 @@ use serde_json::{Map, Value, json};
 /// Degree of the reconstructions.
 pub const DEGREE: Parameter = Parameter::new(
     "degree",
-    "degree of the local reconstructions; when not given, 4 in the plane and 2 in space and under mean_curvature",
+    "degree of the local reconstructions; when not given, 4 in the plane and 2 in space",
     Kind::Integer { least: 2, most: 4 },
     DefaultValue::Absent,
 );
 /// Particles of a reconstruction.
 pub const NEIGHBORS: Parameter = Parameter::new(
     "neighbors",
-    "particles of a reconstruction; when not given, 8 (6 of degree 2, 14 of degree 4 under mean_curvature) in the plane; in space as many as coefficients where normals weigh .1 or more, 16 (24 of degree 4) else",
+    "particles of a reconstruction; when not given, 8 (6 of degree 2, 10 of degree 4 under mean_curvature) in the plane; in space as many as coefficients where normals weigh .1 or more, 16 (24 of degree 4) else",
     Kind::Integer { least: 3, most: 60 },
     DefaultValue::Absent,
 );
@@ -216,8 +216,7 @@ pub fn understand(
 ) -> Result<(Chosen, Value), Vec<Violation>> {
     let mut violations = Vec::new();
     let is_by_curvature = motion == Motion::Curvature;
-    let is_low = is_by_curvature || dimension == 3;
-    let degree = written.degree.unwrap_or(if is_low { 2 } else { 4 });
+    let degree = written.degree.unwrap_or(if dimension == 2 { 4 } else { 2 });
     let terms = if dimension == 2 { degree + 1 } else { (degree + 1) * (degree + 2) / 2 };
     if let Some(given) = written.normal_weight.filter(|given| *given > 0.0 && motion != Motion::Flow) {
         let detail = "normals of a surface take part in reconstructions in a flow, which carries them along exactly";
@@ -235,7 +234,7 @@ pub fn understand(
         (2, 2) => 6,
         (2, 3) => 7,
         // Narrower quartics blow up slowly under curvature.
-        (2, _) if is_by_curvature => 14,
+        (2, 4) if is_by_curvature => 10,
         (2, _) => 8,
         (_, _) if normal_weight >= NORMALS_DETERMINE => terms,
         (_, 2 | 3) => 16,

@@ -26,9 +26,9 @@ const FLOW_CFL: f64 = 10.0;
 const SPEED_CFL: f64 = 0.75;
 /// The same for rays.
 const RAY_CFL: f64 = 2.0;
-/// dt/h² under motion by curvature, and at most: a little more blows up slowly, much more at once.
+/// dt/h² under motion by curvature, and at most with four and with two stages: a little more blows up slowly, much more at once.
 const CURVATURE_STEP: f64 = 0.5;
-const MOST_CURVATURE_STEP: f64 = 1.0;
+const MOST_CURVATURE_STEP: [f64; 2] = [0.8, 0.6];
 /// Steps in the period of a flow that turns back, at least.
 const STEPS_A_TURN: f64 = 32.0;
 /// Paths of an error in space by particle, by the cost of a tight one, beside that: three, and those of samples.
@@ -162,9 +162,12 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
         violations.push(Violation::new("/spacing", "range", detail, &json!(choice.spacing), json!("a larger number")));
     }
-    let longest = MOST_CURVATURE_STEP * finest * finest;
+    let [of_four, of_two] = MOST_CURVATURE_STEP;
+    let factor = if matches!(choice.integrator, PathIntegrator::TvdRk2) { of_two } else { of_four };
+    let longest = factor * finest * finest;
     if is_by_curvature && let Some(step) = choice.time_step.filter(|step| *step > longest) {
-        let detail = "motion by curvature is unstable with steps longer than the square of the (finest) spacing";
+        let detail =
+            format!("motion by curvature is unstable with steps longer than {factor} h² (of the finest level)");
         let allowed = json!(format!("a number ≤ {longest:e}"));
         violations.push(Violation::new("/time_step", "range", detail, &json!(step), allowed));
     }

@@ -41,6 +41,11 @@ impl<const D: usize> Law<D> {
         }
     }
 
+    /// Whether bends go by themselves, the sharper the sooner.
+    pub(super) fn rounds_bends(&self) -> bool {
+        matches!(self, Self::MeanCurvature)
+    }
+
     /// Whether a corner becomes round, seen from a grid point at a distance on the side where it is the closest point:
     /// where it moves towards that side, and always by its curvature.
     pub(super) fn opens_corners(&self, distance: f64) -> bool {

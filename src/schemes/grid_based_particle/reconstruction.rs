@@ -19,6 +19,10 @@ const MOST_EXTRAPOLATION: f64 = 0.3;
 const LEAST_AGREEMENT: f64 = 0.2;
 /// Cosine of normals within a stencil below which the front turns too much for the degree asked for.
 const TURNED: f64 = 0.7;
+/// The same where the front rounds its bends by itself: a wide polynomial that does not resolve one rounds it too slowly.
+const BENT: f64 = 0.9;
+/// Particles of the quadratic that takes its place there, on a curve and on a surface.
+const IN_BENDS: [usize; 2] = [6, 16];
 /// How far from the nearest of its particles an answer may lie, in spacings: past the last of them, and between two.
 const MOST_LONELY: f64 = 1.0;
 /// The largest |κ| h of a front that its particles resolve.
@@ -166,8 +170,8 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
     }
 
-    /// The closest point of one segment, in units of the coarser spacing of grid point and base: with more particles where
-    /// those taken do not determine the polynomial well, as on two rows of a lattice, and then by a quadratic.
+    /// The closest point of one segment, in units of the coarser spacing of grid point and base. By its curvature a bend that the
+    /// stencil does not resolve gets a narrow quadratic instead of a polynomial of the degree asked for.
     fn of_segment(
         &self,
         p: &Vector<D>,
@@ -176,18 +180,45 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         reach: &mut f64,
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
-        let mut number = self.method.neighbors;
-        while number <= 2 * self.method.neighbors {
+        let number = self.method.neighbors;
+        if self.terms.count() > self.quadratic.count() && self.law.rounds_bends() {
             self.take(p, base, (number, unit), reach, room);
-            let found = self.with_particles(p, base, self.terms, unit, room);
+            if self.straightest(base, room) < BENT {
+                let narrow = IN_BENDS[M - 1].min(number);
+                return self.of_degree(p, base, (self.quadratic, narrow, unit), reach, room);
+            }
+        }
+        self.of_degree(p, base, (self.terms, number, unit), reach, room)
+    }
+
+    /// The same by polynomials of a degree: with more particles where those taken do not determine one well, as on two rows of a
+    /// lattice, and then by a quadratic.
+    fn of_degree(
+        &self,
+        p: &Vector<D>,
+        base: usize,
+        (terms, least, unit): (&Terms<M>, usize, f64),
+        reach: &mut f64,
+        room: &mut Room<D, M>,
+    ) -> Result<FootPoint<D>, Failure> {
+        let mut number = least;
+        while number <= 2 * least {
+            self.take(p, base, (number, unit), reach, room);
+            let found = self.with_particles(p, base, terms, unit, room);
             if found != Err(Failure::Undetermined) {
                 return found;
             }
-            number += self.method.neighbors.div_ceil(2);
+            number += least.div_ceil(2);
         }
         // At the end of a segment particles of one side determine a quadratic still.
-        self.take(p, base, (self.method.neighbors, unit), reach, room);
+        self.take(p, base, (least, unit), reach, room);
         self.with_particles(p, base, self.quadratic, unit, room)
+    }
+
+    /// The least cosine between the normal of the base and those of the particles chosen.
+    fn straightest(&self, base: usize, room: &Room<D, M>) -> f64 {
+        let normals = &self.feet.normals;
+        room.chosen.iter().map(|j| normals[*j].dot(&normals[base])).fold(1.0, f64::min)
     }
 
     /// Chooses so many particles, from farther away where too few are near.
@@ -214,9 +245,8 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
             return Err(Failure::Starved);
         }
         let normals = &self.feet.normals;
-        let straightest = room.chosen.iter().map(|j| normals[*j].dot(&normals[base])).fold(1.0, f64::min);
         let mut first = Err(Failure::Unresolved);
-        if straightest > TURNED {
+        if self.straightest(base, room) > TURNED {
             first = self.fit(p, base, (&normals[base], terms), unit, room);
             if first.is_ok() || first == Err(Failure::Undetermined) {
                 return first;
