@@ -3,11 +3,18 @@
 //! Every loop computes each item from inputs that the loop does not change and writes it once, so results do not
 //! depend on how items are shared out among threads.
 
+use rayon::iter::{IndexedParallelIterator, MaxLen};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Items per task of a parallel loop: small enough to balance and to notice an interrupt soon.
 pub const BLOCK: usize = 32;
+
+/// The blocks of a parallel loop, each a task of its own: of the halves of halves that are shared out otherwise the last one keeps one
+/// thread busy while the others wait, at the end of every loop.
+pub fn one_by_one<I: IndexedParallelIterator>(blocks: I) -> MaxLen<I> {
+    blocks.with_max_len(1)
+}
 
 /// Asks a running step to be dropped. Clones share the flag.
 #[derive(Debug, Clone, Default)]
@@ -42,21 +49,26 @@ impl Interrupt {
 /// One reusable value for each thread of the pool that runs the loop.
 #[derive(Debug)]
 pub struct PerThread<T> {
-    slots: Vec<Mutex<T>>,
+    slots: Vec<Slot<T>>,
 }
+
+/// Cache lines of its own, two since they are fetched in pairs: threads that write side by side would wait for each other.
+#[derive(Debug, Default)]
+#[repr(align(128))]
+struct Slot<T>(Mutex<T>);
 
 impl<T: Default> PerThread<T> {
     /// Values for the pool of the current thread.
     #[must_use]
     pub fn new() -> Self {
-        Self { slots: (0..=rayon::current_num_threads()).map(|_| Mutex::default()).collect() }
+        Self { slots: (0..=rayon::current_num_threads()).map(|_| Slot::default()).collect() }
     }
 
     /// Lends this thread's value. Threads outside the pool share the last one.
     pub fn with<R>(&self, work: impl FnOnce(&mut T) -> R) -> R {
         let last = self.slots.len() - 1;
         let index = rayon::current_thread_index().unwrap_or(last).min(last);
-        let mut slot = self.slots[index].lock().unwrap_or_else(PoisonError::into_inner);
+        let mut slot = self.slots[index].0.lock().unwrap_or_else(PoisonError::into_inner);
         work(&mut slot)
     }
 }

@@ -91,6 +91,11 @@ impl Grid {
             .fold(level, |node, (d, c)| node | ((c + offset::<D>()) as u64) << (bits::<D>() * d as u32))
     }
 
+    /// What the next cell along an axis has more in its number.
+    pub(super) fn next_along<const D: usize>(axis: usize) -> Node {
+        1 << (bits::<D>() * axis as u32)
+    }
+
     /// The coordinates of a grid point.
     #[must_use]
     pub fn coordinates<const D: usize>(node: Node) -> [i64; D] {

@@ -3,7 +3,7 @@
 use super::foot_points::FootPoints;
 use crate::geometry::frame::{across, tangents};
 use crate::geometry::{Flow, Vector};
-use crate::parallel::{BLOCK, Interrupt, Interrupted};
+use crate::parallel::{BLOCK, Interrupt, Interrupted, one_by_one};
 use crate::time::PathIntegrator;
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
 
@@ -74,7 +74,7 @@ pub(super) fn carry<const D: usize, const M: usize>(
 ) -> Result<f64, Interrupted> {
     let offset = OFFSET * spacing;
     let blocks = feet.positions.par_chunks_mut(BLOCK).zip(feet.normals.par_chunks_mut(BLOCK));
-    let longest = blocks
+    let longest = one_by_one(blocks)
         .map(|(positions, normals)| {
             if interrupt.is_raised() {
                 return 0.0;

@@ -6,12 +6,12 @@
 use super::foot_points::FootPoint;
 use super::grid::{Grid, Node};
 use super::reconstruction::{Failure, Reconstruction, Room};
-use super::refinement::Window;
+use super::refinement::{Hints, Window};
 use super::system::FrontSystem;
 use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
 use crate::neighbors::NeighborSearch;
-use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
+use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread, one_by_one};
 use rayon::prelude::{
     IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator, ParallelSlice, ParallelSliceMut,
 };
@@ -72,6 +72,7 @@ impl Removals {
 #[derive(Debug, Default)]
 pub(super) struct Proposals {
     nodes: Vec<Node>,
+    hints: Hints,
     outside: u64,
 }
 
@@ -113,7 +114,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     fn propose(&mut self) {
         let mut proposals = std::mem::take(&mut self.proposals);
         proposals.resize_with(self.feet.len().div_ceil(PROPOSING).max(proposals.len()), Proposals::default);
-        proposals.par_iter_mut().enumerate().for_each(|(block, proposals)| {
+        one_by_one(proposals.par_iter_mut().enumerate()).for_each(|(block, proposals)| {
             proposals.nodes.clear();
             proposals.outside = 0;
             let end = ((block + 1) * PROPOSING).min(self.feet.len());
@@ -135,12 +136,13 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
 
     /// Those about one particle.
     fn propose_about(&self, i: usize, proposals: &mut Proposals) {
+        let Proposals { nodes, hints, outside } = proposals;
         let grid = self.parts.grid;
         let width = self.parts.method.tube_radius + MARGIN;
         let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
         if grid.nearest(y, self.parts.method.levels() - 1).is_none() {
             // Where particles are exact by themselves it is looked at again below.
-            proposals.outside += u64::from(!self.parts.law.keeps_particles_exact());
+            *outside += u64::from(!self.parts.law.keeps_particles_exact());
             return;
         }
         let own = grid.spacing_of(self.feet.nodes[i]);
@@ -150,16 +152,17 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             let (across, along) = (width * spacing, farthest.max(ALONG * spacing));
             let reach = across.hypot(along);
             let corner = |side: f64| grid.nearest(&y.add_scalar(side), level);
-            Some(Window { low: corner(-reach)?, high: corner(reach)?, across, along })
+            let (low, high) = (corner(-reach)?, corner(reach)?);
+            Some(Window { low, high, across, along, spacing, first: grid.center(&low, level) - y })
         };
-        self.refinement.for_each_leaf_in(window, |at, level, window| {
-            let d = grid.center(at, level) - y;
+        self.refinement.for_each_leaf_in(hints, window, |at, level, window| {
+            let d = window.from_particle(at);
             // Of the squares along the direction and across it, one is that along the front.
             let by_direction = d.dot(n).powi(2);
             let rest = d.norm_squared() - by_direction;
             let (height, way) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
             if height <= window.across * window.across && way <= window.along * window.along {
-                proposals.nodes.push(Grid::node(at, level));
+                nodes.push(Grid::node(at, level));
             }
         });
     }
@@ -172,7 +175,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         // Only a flow draws particles apart that nothing else replaces.
         let looked_at = if self.parts.law.keeps_particles_exact() { &mut at_gap[..] } else { &mut [] };
         let interrupt = &self.parts.interrupt;
-        looked_at.par_chunks_mut(BLOCK).enumerate().for_each(|(block, at_gap)| {
+        one_by_one(looked_at.par_chunks_mut(BLOCK).enumerate()).for_each(|(block, at_gap)| {
             for (k, is_at_gap) in at_gap.iter_mut().enumerate() {
                 if interrupt.is_raised() {
                     return;
@@ -235,7 +238,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         let mut keep = std::mem::take(&mut self.keep);
         keep.clear();
         keep.resize(self.feet.len(), false);
-        keep.par_chunks_mut(BLOCK).enumerate().for_each(|(block, keep)| {
+        one_by_one(keep.par_chunks_mut(BLOCK).enumerate()).for_each(|(block, keep)| {
             for (k, keep) in keep.iter_mut().enumerate() {
                 *keep = !self.is_replaced(block * BLOCK + k);
             }
@@ -275,7 +278,8 @@ pub(super) fn fill<const D: usize, const M: usize, T: Sync>(
     interrupt: &Interrupt,
     place: impl Fn(usize, &T) -> (Vector<D>, f64) + Sync,
 ) -> Result<(), Interrupted> {
-    items.par_chunks(BLOCK).zip(outcomes.par_chunks_mut(BLOCK)).enumerate().for_each(|(block, (items, outcomes))| {
+    let blocks = items.par_chunks(BLOCK).zip(outcomes.par_chunks_mut(BLOCK)).enumerate();
+    one_by_one(blocks).for_each(|(block, (items, outcomes))| {
         if interrupt.is_raised() {
             return;
         }

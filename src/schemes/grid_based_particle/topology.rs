@@ -9,7 +9,7 @@ use super::grid::Grid;
 use super::method::FrontMethod;
 use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
-use crate::parallel::{BLOCK, Interrupt, Interrupted};
+use crate::parallel::{BLOCK, Interrupt, Interrupted, one_by_one};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
 
 /// What happens where two segments of a front meet.
@@ -70,7 +70,7 @@ pub(super) fn mark_unswept<const D: usize>(
 ) -> Result<(), Interrupted> {
     keep.clear();
     keep.resize(feet.len(), true);
-    keep.par_chunks_mut(BLOCK).enumerate().for_each(|(block, keep)| {
+    one_by_one(keep.par_chunks_mut(BLOCK).enumerate()).for_each(|(block, keep)| {
         for (k, keep) in keep.iter_mut().enumerate() {
             if interrupt.is_raised() {
                 return;
