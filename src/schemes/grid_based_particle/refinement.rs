@@ -49,7 +49,7 @@ pub(super) struct Window<const D: usize> {
 
 impl<const D: usize> Window<D> {
     /// A grid point as the particle sees it.
-    pub fn from_particle(&self, at: &[i64; D]) -> Vector<D> {
+    pub fn seen_at(&self, at: &[i64; D]) -> Vector<D> {
         Vector::<D>::from_fn(|d, _| self.first[d] + (at[d] - self.low[d]) as f64 * self.spacing)
     }
 }

@@ -156,7 +156,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
             Some(Window { low, high, across, along, spacing, first: grid.center(&low, level) - y })
         };
         self.refinement.for_each_leaf_in(hints, window, |at, level, window| {
-            let d = window.from_particle(at);
+            let d = window.seen_at(at);
             // Of the squares along the direction and across it, one is that along the front.
             let by_direction = d.dot(n).powi(2);
             let rest = d.norm_squared() - by_direction;
