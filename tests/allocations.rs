@@ -80,6 +80,12 @@ fn steps_allocate_nothing_after_warm_up() {
             "law": {"type": "flow", "flow": {"type": "translation", "velocity": [1, 0.5, 0.25]}},
             "shape": {"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25}
         }),
+        // On a refined grid.
+        json!({
+            "kind": "front", "spacing": 0.03, "end_time": 0.24, "time_step": 0.02, "adaptivity": {"levels": 3},
+            "law": {"type": "flow", "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 2}},
+            "shape": {"type": "circle", "center": [0.5, 0.5], "radius": 0.2}
+        }),
     ];
     let plan = meniscus::simulation::OutputPlan { every_time: None, series_every_steps: 1000 };
     for body in bodies {

@@ -170,8 +170,9 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
     }
 
-    /// The closest point of one segment, in units of the coarser spacing of grid point and base. By its curvature a bend that the
-    /// stencil does not resolve gets a narrow quadratic instead of a polynomial of the degree asked for.
+    /// The closest point of one segment, in units of the coarser spacing of grid point and base: with more particles where
+    /// those taken do not determine the polynomial well, as on two rows of a lattice, and then by a quadratic. Under motion by
+    /// curvature a bend that the stencil does not resolve gets a quadratic of the nearest of them at once.
     fn of_segment(
         &self,
         p: &Vector<D>,
@@ -180,35 +181,24 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         reach: &mut f64,
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
-        let number = self.method.neighbors;
-        if self.terms.count() > self.quadratic.count() && self.law.rounds_bends() {
-            self.take(p, base, (number, unit), reach, room);
-            if self.straightest(base, room) < BENT {
-                let narrow = IN_BENDS[M - 1].min(number);
-                return self.of_degree(p, base, (self.quadratic, narrow, unit), reach, room);
-            }
+        let (mut terms, mut least) = (self.terms, self.method.neighbors);
+        self.take(p, base, (least, unit), reach, room);
+        let is_wide = terms.count() > self.quadratic.count();
+        if is_wide && self.law.rounds_bends() && self.straightest(base, room) < BENT {
+            (terms, least) = (self.quadratic, IN_BENDS[M - 1].min(least));
+            room.chosen.truncate(least);
         }
-        self.of_degree(p, base, (self.terms, number, unit), reach, room)
-    }
-
-    /// The same by polynomials of a degree: with more particles where those taken do not determine one well, as on two rows of a
-    /// lattice, and then by a quadratic.
-    fn of_degree(
-        &self,
-        p: &Vector<D>,
-        base: usize,
-        (terms, least, unit): (&Terms<M>, usize, f64),
-        reach: &mut f64,
-        room: &mut Room<D, M>,
-    ) -> Result<FootPoint<D>, Failure> {
         let mut number = least;
-        while number <= 2 * least {
-            self.take(p, base, (number, unit), reach, room);
+        loop {
             let found = self.with_particles(p, base, terms, unit, room);
+            number += least.div_ceil(2);
             if found != Err(Failure::Undetermined) {
                 return found;
             }
-            number += least.div_ceil(2);
+            if number > 2 * least {
+                break;
+            }
+            self.take(p, base, (number, unit), reach, room);
         }
         // At the end of a segment particles of one side determine a quadratic still.
         self.take(p, base, (least, unit), reach, room);
