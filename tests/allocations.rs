@@ -6,6 +6,7 @@
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
+use meniscus::simulation::FieldValues;
 use serde_json::json;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -84,7 +85,11 @@ fn steps_allocate_nothing_after_warm_up() {
         json!({
             "kind": "front", "spacing": 0.03, "end_time": 0.24, "time_step": 0.02, "adaptivity": {"levels": 3},
             "law": {"type": "flow", "flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 2}},
-            "shape": {"type": "circle", "center": [0.5, 0.5], "radius": 0.2}
+            "shape": {"type": "ellipse", "center": [0.5, 0.5], "semi_axes": [0.3, 0.15]}
+        }),
+        json!({
+            "kind": "front", "spacing": 0.015625, "end_time": 0.0012, "time_step": 1e-4, "law": "mean_curvature",
+            "shape": {"type": "ellipse", "center": [0.5, 0.5], "semi_axes": [0.3, 0.1]}
         }),
     ];
     let plan = meniscus::simulation::OutputPlan { every_time: None, series_every_steps: 1000 };
@@ -94,6 +99,12 @@ fn steps_allocate_nothing_after_warm_up() {
             let mut simulation = build(&body, plan);
             for _ in 0..6 {
                 simulation.step().unwrap();
+            }
+            if body.get("adaptivity").is_some() {
+                let fields = simulation.fields();
+                let level = fields.columns.iter().find(|column| column.name == "level").unwrap();
+                let FieldValues::Scalar(levels) = &level.values else { panic!("numbers") };
+                assert!(levels.iter().any(|level| *level != levels[0]), "nothing is refined");
             }
             for step in 7..12 {
                 let before = ALLOCATIONS.get();

@@ -99,7 +99,7 @@ fn front_bodies() -> Vec<Value> {
         front(json!({"shape": square, "law": {"type": "normal", "speed": -1}, "preset": "paper"})),
         front(json!({"law": "mean_curvature", "time_step": 8e-4, "end_time": 0.008, "shape": square})),
         front(
-            json!({"law": "mean_curvature", "integrator": "tvd_rk2", "time_step": 8e-4, "end_time": 0.008, "shape": sphere(0.5)}),
+            json!({"law": "mean_curvature", "integrator": "tvd_rk2", "time_step": 6e-4, "end_time": 0.006, "shape": sphere(0.5)}),
         ),
         // It vanishes on the way.
         front(json!({"shape": {"type": "circle", "radius": 0.06}, "law": {"type": "normal", "speed": -1}})),

@@ -133,14 +133,12 @@ fn obj(text: &str) -> Result<Mesh, String> {
             _ => {}
         }
     }
-    if !mesh.points.is_empty() && given.len() == mesh.points.len() {
+    if !given.is_empty() {
+        // Those that faces give to some points only are refused where all formats are.
         let of_point = |k: u32| given.get(&k).and_then(|normal| normals.get(*normal)).copied();
         mesh.normals = (0..mesh.points.len() as u32).filter_map(of_point).collect();
-    } else if normals.len() == mesh.points.len() && given.is_empty() {
+    } else if normals.len() == mesh.points.len() {
         mesh.normals = normals;
-    }
-    if mesh.normals.len() != mesh.points.len() {
-        mesh.normals.clear();
     }
     Ok(mesh)
 }
@@ -357,6 +355,7 @@ mod tests {
             ("v 0 0 0\nf 1 2 3\n", "line 2"),
             ("", "no points"),
             ("0 0 0\n1 0 0 0 0 1\n", "1 of 2 points have normals"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3\n", "2 of 3 points have normals"),
             (
                 "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nproperty int nx\n\
                  property int ny\nproperty int nz\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\n\

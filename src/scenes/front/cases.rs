@@ -61,6 +61,11 @@ pub(super) fn by_curvature(cells: u32, end_time: f64, more: &Value) -> Value {
     with(front(cells, &json!({"law": "mean_curvature", "shape": circle, "end_time": end_time})), more)
 }
 
+pub(super) fn sphere_by_curvature(cells: u32, end_time: f64, more: &Value) -> Value {
+    let sphere = json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.4});
+    by_curvature(cells, end_time, &with(json!({"shape": sphere}), more))
+}
+
 pub(super) fn balls(cells: u32, kind: &str, end_time: f64, more: &Value) -> Value {
     let ball = |c: f64| {
         let center = if kind == "circle" { json!([c, c]) } else { json!([c, c, c]) };
@@ -115,10 +120,37 @@ pub(super) fn coarsened() -> Value {
     json!({"cfl": 24, "adaptivity": {"levels": 4, "curvature_constant": 0.05}})
 }
 
+fn torus() -> Value {
+    json!({"type": "torus", "center": [0.5, 0.5, 0.5], "major_radius": 0.25, "minor_radius": 0.1})
+}
+
 /// A ring that grows until it has no hole.
 pub(super) fn ring() -> Value {
-    let shape = json!({"type": "torus", "center": [0.5, 0.5, 0.5], "major_radius": 0.25, "minor_radius": 0.1});
-    front(50, &json!({"shape": shape, "end_time": 0.4}))
+    front(50, &json!({"shape": torus(), "end_time": 0.4}))
+}
+
+/// The same by its mean curvature, which collapses everywhere at once.
+pub(super) fn ring_by_curvature() -> Value {
+    front(50, &json!({"shape": torus(), "law": "mean_curvature", "end_time": 0.007}))
+}
+
+/// A thin body whose corners collapse to points, and it with them.
+pub(super) fn collapsing() -> Value {
+    let shape = json!({"type": "box", "center": [0.5, 0.5], "size": [0.6, 0.06]});
+    front(128, &json!({"shape": shape, "law": {"type": "normal", "speed": -1}, "end_time": 0.06}))
+}
+
+/// Two circles that touch, but for a rounding error.
+pub(super) fn touching() -> Value {
+    let circle = |x: f64| json!({"type": "circle", "center": [x, 0.5], "radius": 0.1});
+    let shape = json!({"type": "union", "of": [circle(0.4), circle(0.6 + 1e-9)]});
+    front(128, &json!({"shape": shape, "end_time": 0.05}))
+}
+
+/// A front that leaves any grid.
+pub(super) fn leaving() -> Value {
+    let law = json!({"type": "flow", "flow": {"type": "translation", "velocity": [1e9, 0]}});
+    front(128, &json!({"law": law, "end_time": 0.1, "time_step": 0.05}))
 }
 
 pub(super) fn three_spheres() -> Value {

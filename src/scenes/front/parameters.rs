@@ -73,10 +73,16 @@ fn laws() -> &'static [Variant] {
 /// What section 4 states.
 pub(super) fn preset(_name: &str, given: &Map<String, Value>) -> Map<String, Value> {
     let mut preset = Map::new();
-    gbpm_parameters::lay_paper_method(&mut preset, Some(given), shapes::is_in_space(given));
+    let is_in_space = shapes::is_in_space(given);
+    gbpm_parameters::lay_paper_method(&mut preset, Some(given), is_in_space);
     preset.insert("integrator".into(), json!("tvd_rk2"));
     let law = given.get("law").map(|law| law.get("type").unwrap_or(law));
-    if !given.contains_key("time_step") && law != Some(&json!("mean_curvature")) {
+    let is_by_curvature = law == Some(&json!("mean_curvature"));
+    if is_by_curvature && is_in_space {
+        // The paper's ten of a surface blow up with its own step.
+        preset.remove("neighbors");
+    }
+    if !given.contains_key("time_step") && !is_by_curvature {
         preset.insert("cfl".into(), json!(0.75));
     }
     preset

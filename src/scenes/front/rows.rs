@@ -1,9 +1,10 @@
 //! The rows of `front`, and of `vortex` with grid-based particles: GBPM paper, section 4.
 
 use super::cases::{
-    adaptive, along_exact_paths, balls, by_curvature, by_parameter, coarsened, disk, dumbbell, front, levels, onward,
-    onward_in_space, optics, other_square, ring, rotated, square, square_shape, still, still_sphere, three_spheres,
-    translated, vortex, vortex_in_space,
+    adaptive, along_exact_paths, balls, by_curvature, by_parameter, coarsened, collapsing, disk, dumbbell, front,
+    leaving, levels, onward, onward_in_space, optics, other_square, ring, ring_by_curvature, rotated,
+    sphere_by_curvature, square, square_shape, still, still_sphere, three_spheres, touching, translated, vortex,
+    vortex_in_space,
 };
 use super::figures::figures;
 use crate::scene::rows::{Measure, Quantity, Reach, Row, Rows, with};
@@ -174,16 +175,25 @@ pub fn rows() -> Rows {
             false,
         );
     }
-    let sphere = json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.4});
-    let run = || vec![front(32, &json!({"law": "mean_curvature", "shape": sphere, "end_time": 0.045}))];
+    let runs = vec![sphere_by_curvature(32, 0.02, &json!({}))];
     row(
-        "mean curvature, sphere .4, 33³: extinction".into(),
+        "mean curvature, sphere .4, 33³: RMS at t = .02".into(),
         "picture",
-        run(),
-        end("extinction", "absolute"),
-        most(1e-3),
+        runs,
+        end("front", "rms"),
+        most(5e-5),
         false,
     );
+    let runs = [28, 32, 40, 48].map(|cells| sphere_by_curvature(cells, 0.02, &json!({}))).to_vec();
+    let case = "mean curvature, sphere, quartic: order of the error at t = .02".into();
+    row(case, "–", runs, slope("front", "rms"), Reach::AtLeast(3.5), true);
+    let runs = vec![sphere_by_curvature(32, 0.045, &json!({}))];
+    let case = "mean curvature, sphere .4, 33³: extinction".into();
+    row(case, "picture", runs, end("extinction", "absolute"), most(2e-4), false);
+    // By a fine outline of its section, r′ = −κ − n_r/r.
+    let reach = Reach::Within { of: 5.246e-3, by: 4e-4 };
+    let runs = vec![ring_by_curvature()];
+    row("mean curvature, torus, 51³: extinction".into(), "–", runs, end("extinction", "time"), reach, false);
     let run = || vec![dumbbell()];
     let reach = Reach::Within { of: 0.15 * 0.15 / 4.0, by: 6e-4 };
     row(
@@ -246,6 +256,27 @@ pub fn rows() -> Rows {
         );
         row(format!("two spheres {name}, 51³: coverage"), "–", run(), end("front", "coverage_h"), most(1.5), false);
     }
+    for (name, scene) in
+        [("a corner collapses to a point, 129²", collapsing()), ("a front leaves the grid, 129²", leaving())]
+    {
+        let case = format!("hard: {name}: foot-points left");
+        row(case, "–", vec![scene], end("front", "count"), most(0.0), false);
+    }
+    let run = || vec![touching()];
+    row(
+        "hard: two circles touch, 129²: largest distance".into(),
+        "–",
+        run(),
+        end("front", "max"),
+        most(0.25 / 128.0),
+        false,
+    );
+    row("hard: two circles touch, 129²: coverage".into(), "–", run(), end("front", "coverage_h"), most(1.5), false);
+    let run = || vec![vortex(128, 8.0, &json!({}))];
+    let case = |what: &str| format!("hard: single vortex, T = 8, 129²: {what}");
+    row(case("deviation"), "–", run(), end("radius", "deviation"), most(1e-3), false);
+    row(case("largest distance"), "–", run(), end("front", "max"), most(0.5 / 128.0), false);
+    row(case("largest gap"), "–", run(), end("front", "gap_h"), most(1.5), false);
     Rows { document: "front", rows, figures: figures() }
 }
 

@@ -14,7 +14,7 @@ use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::{shapes, work_estimate};
 use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::grid_based_particle::{
-    self as gbpm, ExactFrontMotion, FrontParts, FrontSystem, Grid, GridBasedParticles,
+    self as gbpm, ExactFrontMotion, FrontMethod, FrontParts, FrontSystem, Grid, GridBasedParticles,
 };
 use crate::simulation::{OutputPlan, Simulation};
 use crate::time::{FixedStep, PathIntegrator};
@@ -26,9 +26,14 @@ const FLOW_CFL: f64 = 10.0;
 const SPEED_CFL: f64 = 0.75;
 /// The same for rays.
 const RAY_CFL: f64 = 2.0;
-/// dt/h² under motion by curvature, and at most with four and with two stages: a little more blows up slowly, much more at once.
+/// dt/h² under motion by curvature.
 const CURVATURE_STEP: f64 = 0.5;
-const MOST_CURVATURE_STEP: [f64; 2] = [0.8, 0.6];
+/// The longest that four stages bear in the plane.
+const IN_THE_PLANE: f64 = 0.8;
+/// How much of a step of four stages two bear: 2/2.785.
+const OF_TWO_STAGES: f64 = 0.718;
+/// Weights up to which steps may be as long as without.
+const UNWEIGHTED: f64 = 0.3;
 /// Steps in the period of a flow that turns back, at least.
 const STEPS_A_TURN: f64 = 32.0;
 /// Paths of an error in space by particle, by the cost of a tight one, beside that: three, and those of samples.
@@ -162,17 +167,17 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
         violations.push(Violation::new("/spacing", "range", detail, &json!(choice.spacing), json!("a larger number")));
     }
-    let [of_four, of_two] = MOST_CURVATURE_STEP;
-    let factor = if matches!(choice.integrator, PathIntegrator::TvdRk2) { of_two } else { of_four };
+    let method = understood.as_ref().ok().map(|(chosen, _)| &chosen.method);
+    let factor = most_curvature_step(choice.integrator, D, method);
     let longest = factor * finest * finest;
     if is_by_curvature && let Some(step) = choice.time_step.filter(|step| *step > longest) {
         let detail =
-            format!("motion by curvature is unstable with steps longer than {factor} h² (of the finest level)");
+            format!("motion by curvature is unstable with steps longer than {factor:.3} h² (of the finest level)");
         let allowed = json!(format!("a number ≤ {longest:e}"));
         violations.push(Violation::new("/time_step", "range", detail, &json!(step), allowed));
     }
     let limit = match &choice.law {
-        Law::MeanCurvature => CURVATURE_STEP * finest * finest,
+        Law::MeanCurvature => CURVATURE_STEP.min(factor) * finest * finest,
         Law::Flow { .. } => {
             let by_speed = written.cfl.unwrap_or(FLOW_CFL) * finest / top;
             turn.map_or(by_speed, |turn| by_speed.min(turn / STEPS_A_TURN))
@@ -215,19 +220,37 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
     })
 }
 
-/// What a report says of the method.
-pub(super) fn labels(chosen: &Chosen, fixed: FixedStep) -> BTreeMap<&'static str, String> {
+/// What a report says of the method; `in_bends` is how many particles the quadratics of sharp bends have, where these have their own.
+pub(super) fn labels(chosen: &Chosen, fixed: FixedStep, in_bends: Option<usize>) -> BTreeMap<&'static str, String> {
     let method = &chosen.method;
-    let reconstruction = format!(
+    let mut reconstruction = format!(
         "degree {}, {} particles, weight {}, that of normals {}, normals to {}",
         method.degree, method.neighbors, method.weight, method.normal_weight, method.cosine
     );
+    if let Some(number) = in_bends.filter(|_| method.degree > 2) {
+        reconstruction += &format!("; in sharp bends degree 2, {} particles", number.min(method.neighbors));
+    }
     let mut said = BTreeMap::from([("reconstruction", reconstruction), ("time_step", format!("{}", fixed.time_step))]);
     if let Some(adaptivity) = method.adaptivity {
         let levels = format!("{} levels where |κ| h ≥ {}", adaptivity.levels, adaptivity.curvature_constant);
         said.insert("adaptivity", levels);
     }
     said
+}
+
+/// dt/h² at most under motion by curvature: a little more blows up slowly, much more at once. Wide reconstructions of a surface bear
+/// less, and so do weights; two stages bear less than four, as the real parts of their regions of stability do.
+fn most_curvature_step(integrator: PathIntegrator, dimension: usize, method: Option<&FrontMethod>) -> f64 {
+    let of_four = method.map_or(IN_THE_PLANE, |method| {
+        let unweighted = match (dimension, method.degree) {
+            (2, _) => IN_THE_PLANE,
+            (_, 2) => 0.7,
+            (_, 3) => 0.65,
+            _ => 0.55,
+        };
+        if method.weight > UNWEIGHTED { CURVATURE_STEP.min(unweighted) } else { unweighted }
+    });
+    if matches!(integrator, PathIntegrator::TvdRk2) { of_four * OF_TWO_STAGES } else { of_four }
 }
 
 /// Whether a grid reaches around a box: with three levels more, for lattices that are finer still.
@@ -399,7 +422,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             let detail = "no grid point of this spacing has a foot-point on the shape";
             return Err(vec![Violation::new("/spacing", "range", detail, &json!(self.choice.spacing), Value::Null)]);
         }
-        let said = labels(&self.chosen, self.fixed);
+        let said = labels(&self.chosen, self.fixed, self.law().ok().and_then(|law| law.particles_in_bends()));
         let ball = shapes::ball::<D>(&self.choice.shape);
         Ok(Box::new(GridBasedParticles::new(system, self.exact()?, ball, self.fixed, context.cpu_clock, said)))
     }

@@ -101,7 +101,7 @@ impl Scene for WavefrontScene {
             let detail = "no grid point of this spacing has a foot-point on the curve";
             return Err(vec![Violation::new("/spacing", "range", detail, &json!(self.choice.spacing), Value::Null)]);
         }
-        let said = labels(&self.chosen, self.fixed);
+        let said = labels(&self.chosen, self.fixed, None);
         let exact = ExactFrontMotion::Rays(self.front);
         Ok(Box::new(GridBasedParticles::new(system, exact, None, self.fixed, context.cpu_clock, said)))
     }

@@ -32,6 +32,12 @@ impl<const D: usize> Law<D> {
         if matches!(self, Self::Flow(_)) { 3.0 } else { 1.5 }
     }
 
+    /// How far from a place a particle of its reconstruction may lie, in spacings: by its curvature a surface has no gaps, and what
+    /// is left here and there of one that has collapsed must not be joined to sheets.
+    pub(super) fn farthest_particle(&self) -> f64 {
+        if D == 3 && matches!(self, Self::MeanCurvature) { 4.0 } else { 6.0 }
+    }
+
     /// Whether a particle moves along its normal, 1, or against it, −1.
     pub(super) fn facing(&self, curvature: f64) -> f64 {
         match self {
@@ -41,9 +47,11 @@ impl<const D: usize> Law<D> {
         }
     }
 
-    /// Whether bends go by themselves, the sharper the sooner.
-    pub(super) fn rounds_bends(&self) -> bool {
-        matches!(self, Self::MeanCurvature)
+    /// How many particles the quadratic has that takes the place of a wider polynomial in bends which that does not resolve: where
+    /// bends go by themselves, the sharper the sooner, a wide one rounds them too slowly.
+    #[must_use]
+    pub fn particles_in_bends(&self) -> Option<usize> {
+        matches!(self, Self::MeanCurvature).then_some(if D == 2 { 6 } else { 16 })
     }
 
     /// Whether a corner becomes round, seen from a grid point at a distance on the side where it is the closest point:

@@ -19,10 +19,8 @@ const MOST_EXTRAPOLATION: f64 = 0.3;
 const LEAST_AGREEMENT: f64 = 0.2;
 /// Cosine of normals within a stencil below which the front turns too much for the degree asked for.
 const TURNED: f64 = 0.7;
-/// The same where the front rounds its bends by itself: a wide polynomial that does not resolve one rounds it too slowly.
-const BENT: f64 = 0.9;
-/// Particles of the quadratic that takes its place there, on a curve and on a surface.
-const IN_BENDS: [usize; 2] = [6, 16];
+/// The same where bends have a narrow quadratic, on a curve and on a surface.
+const BENT: [f64; 2] = [0.9, 0.94];
 /// How far from the nearest of its particles an answer may lie, in spacings: past the last of them, and between two.
 const MOST_LONELY: f64 = 1.0;
 /// The largest |κ| h of a front that its particles resolve.
@@ -38,9 +36,8 @@ const NOTHING: f64 = 1e-6;
 const MOST_SEGMENTS: usize = 3;
 /// How much farther than the best answer so far the first particle of another segment may lie, in spacings.
 const SEGMENT_MARGIN: f64 = 0.5;
-/// How the neighbourhood grows, and its largest radius in spacings.
+/// How the neighbourhood grows.
 const GROWTH: f64 = 1.4;
-const FARTHEST: f64 = 6.0;
 
 /// Why there is no foot-point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -184,8 +181,10 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let (mut terms, mut least) = (self.terms, self.method.neighbors);
         self.take(p, base, (least, unit), reach, room);
         let is_wide = terms.count() > self.quadratic.count();
-        if is_wide && self.law.rounds_bends() && self.straightest(base, room) < BENT {
-            (terms, least) = (self.quadratic, IN_BENDS[M - 1].min(least));
+        if let Some(number) = self.law.particles_in_bends().filter(|_| is_wide)
+            && self.straightest(base, room) < BENT[M - 1]
+        {
+            (terms, least) = (self.quadratic, number.min(least));
             room.chosen.truncate(least);
         }
         let mut number = least;
@@ -199,6 +198,9 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
                 break;
             }
             self.take(p, base, (number, unit), reach, room);
+        }
+        if terms.count() == self.quadratic.count() {
+            return Err(Failure::Undetermined);
         }
         // At the end of a segment particles of one side determine a quadratic still.
         self.take(p, base, (least, unit), reach, room);
@@ -215,7 +217,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
     fn take(&self, p: &Vector<D>, base: usize, (number, unit): (usize, f64), reach: &mut f64, room: &mut Room<D, M>) {
         loop {
             self.choose(base, number, unit, room);
-            if room.chosen.len() >= number || *reach * GROWTH > FARTHEST * unit {
+            if room.chosen.len() >= number || *reach * GROWTH > self.law.farthest_particle() * unit {
                 return;
             }
             *reach *= GROWTH;

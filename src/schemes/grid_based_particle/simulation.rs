@@ -84,7 +84,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
         }
         let reason = format!(
             "the front is {growth:.1} times as large as at the start, though by its mean curvature it only shrinks: the time \
-             step ({}) is too long or the spacing too coarse",
+             step ({}) is too long, the particles of a reconstruction are too few, or the spacing is too coarse",
             self.fixed.time_step
         );
         Err(StepError::Unsolved { reason, step, time })
