@@ -328,6 +328,27 @@ fn the_vortex_that_turns_back_is_closed_and_round() {
     assert!(error(&report, "front", "coverage_h", Some(1.0)) < 1.5);
 }
 
+/// In a flow no side of a body grows past its corners and edges, and the mouth of a slot of a few spacings stays open, as
+/// exact as the paths.
+#[test]
+fn sides_end_at_their_corners() {
+    let disk =
+        json!({"type": "zalesak_disk", "center": [0.5, 0.75], "radius": 0.15, "slot_width": 0.05, "slot_depth": 0.25});
+    let cube = json!({"type": "box", "center": [0.5, 0.6, 0.5], "size": [0.3, 0.3, 0.3]});
+    for (shape, center, spacings) in
+        [(disk, json!([0.5, 0.5]), vec![0.008, 0.01, 0.0125, 0.015]), (cube, json!([0.5, 0.5, 0.5]), vec![0.02])]
+    {
+        let flow = json!({"type": "rotation", "center": center, "angular_velocity": 2});
+        for spacing in spacings {
+            let report = run(&front(&json!({
+                "law": {"type": "flow", "flow": flow}, "shape": shape, "spacing": spacing, "end_time": std::f64::consts::PI
+            })));
+            let (far, coverage) = (error(&report, "front", "max", None), error(&report, "front", "coverage_h", None));
+            assert!(far < 5e-5 && coverage < 1.5, "{shape} {spacing}: {far:e}, coverage {coverage}");
+        }
+    }
+}
+
 /// T = 8 at 129², a filament far below the grid: neither few long steps nor many short ones leave strays.
 #[test]
 fn the_filament_comes_back_whatever_the_step() {

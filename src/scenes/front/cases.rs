@@ -31,6 +31,13 @@ pub(super) fn rotated(cells: u32, shape: &Value, turns: f64, more: &Value) -> Va
     with(front(cells, &json!({"law": law, "shape": shape, "end_time": PI * turns})), more)
 }
 
+/// A cube turned once.
+pub(super) fn rotated_cube(cells: u32) -> Value {
+    let flow = json!({"type": "rotation", "center": [0.5, 0.5, 0.5], "angular_velocity": 2});
+    let cube = json!({"type": "box", "center": [0.5, 0.6, 0.5], "size": [0.3, 0.3, 0.3]});
+    front(cells, &json!({"law": {"type": "flow", "flow": flow}, "shape": cube, "end_time": PI}))
+}
+
 pub(super) fn disk() -> Value {
     json!({"type": "zalesak_disk", "center": [0.5, 0.75], "radius": 0.15, "slot_width": 0.05, "slot_depth": 0.25})
 }

@@ -2,7 +2,7 @@
 
 use super::cases::{
     adaptive, along_exact_paths, balls, by_curvature, by_parameter, coarsened, collapsing, disk, dumbbell, front,
-    leaving, levels, onward, onward_in_space, optics, other_square, ring, ring_by_curvature, rotated,
+    leaving, levels, onward, onward_in_space, optics, other_square, ring, ring_by_curvature, rotated, rotated_cube,
     sphere_by_curvature, square, square_shape, still, still_sphere, three_spheres, touching, translated, vortex,
     vortex_in_space,
 };
@@ -145,6 +145,14 @@ pub fn rows() -> Rows {
             row(case("largest distance"), "picture", run(), end("front", "max"), most(largest), false);
             row(case("CPU seconds"), "–", run(), Measure::Seconds("front/"), most(0.4), false);
         }
+    }
+    for (name, run, far) in [
+        ("Zalesak disk, 101²", rotated(100, &disk(), 1.0, &json!({})), 0.8 / 100.0),
+        ("cube, 51³", rotated_cube(50), 0.8 / 50.0),
+    ] {
+        let case = |what: &str| format!("{name}, 1 revolution: {what}");
+        row(case("largest distance"), "–", vec![run.clone()], end("front", "max"), most(far), false);
+        row(case("coverage"), "–", vec![run], end("front", "coverage_h"), most(1.5), false);
     }
     let refined = with(levels(3), &json!({"cfl": 20}));
     let both = || vec![rotated(1024, &disk(), 1.0, &json!({"cfl": 20})), rotated(256, &disk(), 1.0, &refined)];

@@ -23,6 +23,16 @@ const TURNED: f64 = 0.7;
 const BENT: [f64; 2] = [0.9, 0.94];
 /// How far from the nearest of its particles an answer may lie, in spacings: past the last of them, and between two.
 const MOST_LONELY: f64 = 1.0;
+/// How near the next particle of a segment is where it goes on, and those of a corner's two sides to each other, in spacings.
+const AHEAD: f64 = 1.5;
+const CORNER: f64 = 2.0;
+/// 1/cos² of the angle from a way within which a particle is on it: along an edge of a body there always are some, which must not
+/// stand for what lies beyond it.
+const CONE: f64 = 1.4;
+/// Normals whose cosine is smaller are those of the two sides of a thin sheet rather than of a corner.
+const OPPOSITE: f64 = -0.5;
+/// A distance from a particle that is none, in spacings.
+const NO_WAY: f64 = 1e-3;
 /// The largest |κ| h of a front that its particles resolve.
 const SHARPEST: f64 = 2.0;
 /// How far the directions of a graph may be from those of its particles, root mean square, where particles are exact by themselves:
@@ -321,10 +331,12 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         for (t, s) in frame.along.iter().zip(s) {
             position += t * (s * unit);
         }
-        let nearest = |j: &usize| (self.feet.positions[*j] - position).norm_squared();
-        let nearest = room.chosen.iter().map(nearest).fold(f64::INFINITY, f64::min);
         let most = if beyond > 0.0 { MOST_LONELY } else { self.law.widest_bridge() };
-        if nearest > (most * unit).powi(2) {
+        let square = |j: usize| (self.feet.positions[j] - position).norm_squared();
+        let is_nearer = |a: &usize, b: &usize| square(*a).total_cmp(&square(*b));
+        let nearest = room.chosen.iter().copied().min_by(is_nearer).unwrap_or(base);
+        let is_lonely = square(nearest) > (most * unit).powi(2);
+        if is_lonely || (self.law.keeps_particles_exact() && self.is_past_corner(nearest, &position, unit, room)) {
             return Err(Failure::Extrapolated);
         }
         if self.law.keeps_particles_exact() && self.misfit(frame, &graphs, room) > MOST_MISFIT[M - 1] {
@@ -346,6 +358,34 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
 }
 
 impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
+    /// Whether a place lies ahead of the last particle of its segment at a corner, where the front goes on round it: what is there
+    /// is an opening, which nothing may bridge.
+    fn is_past_corner(&self, last: usize, place: &Vector<D>, unit: f64, room: &Room<D, M>) -> bool {
+        let (x, n) = (&self.feet.positions[last], &self.feet.normals[last]);
+        let way = place - x;
+        let length = way.norm();
+        let is_ahead = |j: usize| {
+            let d = self.feet.positions[j] - x;
+            let (along, square) = (d.dot(&way), d.norm_squared());
+            let is_on_the_way = CONE * along * along >= square * length * length;
+            along > 0.0 && is_on_the_way && square <= (AHEAD * unit).powi(2)
+        };
+        if length < NO_WAY * unit || room.chosen.iter().any(|j| is_ahead(*j)) {
+            return false;
+        }
+        let normals = &self.feet.normals;
+        let order = self.cells.order();
+        let goes_on = self.cells.any_within(x, AHEAD * unit, |place| {
+            let j = order[place];
+            normals[j].dot(n) > self.method.cosine && is_ahead(j) && self.agrees(last, j)
+        });
+        !goes_on
+            && self.cells.any_within(x, CORNER * unit, |place| {
+                let cosine = normals[order[place]].dot(n);
+                cosine <= self.method.cosine && cosine > OPPOSITE
+            })
+    }
+
     /// The slopes that the normals of the chosen particles ask of a graph, where they take part.
     fn note_slopes<const C: usize>(&self, frame: &Frame<D, M, C>, room: &mut Room<D, M>) {
         room.slopes.clear();
