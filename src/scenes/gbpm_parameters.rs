@@ -18,7 +18,7 @@ pub const NEIGHBORS: Parameter = Parameter::new(
     "neighbors",
     "particles of a reconstruction; when not given, in the plane 6, 7, 8 of degree 2, 3, 4; in space as many as coefficients where normals weigh \
      .1 or more, else 16, of degree 4 24; under mean_curvature of degree 4 10 in the plane, 36 in space, \
-     and in sharp bends the nearest 6 (16) of them and degree 2",
+     and in sharp bends the nearest 6 (16) of them and degree 2; fewer where fewer are in reach",
     Kind::Integer { least: 3, most: 60 },
     DefaultValue::Absent,
 );
@@ -92,7 +92,7 @@ static ADAPTIVITY_PARAMETERS: &[Parameter] = &[
 pub const CFL: Parameter = Parameter::new(
     "cfl",
     "dt · max speed/h, h that of the finest level; when neither it nor a step is given, 10 in a flow, 2 of rays, .75 with a given speed, and dt = .5 h² under \
-     mean_curvature",
+     mean_curvature, or the longest that is stable where that is less",
     POSITIVE,
     DefaultValue::Absent,
 );
@@ -207,8 +207,8 @@ fn fewest_by_curvature(dimension: usize, degree: usize) -> usize {
     }
 }
 
-/// The largest weight under motion by curvature, by the same measurements: with more, few particles count.
-const MOST_WEIGHT_BY_CURVATURE: f64 = 1.0;
+/// The largest weights under motion by curvature of curves and surfaces, by the same measurements: with more, few particles count.
+const MOST_WEIGHT_BY_CURVATURE: [f64; 2] = [1.0, 0.5];
 
 /// What moves the front, as far as it matters to reconstructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -254,7 +254,7 @@ pub fn understand(
         (2, 4) if is_by_curvature => 10,
         (2, _) => 8,
         (_, 4) if is_by_curvature => 36,
-        (_, _) if normal_weight >= NORMALS_DETERMINE => terms,
+        (_, _) if has_normals && normal_weight >= NORMALS_DETERMINE => terms,
         (_, 2 | 3) => 16,
         _ => 24,
     });
@@ -269,9 +269,10 @@ pub fn understand(
         let allowed = json!(format!("a whole number ≥ {fewest}"));
         violations.push(Violation::new(format!("{pointer}/neighbors"), "range", detail, &json!(neighbors), allowed));
     }
-    if is_by_curvature && weight > MOST_WEIGHT_BY_CURVATURE {
+    let most_weight = MOST_WEIGHT_BY_CURVATURE[usize::from(dimension == 3)];
+    if is_by_curvature && weight > most_weight {
         let detail = "with larger weights motion by curvature is unstable";
-        let allowed = json!(format!("a number ≤ {MOST_WEIGHT_BY_CURVATURE}"));
+        let allowed = json!(format!("a number ≤ {most_weight}"));
         violations.push(Violation::new(format!("{pointer}/weight"), "range", detail, &json!(weight), allowed));
     }
     if !violations.is_empty() {

@@ -197,20 +197,21 @@ fn refusals(body: &Value) -> Vec<String> {
 fn motion_by_curvature_is_stable_or_refused() {
     let sphere = json!({"type": "sphere", "center": [0.5, 0.503, 0.49], "radius": 0.4});
     let circle = json!({"type": "circle", "center": [0.5, 0.503], "radius": 0.4});
-    // cells, steps in h² that hold and that are refused, by the degree and the integrator; the bound of the curvature.
-    for (shape, cells, degree, integrator, (holds, refused), steps, most) in [
-        (&circle, 96.0, 2, "rk4", (0.79, 0.81), 600.0, 2e-2),
-        (&circle, 96.0, 4, "rk4", (0.79, 0.81), 600.0, 2e-4),
-        (&circle, 96.0, 4, "tvd_rk2", (0.57, 0.58), 600.0, 2e-4),
-        (&sphere, 40.0, 2, "rk4", (0.69, 0.71), 50.0, 0.2),
-        (&sphere, 40.0, 3, "tvd_rk2", (0.46, 0.47), 70.0, 0.2),
-        (&sphere, 40.0, 4, "rk4", (0.54, 0.56), 60.0, 5e-3),
-        (&sphere, 40.0, 4, "tvd_rk2", (0.39, 0.4), 80.0, 5e-3),
+    // cells, steps in h² that hold with the fewest particles and that are refused, by the degree and the integrator; the bound of
+    // the curvature.
+    for (shape, cells, (degree, fewest), integrator, (holds, refused), steps, most) in [
+        (&circle, 96.0, (2, 6), "rk4", (0.79, 0.81), 600.0, 2e-2),
+        (&circle, 96.0, (4, 10), "rk4", (0.79, 0.81), 600.0, 2e-4),
+        (&circle, 96.0, (4, 10), "tvd_rk2", (0.57, 0.58), 600.0, 2e-4),
+        (&sphere, 40.0, (2, 14), "rk4", (0.69, 0.71), 50.0, 0.2),
+        (&sphere, 40.0, (3, 16), "tvd_rk2", (0.46, 0.47), 70.0, 0.2),
+        (&sphere, 40.0, (4, 32), "rk4", (0.54, 0.56), 60.0, 5e-3),
+        (&sphere, 40.0, (4, 32), "tvd_rk2", (0.39, 0.4), 80.0, 5e-3),
     ] {
         let body = |factor: f64| {
             let step = factor / cells / cells;
             json!({
-                "shape": shape, "law": "mean_curvature", "spacing": 1.0 / cells, "degree": degree, "integrator": integrator,
+                "shape": shape, "law": "mean_curvature", "spacing": 1.0 / cells, "degree": degree, "neighbors": fewest, "integrator": integrator,
                 "time_step": step, "end_time": steps * step
             })
         };
@@ -226,6 +227,12 @@ fn motion_by_curvature_is_stable_or_refused() {
         assert!(refusals(&body(fewest)).is_empty());
     }
     assert_eq!(refusals(&json!({"law": "mean_curvature", "weight": 1.1})), ["/weight"]);
+    assert_eq!(
+        refusals(&json!({"law": "mean_curvature", "shape": sphere, "spacing": 0.05, "weight": 0.6})),
+        ["/weight"]
+    );
+    let more = json!({"law": "mean_curvature", "shape": sphere, "spacing": 0.05, "degree": 2, "normal_weight": 0.2});
+    assert_eq!(refusals(&more), ["/normal_weight"]);
     assert_eq!(
         refusals(&json!({"law": "mean_curvature", "weight": 1, "spacing": 0.1, "time_step": 5.1e-3})),
         ["/time_step"]
@@ -328,23 +335,25 @@ fn the_vortex_that_turns_back_is_closed_and_round() {
     assert!(error(&report, "front", "coverage_h", Some(1.0)) < 1.5);
 }
 
-/// In a flow no side of a body grows past its corners and edges, and the mouth of a slot of a few spacings stays open, as
-/// exact as the paths.
+/// In a flow no side of a body grows past its corners and edges, and the mouth of a slot of a few spacings stays open: exact as the
+/// paths, and within half a spacing where some edges lie beside the grid points.
 #[test]
 fn sides_end_at_their_corners() {
     let disk =
         json!({"type": "zalesak_disk", "center": [0.5, 0.75], "radius": 0.15, "slot_width": 0.05, "slot_depth": 0.25});
     let cube = json!({"type": "box", "center": [0.5, 0.6, 0.5], "size": [0.3, 0.3, 0.3]});
-    for (shape, center, spacings) in
-        [(disk, json!([0.5, 0.5]), vec![0.008, 0.01, 0.0125, 0.015]), (cube, json!([0.5, 0.5, 0.5]), vec![0.02])]
-    {
+    for (shape, center, spacings, most) in [
+        (disk, json!([0.5, 0.5]), vec![0.008, 0.01, 0.0125, 0.015], 5e-5),
+        (cube.clone(), json!([0.5, 0.5, 0.5]), vec![0.02], 5e-5),
+        (cube, json!([0.5, 0.5, 0.5]), vec![0.0213], 0.5 * 0.0213),
+    ] {
         let flow = json!({"type": "rotation", "center": center, "angular_velocity": 2});
         for spacing in spacings {
             let report = run(&front(&json!({
                 "law": {"type": "flow", "flow": flow}, "shape": shape, "spacing": spacing, "end_time": std::f64::consts::PI
             })));
             let (far, coverage) = (error(&report, "front", "max", None), error(&report, "front", "coverage_h", None));
-            assert!(far < 5e-5 && coverage < 1.5, "{shape} {spacing}: {far:e}, coverage {coverage}");
+            assert!(far < most && coverage < 1.5, "{shape} {spacing}: {far:e}, coverage {coverage}");
         }
     }
 }

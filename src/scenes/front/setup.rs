@@ -32,7 +32,8 @@ const CURVATURE_STEP: f64 = 0.5;
 const IN_THE_PLANE: f64 = 0.8;
 /// How much of a step of four stages two bear: 2/2.785.
 const OF_TWO_STAGES: f64 = 0.718;
-/// Weights up to which steps may be as long as without.
+/// The longest that four stages bear with weights, and up to which weights in the plane that without is borne.
+const WEIGHTED: f64 = 0.5;
 const UNWEIGHTED: f64 = 0.3;
 /// Steps in the period of a flow that turns back, at least.
 const STEPS_A_TURN: f64 = 32.0;
@@ -228,7 +229,7 @@ pub(super) fn labels(chosen: &Chosen, fixed: FixedStep, in_bends: Option<usize>)
         method.degree, method.neighbors, method.weight, method.normal_weight, method.cosine
     );
     if let Some(number) = in_bends.filter(|_| method.degree > 2) {
-        reconstruction += &format!("; in sharp bends degree 2, {} particles", number.min(method.neighbors));
+        reconstruction += &format!("; in sharp bends degree 2, {} particles", number);
     }
     let mut said = BTreeMap::from([("reconstruction", reconstruction), ("time_step", format!("{}", fixed.time_step))]);
     if let Some(adaptivity) = method.adaptivity {
@@ -248,7 +249,8 @@ fn most_curvature_step(integrator: PathIntegrator, dimension: usize, method: Opt
             (_, 3) => 0.65,
             _ => 0.55,
         };
-        if method.weight > UNWEIGHTED { CURVATURE_STEP.min(unweighted) } else { unweighted }
+        let is_weighted = method.weight > if dimension == 2 { UNWEIGHTED } else { 0.0 };
+        if is_weighted { WEIGHTED } else { unweighted }
     });
     if matches!(integrator, PathIntegrator::TvdRk2) { of_four * OF_TWO_STAGES } else { of_four }
 }

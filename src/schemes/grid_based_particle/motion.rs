@@ -32,9 +32,9 @@ impl<const D: usize> Law<D> {
         if matches!(self, Self::Flow(_)) { 3.0 } else { 1.5 }
     }
 
-    /// How far from a place a particle of its reconstruction may lie, in spacings: by its curvature a surface has no gaps, and what
-    /// is left here and there of one that has collapsed must not be joined to sheets.
-    pub(super) fn farthest_particle(&self) -> f64 {
+    /// How far the search for the particles of a reconstruction may go, in spacings: by its curvature a surface has no gaps, and what
+    /// is left here and there of one that has collapsed must not be joined to sheets. The search grows by factors, and stays below.
+    pub(super) fn farthest_search(&self) -> f64 {
         if D == 3 && matches!(self, Self::MeanCurvature) { 4.0 } else { 6.0 }
     }
 

@@ -29,8 +29,10 @@ const CORNER: f64 = 2.0;
 /// 1/cos² of the angle from a way within which a particle is on it: along an edge of a body there always are some, which must not
 /// stand for what lies beyond it.
 const CONE: f64 = 1.4;
-/// Normals whose cosine is smaller are those of the two sides of a thin sheet rather than of a corner.
+/// Normals whose cosine is smaller are those of the two sides of a thin sheet rather than of a corner, and those of one side
+/// whose cosine is larger are of one that is straight there.
 const OPPOSITE: f64 = -0.5;
+const STRAIGHT: f64 = 0.8;
 /// A distance from a particle that is none, in spacings.
 const NO_WAY: f64 = 1e-3;
 /// The largest |κ| h of a front that its particles resolve.
@@ -56,7 +58,7 @@ pub enum Failure {
     Starved,
     /// The particles near do not determine a polynomial.
     Undetermined,
-    /// The closest point lies beyond the particles.
+    /// The closest point lies beyond the particles, or past a corner.
     Extrapolated,
     /// The front turns too sharply for the spacing, or the polynomial has not the directions of its particles.
     Unresolved,
@@ -227,7 +229,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
     fn take(&self, p: &Vector<D>, base: usize, (number, unit): (usize, f64), reach: &mut f64, room: &mut Room<D, M>) {
         loop {
             self.choose(base, number, unit, room);
-            if room.chosen.len() >= number || *reach * GROWTH > self.law.farthest_particle() * unit {
+            if room.chosen.len() >= number || *reach * GROWTH > self.law.farthest_search() * unit {
                 return;
             }
             *reach *= GROWTH;
@@ -373,17 +375,15 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if length < NO_WAY * unit || room.chosen.iter().any(|j| is_ahead(*j)) {
             return false;
         }
-        let normals = &self.feet.normals;
         let order = self.cells.order();
-        let goes_on = self.cells.any_within(x, AHEAD * unit, |place| {
-            let j = order[place];
-            normals[j].dot(n) > self.method.cosine && is_ahead(j) && self.agrees(last, j)
-        });
-        !goes_on
-            && self.cells.any_within(x, CORNER * unit, |place| {
-                let cosine = normals[order[place]].dot(n);
-                cosine <= self.method.cosine && cosine > OPPOSITE
-            })
+        let cosine = |place: usize| self.feet.normals[order[place]].dot(n);
+        let goes_on = |place: usize| is_ahead(order[place]) && self.agrees(last, order[place]);
+        let is_other_side = |place: usize| OPPOSITE < cosine(place) && cosine(place) <= self.method.cosine;
+        // The tip of a filament has all directions, a corner those of its sides alone. The edge of a sheet counts as one.
+        let is_between = |place: usize| self.method.cosine < cosine(place) && cosine(place) < STRAIGHT;
+        !self.cells.any_within(x, AHEAD * unit, goes_on)
+            && self.cells.any_within(x, CORNER * unit, is_other_side)
+            && (M > 1 || !self.cells.any_within(x, CORNER * unit, is_between))
     }
 
     /// The slopes that the normals of the chosen particles ask of a graph, where they take part.

@@ -34,7 +34,7 @@ const SAME: f64 = 0.02;
 pub struct Removals {
     /// Grid points without enough particles of one segment about them.
     pub starved: u64,
-    /// Grid points whose foot-point would lie beyond all particles.
+    /// Grid points whose foot-point would lie beyond all particles, or past a corner.
     pub extrapolated: u64,
     /// Grid points where the front turns too sharply for the spacing, or where a fit in a flow misses its particles' directions.
     pub unresolved: u64,
