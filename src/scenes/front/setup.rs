@@ -229,7 +229,7 @@ pub(super) fn labels(chosen: &Chosen, fixed: FixedStep, in_bends: Option<usize>)
         method.degree, method.neighbors, method.weight, method.normal_weight, method.cosine
     );
     if let Some(number) = in_bends.filter(|_| method.degree > 2) {
-        reconstruction += &format!("; in sharp bends degree 2, {} particles", number);
+        reconstruction += &format!("; in sharp bends degree 2, {number} particles");
     }
     let mut said = BTreeMap::from([("reconstruction", reconstruction), ("time_step", format!("{}", fixed.time_step))]);
     if let Some(adaptivity) = method.adaptivity {
