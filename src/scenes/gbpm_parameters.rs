@@ -2,6 +2,7 @@
 
 use crate::scene::schema::POSITIVE;
 use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
+use crate::scenes::curvature_stability::{fewest_particles, most_weight};
 use crate::schemes::grid_based_particle::{self as gbpm, FrontMethod, MOST_LEVELS, Segments, Topology};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -165,6 +166,19 @@ impl Written {
     pub fn levels(&self) -> u32 {
         self.adaptivity.map_or(1, |adaptivity| adaptivity.levels)
     }
+
+    /// The degree, chosen where none is given.
+    #[must_use]
+    pub fn degree_for(&self, dimension: usize, motion: Motion) -> usize {
+        self.degree.unwrap_or(if dimension == 2 || motion == Motion::Curvature { 4 } else { 2 })
+    }
+
+    /// The weight, chosen where none is given.
+    #[must_use]
+    pub fn weight_for(&self, dimension: usize, motion: Motion) -> f64 {
+        let is_narrow = dimension == 2 && motion != Motion::Curvature && self.degree_for(dimension, motion) == 4;
+        self.weight.unwrap_or(if is_narrow { 1.0 } else { 0.0 })
+    }
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -194,22 +208,6 @@ pub struct Chosen {
 /// λ from which on the normals do what more particles would: with less, few particles are unstable.
 const NORMALS_DETERMINE: f64 = 0.1;
 
-/// Fewer particles blow up under motion by curvature, of quartics slowly: measured on circles and spheres of 20 to 100 spacings over
-/// hundreds of steps (docs/results/front-notes.md). The paper's ten of a surface are too few.
-fn fewest_by_curvature(dimension: usize, degree: usize) -> usize {
-    match (dimension, degree) {
-        (2, 2) => 6,
-        (2, 3) => 7,
-        (2, _) => 10,
-        (_, 2) => 14,
-        (_, 3) => 16,
-        _ => 32,
-    }
-}
-
-/// The largest weights under motion by curvature of curves and surfaces, by the same measurements: with more, few particles count.
-const MOST_WEIGHT_BY_CURVATURE: [f64; 2] = [1.0, 0.5];
-
 /// What moves the front, as far as it matters to reconstructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motion {
@@ -234,7 +232,7 @@ pub fn understand(
 ) -> Result<(Chosen, Value), Vec<Violation>> {
     let mut violations = Vec::new();
     let is_by_curvature = motion == Motion::Curvature;
-    let degree = written.degree.unwrap_or(if dimension == 2 || is_by_curvature { 4 } else { 2 });
+    let (degree, weight) = (written.degree_for(dimension, motion), written.weight_for(dimension, motion));
     let terms = if dimension == 2 { degree + 1 } else { (degree + 1) * (degree + 2) / 2 };
     if let Some(given) = written.normal_weight.filter(|given| *given > 0.0 && motion != Motion::Flow) {
         let detail = "normals of a surface take part in reconstructions in a flow, which carries them along exactly";
@@ -258,10 +256,9 @@ pub fn understand(
         (_, 2 | 3) => 16,
         _ => 24,
     });
-    let weight = written.weight.unwrap_or(if degree == 4 && dimension == 2 && !is_by_curvature { 1.0 } else { 0.0 });
     let (fewest, detail) = if is_by_curvature {
         let detail = format!("with fewer particles of degree {degree} motion by curvature is unstable");
-        (fewest_by_curvature(dimension, degree), detail)
+        (fewest_particles(dimension, degree), detail)
     } else {
         (terms, format!("a reconstruction of degree {degree} has {terms} coefficients"))
     };
@@ -269,7 +266,7 @@ pub fn understand(
         let allowed = json!(format!("a whole number ≥ {fewest}"));
         violations.push(Violation::new(format!("{pointer}/neighbors"), "range", detail, &json!(neighbors), allowed));
     }
-    let most_weight = MOST_WEIGHT_BY_CURVATURE[usize::from(dimension == 3)];
+    let most_weight = most_weight(dimension);
     if is_by_curvature && weight > most_weight {
         let detail = "with larger weights motion by curvature is unstable";
         let allowed = json!(format!("a number ≤ {most_weight}"));

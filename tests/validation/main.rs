@@ -3,6 +3,7 @@
 
 mod droplets;
 mod fronts;
+mod ring;
 mod hard_cases;
 mod surfaces;
 #[path = "../support/mod.rs"]

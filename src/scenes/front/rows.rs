@@ -201,7 +201,7 @@ pub fn rows() -> Rows {
     // A step is .5 h² = 4.9e-4.
     let case = "mean curvature, sphere .4, 33³: extinction".into();
     row(case, "picture", runs, end("extinction", "absolute"), most(5e-4), false);
-    // By a fine outline of its section, r′ = −κ − n_r/r.
+    // By a fine outline of its section: the test `bodies_round_break_and_die_by_their_curvature` has it.
     let reach = Reach::Within { of: 5.246e-3, by: 4e-4 };
     let runs = vec![ring_by_curvature()];
     row("mean curvature, torus, 51³: extinction".into(), "–", runs, end("extinction", "time"), reach, false);

@@ -7,6 +7,7 @@ use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
+use crate::scenes::curvature_stability::longest_step;
 use crate::scenes::flow_work::{Stretch, error_units, path_units, stretch};
 use crate::scenes::flows::{Flow, flow, top_speed};
 use crate::scenes::gbpm_parameters::{self, Chosen, Motion};
@@ -14,7 +15,7 @@ use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::{shapes, work_estimate};
 use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::grid_based_particle::{
-    self as gbpm, ExactFrontMotion, FrontMethod, FrontParts, FrontSystem, Grid, GridBasedParticles,
+    self as gbpm, ExactFrontMotion, FrontParts, FrontSystem, Grid, GridBasedParticles,
 };
 use crate::simulation::{OutputPlan, Simulation};
 use crate::time::{FixedStep, PathIntegrator};
@@ -28,13 +29,6 @@ const SPEED_CFL: f64 = 0.75;
 const RAY_CFL: f64 = 2.0;
 /// dt/h² under motion by curvature.
 const CURVATURE_STEP: f64 = 0.5;
-/// The longest that four stages bear in the plane.
-const IN_THE_PLANE: f64 = 0.8;
-/// How much of a step of four stages two bear: 2/2.785.
-const OF_TWO_STAGES: f64 = 0.718;
-/// The longest that four stages bear with weights, and up to which weights in the plane that without is borne.
-const WEIGHTED: f64 = 0.5;
-const UNWEIGHTED: f64 = 0.3;
 /// Steps in the period of a flow that turns back, at least.
 const STEPS_A_TURN: f64 = 32.0;
 /// Paths of an error in space by particle, by the cost of a tight one, beside that: three, and those of samples.
@@ -168,8 +162,7 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
         violations.push(Violation::new("/spacing", "range", detail, &json!(choice.spacing), json!("a larger number")));
     }
-    let method = understood.as_ref().ok().map(|(chosen, _)| &chosen.method);
-    let factor = most_curvature_step(choice.integrator, D, method);
+    let factor = longest_step(choice.integrator, D, written.degree_for(D, motion), written.weight_for(D, motion));
     let longest = factor * finest * finest;
     if is_by_curvature && let Some(step) = choice.time_step.filter(|step| *step > longest) {
         let detail =
@@ -237,22 +230,6 @@ pub(super) fn labels(chosen: &Chosen, fixed: FixedStep, in_bends: Option<usize>)
         said.insert("adaptivity", levels);
     }
     said
-}
-
-/// dt/h² at most under motion by curvature: a little more blows up slowly, much more at once. Wide reconstructions of a surface bear
-/// less, and so do weights; two stages bear less than four, as the real parts of their regions of stability do.
-fn most_curvature_step(integrator: PathIntegrator, dimension: usize, method: Option<&FrontMethod>) -> f64 {
-    let of_four = method.map_or(IN_THE_PLANE, |method| {
-        let unweighted = match (dimension, method.degree) {
-            (2, _) => IN_THE_PLANE,
-            (_, 2) => 0.7,
-            (_, 3) => 0.65,
-            _ => 0.55,
-        };
-        let is_weighted = method.weight > if dimension == 2 { UNWEIGHTED } else { 0.0 };
-        if is_weighted { WEIGHTED } else { unweighted }
-    });
-    if matches!(integrator, PathIntegrator::TvdRk2) { of_four * OF_TWO_STAGES } else { of_four }
 }
 
 /// Whether a grid reaches around a box: with three levels more, for lattices that are finer still.
@@ -424,7 +401,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             let detail = "no grid point of this spacing has a foot-point on the shape";
             return Err(vec![Violation::new("/spacing", "range", detail, &json!(self.choice.spacing), Value::Null)]);
         }
-        let said = labels(&self.chosen, self.fixed, self.law().ok().and_then(|law| law.particles_in_bends()));
+        let said = labels(&self.chosen, self.fixed, self.law()?.particles_in_bends());
         let ball = shapes::ball::<D>(&self.choice.shape);
         Ok(Box::new(GridBasedParticles::new(system, self.exact()?, ball, self.fixed, context.cpu_clock, said)))
     }

@@ -196,7 +196,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if let Some(number) = self.law.particles_in_bends().filter(|_| is_wide)
             && self.straightest(base, room) < BENT[M - 1]
         {
-            (terms, least) = (self.quadratic, number.min(least));
+            (terms, least) = (self.quadratic, number);
             room.chosen.truncate(least);
         }
         let mut number = least;
