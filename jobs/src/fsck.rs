@@ -155,15 +155,10 @@ fn of_uploads(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
 
 /// Directories that belong to nothing. The next start removes them.
 fn of_directories(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
-    for kind in ["jobs", "uploads"] {
-        for entry in fs::read_dir(store.directory().join(kind))? {
-            let name = entry?.file_name().to_string_lossy().into_owned();
-            let known = if kind == "jobs" { store.job(&name)?.is_some() } else { store.upload(&name)?.is_some() };
-            if !known {
-                let what = "a directory without a row; the next start removes it".to_owned();
-                findings.wrong.push(Finding { place: format!("{kind}/{name}"), what });
-            }
-        }
+    for path in store.unknown_entries()? {
+        let place = path.strip_prefix(store.directory()).unwrap_or(&path).display().to_string();
+        let what = "it is not in the database; the service leaves it where it is".to_owned();
+        findings.wrong.push(Finding { place, what });
     }
     Ok(())
 }

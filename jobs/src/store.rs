@@ -259,7 +259,8 @@ impl Store {
 
     /// Deletes a job in a terminal state and its files; false where it is in another state.
     ///
-    /// The row goes first: files without a row are swept up at the next start, a row without files never exists.
+    /// The row goes first, so that a row without files never exists. A crash in between leaves files without a row; the next
+    /// start names them in the log and leaves them alone.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -279,12 +280,13 @@ impl Store {
         Ok(deleted)
     }
 
-    /// Removes directories of jobs and uploads that the store does not know: leftovers of a deletion, of a submission
-    /// or an upload that a crash cut short.
+    /// Entries of the job and upload folders that the database does not list: folders of other programs, jobs of a newer
+    /// database, leftovers of a submission, an upload or a deletion that a crash cut short. None of them is touched.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn sweep(&self) -> Result<(), StoreError> {
+    pub fn unknown_entries(&self) -> Result<Vec<PathBuf>, StoreError> {
+        let mut unknown = Vec::new();
         for kind in ["jobs", "uploads"] {
             let known: HashSet<String> = {
                 let connection = self.read();
@@ -295,11 +297,12 @@ impl Store {
             for entry in std::fs::read_dir(self.directory.join(kind))? {
                 let entry = entry?;
                 if !entry.file_name().to_str().is_some_and(|name| known.contains(name)) {
-                    remove_directory(&entry.path())?;
+                    unknown.push(entry.path());
                 }
             }
         }
-        Ok(())
+        unknown.sort();
+        Ok(unknown)
     }
 }
 

@@ -165,7 +165,7 @@ impl Supervisor {
         SupervisorHandle { sender: self.sender.clone() }
     }
 
-    /// Brings every job that had a worker to a legal state and sweeps leftovers. To be done before the service is
+    /// Brings every job that had a worker to a legal state and names what the database does not know. To be done before the service is
     /// ready. A restart of the service never counts as a death.
     ///
     /// # Errors
@@ -176,14 +176,17 @@ impl Supervisor {
             // What the worker managed to say before counts, its verdict above all. Records that cannot be read are as
             // good as none: the job goes on from its last checkpoint.
             let imported = self.store.import(&job.id, job.attempt, &mut ProgressPace::default());
-            let cleared = imported.and_then(|_| leftovers::remove(&self.store, &job.id));
+            let cleared = imported.and_then(|_| leftovers::remove(&self.store, &job.id, job.attempt));
             if let Err(error) = cleared {
                 tracing::error!(job = job.id, %error, "records could not be imported or leftovers not removed");
             }
             self.store.settle(&job.id, job.attempt, Loss { reason: Reason::ServerRestart, is_death: false })?;
             tracing::info!(job = job.id, attempt = job.attempt, "recovered");
         }
-        self.store.sweep()
+        for path in self.store.unknown_entries()? {
+            tracing::warn!(path = %path.display(), "not in the database; left where it is");
+        }
+        Ok(())
     }
 
     /// Ends a worker that outlived its service. It could not be believed any more, but it would use the machine.
@@ -305,7 +308,7 @@ impl Supervisor {
                 (false, false) => Loss { reason: Reason::WorkerCrash, is_death: true },
             };
             if imported.is_whole {
-                leftovers::remove(&self.store, &running.job)?;
+                leftovers::remove(&self.store, &running.job, running.epoch)?;
             }
             self.book_disk(k)?;
             let running = &self.running[k];

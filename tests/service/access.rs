@@ -168,3 +168,32 @@ fn fsck_finds_what_is_wrong() {
         assert!(text.contains(part), "{part}: {text}");
     }
 }
+
+#[test]
+fn a_start_deletes_nothing_that_its_database_does_not_know() {
+    let directory = tempfile::tempdir().unwrap();
+    let foreign = directory.path().join("jobs/2025-thesis/results.csv");
+    std::fs::create_dir_all(foreign.parent().unwrap()).unwrap();
+    std::fs::write(&foreign, "years of work").unwrap();
+    std::fs::create_dir_all(directory.path().join("uploads/photos")).unwrap();
+    std::fs::write(directory.path().join("jobs/.DS_Store"), "").unwrap();
+    let mut service = Service::start(directory.path(), &["--slots", "1"]);
+    let id = service.submit(&json!({"scene": {"kind": "redistance", "spacing": 0.1}}));
+    service.wait_for(&id, &["succeeded"]);
+    assert!(service.stop());
+    // The database is lost, and with it what it knew of the job.
+    for entry in std::fs::read_dir(directory.path()).unwrap().flatten() {
+        if entry.file_name().to_string_lossy().starts_with("meniscus.sqlite") {
+            std::fs::remove_file(entry.path()).unwrap();
+        }
+    }
+    service.restart();
+    assert_eq!(service.get("/v1/jobs").json()["items"], json!([]));
+    assert!(service.stop());
+    assert_eq!(std::fs::read_to_string(&foreign).unwrap(), "years of work");
+    for kept in ["uploads/photos", "jobs/.DS_Store"] {
+        assert!(directory.path().join(kept).exists(), "{kept} is gone");
+    }
+    let frame = directory.path().join("jobs").join(&id).join("attempts/1/frames/000000.vtkhdf");
+    assert!(frame.is_file(), "a job that a lost database knew is gone");
+}

@@ -159,7 +159,7 @@ fn pages_are_not_shifted_by_inserts() {
 }
 
 #[test]
-fn deletion_takes_terminal_jobs_only_and_leftovers_are_swept() {
+fn deletion_takes_terminal_jobs_only() {
     let (_directory, store) = store();
     let job = submit(&store, &json!({}));
     assert!(!store.delete(&job.id).unwrap());
@@ -167,10 +167,23 @@ fn deletion_takes_terminal_jobs_only_and_leftovers_are_swept() {
     std::fs::create_dir_all(store.job_directory(&job.id)).unwrap();
     assert!(store.delete(&job.id).unwrap());
     assert!(store.job(&job.id).unwrap().is_none());
-    let leftover = store.job_directory("job_leftover");
-    std::fs::create_dir_all(&leftover).unwrap();
-    store.sweep().unwrap();
-    assert!(!leftover.exists());
+    assert!(!store.job_directory(&job.id).exists());
+}
+
+#[test]
+fn entries_that_the_database_does_not_list_are_named() {
+    let (directory, store) = store();
+    let known = submit(&store, &json!({}));
+    std::fs::create_dir_all(store.job_directory(&known.id)).unwrap();
+    let foreign = ["jobs/2025-thesis", "jobs/job_of_a_newer_database", "uploads/photos"].map(|p| directory.path().join(p));
+    for folder in &foreign {
+        std::fs::create_dir_all(folder).unwrap();
+    }
+    std::fs::write(directory.path().join("jobs/.DS_Store"), "x").unwrap();
+    let mut expected = foreign.to_vec();
+    expected.push(directory.path().join("jobs/.DS_Store"));
+    expected.sort();
+    assert_eq!(store.unknown_entries().unwrap(), expected);
 }
 
 #[test]
