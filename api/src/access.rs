@@ -6,7 +6,7 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use meniscus_jobs::digest;
+use meniscus_jobs::system::digest;
 use std::collections::{BTreeSet, HashMap};
 use std::net::IpAddr;
 use std::path::Path;
@@ -261,7 +261,7 @@ impl Budget {
 mod tests {
     use super::{AccessRules, Client, Scope, parse_tokens, wanted_scope};
     use axum::http::{HeaderMap, HeaderValue, Method};
-    use meniscus_jobs::digest;
+    use meniscus_jobs::system::digest;
 
     fn rules(per_minute: Option<u32>) -> AccessRules {
         let line = |name: &str, scopes: &str| format!("{name} {scopes} sha256:{}\n", digest::of_bytes(name.as_bytes()));

@@ -1,7 +1,7 @@
 //! Measuring an unknown machine, once, in a process of its own.
 
-use meniscus_jobs::calibration::PhaseMeasured;
-use meniscus_jobs::store::Store;
+use meniscus_jobs::service::store::Store;
+use meniscus_jobs::spec::calibration::PhaseMeasured;
 use std::io;
 use std::process::{Command, Stdio};
 use std::sync::Arc;

@@ -2,9 +2,9 @@
 
 use crate::access::{AccessRules, TokenFileError};
 use clap::Args;
-use meniscus_jobs::body::Allowance;
-use meniscus_jobs::process;
-use meniscus_jobs::supervisor::{DISK_RESERVE_BYTES, Settings};
+use meniscus_jobs::service::supervisor::{DISK_RESERVE_BYTES, Settings};
+use meniscus_jobs::spec::body::Allowance;
+use meniscus_jobs::system::process;
 use serde::Deserialize;
 use std::net::SocketAddr;
 use std::path::PathBuf;

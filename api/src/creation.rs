@@ -9,8 +9,9 @@ use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use meniscus::scene::Violation;
-use meniscus_jobs::store::{KeptAnswer, Made, Once};
-use meniscus_jobs::{digest, strict_json};
+use meniscus_jobs::service::store::{KeptAnswer, Made, Once};
+use meniscus_jobs::spec::strict_json;
+use meniscus_jobs::system::digest;
 use serde_json::{Value, json};
 
 /// A request that makes something, with its whole body.

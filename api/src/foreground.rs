@@ -1,11 +1,14 @@
 //! `meniscus run` and `meniscus resume`: one job in this process, with a progress bar and no service.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use meniscus_jobs::body::{self, Allowance, NoSources};
-use meniscus_jobs::observers::Control;
-use meniscus_jobs::order::{Order, StartCheckpoint};
-use meniscus_jobs::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
-use meniscus_jobs::{checkpoint, process, strict_json, worker};
+use meniscus_jobs::formats::checkpoint;
+use meniscus_jobs::spec::attempt_spec::{Order, StartCheckpoint};
+use meniscus_jobs::spec::body::{self, Allowance, NoSources};
+use meniscus_jobs::spec::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
+use meniscus_jobs::spec::strict_json;
+use meniscus_jobs::system::process;
+use meniscus_jobs::worker::attempt;
+use meniscus_jobs::worker::observers::Control;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -107,7 +110,7 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
     };
     let keep = resolved["checkpoint"]["keep"].as_u64().unwrap_or(2) as usize;
     let mut sink = Screen::new(out.clone(), keep);
-    let verdict = worker::run_attempt(&order, &out, &Control::default(), &mut sink);
+    let verdict = attempt::run_attempt(&order, &out, &Control::default(), &mut sink);
     sink.bar.finish_and_clear();
     let mut output = io::stdout().lock();
     match verdict {

@@ -20,7 +20,7 @@ pub(crate) use sources::StoreSources;
 use crate::application::Application;
 use crate::error::ApiError;
 use axum::http::{HeaderMap, header};
-use meniscus_jobs::store::{JobRow, Store};
+use meniscus_jobs::service::store::{JobRow, Store};
 use std::sync::Arc;
 
 /// Runs work on the store away from the threads that answer.

@@ -4,9 +4,9 @@ mod collections;
 
 pub use collections::{DryRunView, EstimateView, StudyList, StudyView, UploadList, UploadView};
 
-use meniscus_jobs::build;
-use meniscus_jobs::records::{HealthRecord, Progress, Usage};
-use meniscus_jobs::store::{CheckpointRow, Event, FileRow, JobRow};
+use meniscus_jobs::service::store::{CheckpointRow, Event, FileRow, JobRow};
+use meniscus_jobs::spec::records::{HealthRecord, Progress, Usage};
+use meniscus_jobs::system::build;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -1,10 +1,12 @@
 //! Files that others read: VTKHDF frames, CSV series, SVG pictures.
 
 pub mod chart;
+pub mod checkpoint;
 pub mod cloud_file;
 pub mod csv;
 pub mod frame_index;
 pub mod hdf5_file;
+pub mod mesh;
 pub mod picture;
 pub mod speed_error;
 pub mod structure;

@@ -1,40 +1,28 @@
-//! Durable jobs for the Meniscus engine.
+//! Durable jobs for the Meniscus engine, by process.
 //!
-//! Two processes share this crate and meet in files only:
+//! The modules stand in order: each uses only those above it.
 //!
-//! - the service: [`body`] → [`store`] (the one SQLite file) → [`supervisor`] (queue, limits, recovery) → [`executor`];
-//! - a worker: [`order`] → [`worker`] → [`observers`] → frames, checkpoints, series and [`records`] in its attempt's
-//!   directory.
+//! - [`system`]: files, digests, the clock, what the operating system says of processes;
+//! - [`spec`]: plain data that the service and its workers exchange: bodies, states, records, the attempt's specification;
+//! - [`formats`]: files that other programs read, and checkpoints;
+//! - [`worker`]: the process of one attempt;
+//! - [`inspection`]: the process that looks into one uploaded file, under limits;
+//! - [`service`]: the store (one SQLite file), the supervisor (queue, limits, recovery), the executor, uploads, studies;
+//! - [`verify`]: runs cases with the worker's code and measures them.
 //!
-//! The service reads the records, checks their epoch and publishes. It knows no HTTP and no numerics: a simulation is
-//! a `dyn Simulation` to it.
+//! The service and its workers meet in files only. The service reads the records, checks their epoch and publishes. It
+//! knows no HTTP and no numerics: a simulation is a `dyn Simulation` to it.
 
-pub mod artifacts;
-pub mod backup;
-pub mod body;
-pub mod breakpoints;
-pub mod build;
-pub mod calibration;
-pub mod checkpoint;
-pub mod clock;
-pub mod digest;
-pub mod executor;
-pub mod forecast;
+pub mod system;
+
+pub mod spec;
+
 pub mod formats;
-pub mod fsck;
-pub mod inputs;
-pub mod job;
-pub mod local_run;
-pub mod lock;
-pub mod observers;
-pub mod order;
-pub mod process;
-pub mod records;
-pub mod report;
-pub mod store;
-pub mod strict_json;
-pub mod study;
-pub mod supervisor;
-pub mod uploads;
-pub mod verify;
+
 pub mod worker;
+
+pub mod inspection;
+
+pub mod service;
+
+pub mod verify;

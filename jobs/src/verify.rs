@@ -7,8 +7,9 @@ mod table;
 
 pub use table::Outcome;
 
-use crate::local_run::{self, Keep};
-use crate::{build, digest};
+use crate::system::build;
+use crate::system::digest;
+use crate::worker::local_run::{self, Keep};
 use meniscus::scene::SceneKind;
 use meniscus::scene::rows::{Figure, Row};
 use serde_json::{Value, json};

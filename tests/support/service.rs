@@ -137,7 +137,7 @@ impl Service {
 
     /// Resident memory of the service.
     pub fn resident_bytes(&self) -> u64 {
-        meniscus_jobs::process::resident_bytes(self.pid()).unwrap()
+        meniscus_jobs::system::process::resident_bytes(self.pid()).unwrap()
     }
 
     /// The worker of a job, waited for.

@@ -9,10 +9,10 @@ use axum::Json;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Redirect, Response};
-use meniscus_jobs::job::State as JobState;
-use meniscus_jobs::observers::frames::HDF5;
-use meniscus_jobs::order::attempt_directory;
-use meniscus_jobs::store::CheckpointRow;
+use meniscus_jobs::service::store::CheckpointRow;
+use meniscus_jobs::spec::attempt_spec::attempt_directory;
+use meniscus_jobs::spec::states::State as JobState;
+use meniscus_jobs::worker::observers::frames::HDF5;
 
 /// A job's verified checkpoints, newest first.
 #[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),

@@ -10,7 +10,7 @@ use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::HeaderMap;
-use meniscus_jobs::strict_json;
+use meniscus_jobs::spec::strict_json;
 
 /// Checks a job's body and says what it would take. Nothing is made.
 #[utoipa::path(post, path = "/v1/estimates", tag = "jobs",

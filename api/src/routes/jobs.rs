@@ -12,9 +12,10 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use meniscus::scene::Violation;
 use meniscus::scene::check::closest;
-use meniscus_jobs::job::{Reason, State as JobState, Trigger};
-use meniscus_jobs::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store};
-use meniscus_jobs::{clock, process};
+use meniscus_jobs::service::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store};
+use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
+use meniscus_jobs::system::clock;
+use meniscus_jobs::system::process;
 use serde_json::{Value, json};
 use std::time::Duration;
 

@@ -6,8 +6,8 @@ use crate::routes::with_store;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
-use meniscus_jobs::job::State as JobState;
-use meniscus_jobs::process;
+use meniscus_jobs::spec::states::State as JobState;
+use meniscus_jobs::system::process;
 use metrics::gauge;
 
 /// Counters and gauges as Prometheus text.

@@ -9,10 +9,10 @@ use axum::extract::{Path, Query, State};
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Response};
 use meniscus_jobs::formats::csv;
-use meniscus_jobs::observers::series;
-use meniscus_jobs::order::attempt_directory;
-use meniscus_jobs::store::JobRow;
-use meniscus_jobs::worker;
+use meniscus_jobs::service::store::JobRow;
+use meniscus_jobs::spec::attempt_spec::attempt_directory;
+use meniscus_jobs::worker::attempt;
+use meniscus_jobs::worker::observers::series;
 
 /// A file of every attempt, in order, as far as it is there.
 fn of_attempts(application: &Application, row: &JobRow, name: &str) -> Vec<Vec<u8>> {
@@ -34,7 +34,7 @@ pub async fn log(
     let tail = number(&query, "tail")?;
     let row = job(&application, &id).await?;
     let reader = application.clone();
-    let text = with_store(&application, move |_| Ok(of_attempts(&reader, &row, worker::LOG_NAME).concat())).await?;
+    let text = with_store(&application, move |_| Ok(of_attempts(&reader, &row, attempt::LOG_NAME).concat())).await?;
     let text = match tail {
         None => text,
         Some(tail) => {

@@ -7,7 +7,7 @@ use crate::routes::studies;
 use crate::views::{ServiceLimits, ServiceView, StatusView};
 use axum::Json;
 use axum::extract::State;
-use meniscus_jobs::build;
+use meniscus_jobs::system::build;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 

@@ -1,10 +1,10 @@
 //! Checkpoints and uploads as the store knows them.
 
 use crate::error::ApiError;
-use meniscus_jobs::body::{self, Allowance, JobBody, RestartSource, Sources};
-use meniscus_jobs::calibration::Calibration;
-use meniscus_jobs::store::{Store, StoreError};
-use meniscus_jobs::uploads::Purpose;
+use meniscus_jobs::service::store::{Store, StoreError};
+use meniscus_jobs::spec::body::{self, Allowance, JobBody, RestartSource, Sources};
+use meniscus_jobs::spec::calibration::Calibration;
+use meniscus_jobs::spec::uploads::Purpose;
 use serde_json::Value;
 use std::cell::RefCell;
 

@@ -9,9 +9,11 @@ use axum::Json;
 use axum::extract::{Path, Query, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use meniscus_jobs::job::{Reason, State as JobState, Trigger};
-use meniscus_jobs::store::{Change, Made, NewJob, StudyRow};
-use meniscus_jobs::study::{self, report, table};
+use meniscus_jobs::service::store::{Change, Made, NewJob, StudyRow};
+use meniscus_jobs::service::study_report;
+use meniscus_jobs::service::study_table;
+use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
+use meniscus_jobs::spec::study;
 
 /// Bytes of a study's body at most: ten thousand points of a list.
 pub const BODY_LIMIT: usize = 16 << 20;
@@ -132,7 +134,7 @@ pub async fn table(
     let row = study(&application, id).await?;
     let table = with_store(&application, move |store| {
         let points = store.points(&row, after, limit)?;
-        Ok(table::compose(&row.axes, &points))
+        Ok(study_table::compose(&row.axes, &points))
     })
     .await?;
     if accepts(&headers, "json", "text/csv") {
@@ -159,9 +161,9 @@ pub async fn report(
     with_store(&application, move |store| {
         let points = store.points(&row, None, ALL_POINTS)?;
         if !is_picture {
-            return Ok(Json(report::compose(&row, &points)).into_response());
+            return Ok(Json(study_report::compose(&row, &points)).into_response());
         }
-        let picture = report::draw(&row, &points, wanted.as_deref()).map_err(ApiError::Internal)?;
+        let picture = study_report::draw(&row, &points, wanted.as_deref()).map_err(ApiError::Internal)?;
         let picture = picture.ok_or(ApiError::NotFound("error among the finished points"))?;
         Ok(([(header::CONTENT_TYPE, "image/svg+xml")], picture).into_response())
     })

@@ -1,8 +1,8 @@
 //! Studies, uploads and estimates as clients see them.
 
-use meniscus_jobs::body::JobBody;
-use meniscus_jobs::job::State;
-use meniscus_jobs::store::{StudyRow, UploadRow};
+use meniscus_jobs::service::store::{StudyRow, UploadRow};
+use meniscus_jobs::spec::body::JobBody;
+use meniscus_jobs::spec::states::State;
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

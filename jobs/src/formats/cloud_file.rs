@@ -13,7 +13,7 @@ const HEAD: usize = 24;
 /// Columns at most.
 const MOST_COLUMNS: u64 = 7;
 /// Bytes of a file at most.
-pub const MOST_BYTES: u64 = HEAD as u64 + crate::uploads::MOST_POINTS * MOST_COLUMNS * 8;
+pub const MOST_BYTES: u64 = HEAD as u64 + crate::spec::uploads::MOST_POINTS * MOST_COLUMNS * 8;
 
 /// Writes points.
 ///
@@ -42,7 +42,7 @@ pub fn read(input: &mut impl Read) -> io::Result<Cloud> {
     input.read_exact(&mut head)?;
     let number = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().unwrap_or_default());
     let (count, columns) = (number(8), number(16));
-    if head[..8] != *MAGIC || ![3, 4, 6, MOST_COLUMNS].contains(&columns) || count > crate::uploads::MOST_POINTS {
+    if head[..8] != *MAGIC || ![3, 4, 6, MOST_COLUMNS].contains(&columns) || count > crate::spec::uploads::MOST_POINTS {
         return Err(wrong());
     }
     let mut numbers = Vec::new();

@@ -3,8 +3,8 @@
 use super::{Bench, measure};
 use crate::formats::chart::{self, Chart};
 use crate::formats::{csv, picture, speed_error, vtkhdf};
-use crate::local_run::Keep;
-use crate::observers::series;
+use crate::worker::local_run::Keep;
+use crate::worker::observers::series;
 use meniscus::scene::rows::{Figure, Plot, Quantity};
 use serde_json::{Value, json};
 use std::fs;

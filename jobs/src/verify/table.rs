@@ -1,6 +1,7 @@
 //! Outcomes as lines of a table and as a document.
 
-use crate::{clock, process};
+use crate::system::clock;
+use crate::system::process;
 use meniscus::scene::rows::{Figure, Reach, Row};
 use std::fmt::{Display, Formatter, Write};
 
@@ -88,7 +89,7 @@ pub(super) fn document(outcomes: &[Outcome], figures: &[Figure], notes: Option<&
     let mut text = String::new();
     let date = clock::now();
     let machine = process::cpu_name().unwrap_or_else(|| "unknown".to_owned());
-    let (build, isa) = (crate::build::name(), crate::build::isa());
+    let (build, isa) = (crate::system::build::name(), crate::system::build::isa());
     let missed = outcomes.iter().filter(|outcome| !outcome.is_met).count();
     // Writing to a String cannot fail.
     let _ = write!(

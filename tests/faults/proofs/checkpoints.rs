@@ -3,7 +3,7 @@
 use crate::common::{Expected, checkpoint_files};
 use crate::support::{Service, chance, eventually, long_job, steady_job};
 use meniscus::simulation::State;
-use meniscus_jobs::checkpoint::{Counters, meta, read, write_verified};
+use meniscus_jobs::formats::checkpoint::{Counters, meta, read, write_verified};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Duration;

@@ -89,7 +89,7 @@ pub fn cut_downloads(count: u64, seed: u64) -> String {
     }
     let rest = Command::new("curl").args(["-sS", "-C", "-", "-o"]).arg(&target).arg(&url).output().unwrap();
     assert!(rest.status.success(), "{}", String::from_utf8_lossy(&rest.stderr));
-    let (sha256, bytes) = meniscus_jobs::digest::of_file(&target).unwrap();
+    let (sha256, bytes) = meniscus_jobs::system::digest::of_file(&target).unwrap();
     assert_eq!((sha256.as_str(), bytes), (frame["sha256"].as_str().unwrap(), size));
     format!("{count} cuts in a download of {:.1} MB, the digest is that of the list", size as f64 / 1e6)
 }

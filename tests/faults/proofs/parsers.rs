@@ -6,11 +6,12 @@ use meniscus::scene::CloudSizes;
 use meniscus::scene::understand;
 use meniscus::scenes::SCENES;
 use meniscus::simulation::OutputPlan;
-use meniscus_jobs::body::{self, Allowance, NoSources};
-use meniscus_jobs::calibration::Calibration;
+use meniscus_jobs::formats::mesh;
 use meniscus_jobs::formats::structure;
-use meniscus_jobs::uploads::mesh;
-use meniscus_jobs::{strict_json, study};
+use meniscus_jobs::spec::body::{self, Allowance, NoSources};
+use meniscus_jobs::spec::calibration::Calibration;
+use meniscus_jobs::spec::strict_json;
+use meniscus_jobs::spec::study;
 use serde_json::{Value, json};
 
 /// Draws from a seed and a count.

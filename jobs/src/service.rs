@@ -1,0 +1,10 @@
+//! The service: store, supervisor, executors, uploads, studies, upkeep of the data directory.
+
+pub mod backup;
+pub mod executor;
+pub mod fsck;
+pub mod inspector;
+pub mod store;
+pub mod study_report;
+pub mod study_table;
+pub mod supervisor;

@@ -1,0 +1,164 @@
+//! A look over a data directory that no service is using: whether the store is whole, agrees with itself, and with the
+//! files beside it.
+
+use crate::service::store::uploads::{CLOUD, CONTENT};
+use crate::service::store::{self, JobFilter, JobRow, START_CHECKPOINT, Store, StoreError};
+use crate::spec::attempt_spec::attempt_directory;
+use crate::spec::states::State;
+use crate::system::digest;
+use crate::system::lock::{DirectoryLock, LockError};
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// One thing that is wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// Where: an id, or the store.
+    pub place: String,
+    /// What.
+    pub what: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        write!(formatter, "{}: {}", self.place, self.what)
+    }
+}
+
+/// What was looked at, and what is wrong.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Findings {
+    /// Jobs.
+    pub jobs: usize,
+    /// Files whose digests were taken.
+    pub files: usize,
+    /// What is wrong.
+    pub wrong: Vec<Finding>,
+}
+
+/// Why nothing could be looked at.
+#[derive(Debug, thiserror::Error)]
+pub enum FsckError {
+    /// A service uses the directory.
+    #[error("{0}; stop it first, or look over a copy (meniscus backup)")]
+    Lock(#[from] LockError),
+    /// The store cannot be opened.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// There is no store.
+    #[error("there is no data directory with a store here")]
+    NoStore,
+    /// The system failed.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+}
+
+/// Rows that are read at once.
+const CHUNK: u64 = 500;
+
+/// Looks over a data directory. Nothing is changed, except that the schema is brought up to date as any start would.
+///
+/// # Errors
+/// [`FsckError`].
+pub fn check(data: &Path) -> Result<Findings, FsckError> {
+    if !data.join(store::FILE_NAME).is_file() {
+        return Err(FsckError::NoStore);
+    }
+    let _lock = DirectoryLock::take(data)?;
+    let store = Store::open(data)?;
+    let mut findings = Findings::default();
+    for what in store.integrity()? {
+        findings.wrong.push(Finding { place: "store".to_owned(), what });
+    }
+    let mut filter = JobFilter { limit: CHUNK, oldest_first: true, ..JobFilter::default() };
+    loop {
+        let jobs = store.list(&filter)?;
+        for job in &jobs {
+            of_job(&store, job, &mut findings)?;
+        }
+        match jobs.last() {
+            Some(last) => filter.cursor = Some(last.id.clone()),
+            None => break,
+        }
+    }
+    of_uploads(&store, &mut findings)?;
+    of_directories(&store, &mut findings)?;
+    Ok(findings)
+}
+
+fn of_job(store: &Store, job: &JobRow, findings: &mut Findings) -> Result<(), FsckError> {
+    findings.jobs += 1;
+    let mut wrong = Vec::new();
+    if job.state.is_terminal() != job.finished_at.is_some() {
+        wrong.push(format!("it is {} and finished at {:?}", job.state.word(), job.finished_at));
+    }
+    if !store.events_are_whole(&job.id)? {
+        wrong.push("its events are not numbered from 1 without gaps".to_owned());
+    }
+    let told = store.last_told_state(&job.id)?;
+    if told != Some(job.state) {
+        wrong.push(format!("its last event says {:?}, its row {:?}", told.map(State::word), job.state.word()));
+    }
+    let directory = store.job_directory(&job.id);
+    let listed = store.files(&job.id)?.into_iter().filter(|file| file.content.is_none());
+    let listed = listed.map(|file| (file.attempt, file.path, file.size_bytes, file.sha256));
+    let checkpoints = store.checkpoints(&job.id)?.into_iter().map(|c| (c.attempt, c.path, c.size_bytes, c.sha256));
+    for (attempt, path, size, sha256) in listed.chain(checkpoints) {
+        findings.files += 1;
+        wrong.extend(of_file(&attempt_directory(&directory, attempt).join(&path), &path, size, &sha256));
+    }
+    if let Some(sha256) = job.restart_sha256.as_ref().filter(|_| !job.state.is_terminal()) {
+        let start = directory.join(START_CHECKPOINT);
+        let size = fs::metadata(&start).map_or(0, |meta| meta.len());
+        wrong.extend(of_file(&start, START_CHECKPOINT, size, sha256));
+    }
+    if job.state == State::Succeeded && job.results.is_none() {
+        wrong.push("it has succeeded without results".to_owned());
+    }
+    findings.wrong.extend(wrong.into_iter().map(|what| Finding { place: job.id.clone(), what }));
+    Ok(())
+}
+
+/// What is wrong with a file, if anything is.
+fn of_file(path: &Path, name: &str, size: u64, sha256: &str) -> Option<String> {
+    match digest::of_file(path) {
+        Err(error) => Some(format!("{name} cannot be read: {}", error.kind())),
+        Ok((_, found)) if found != size => Some(format!("{name} has {found} bytes instead of {size}")),
+        Ok((found, _)) if found != sha256 => Some(format!("{name} has another digest than the store")),
+        Ok(_) => None,
+    }
+}
+
+fn of_uploads(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
+    let mut cursor: Option<String> = None;
+    loop {
+        let uploads = store.uploads(cursor.as_deref(), CHUNK)?;
+        for upload in &uploads {
+            findings.files += 1;
+            let directory = store.upload_directory(&upload.id);
+            let mut wrong: Vec<String> =
+                of_file(&directory.join(CONTENT), CONTENT, upload.size_bytes, &upload.sha256).into_iter().collect();
+            let has_points = upload.found["points"].as_u64().is_some();
+            if has_points && !directory.join(CLOUD).is_file() {
+                wrong.push("its points are missing".to_owned());
+            }
+            findings.wrong.extend(wrong.into_iter().map(|what| Finding { place: upload.id.clone(), what }));
+        }
+        match uploads.last() {
+            Some(last) => cursor = Some(last.id.clone()),
+            None => return Ok(()),
+        }
+    }
+}
+
+/// Directories that belong to nothing. The next start removes them.
+fn of_directories(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
+    for path in store.unknown_entries()? {
+        let place = path.strip_prefix(store.directory()).unwrap_or(&path).display().to_string();
+        let what = "it is not in the database; the service leaves it where it is".to_owned();
+        findings.wrong.push(Finding { place, what });
+    }
+    Ok(())
+}

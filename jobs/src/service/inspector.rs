@@ -1,0 +1,144 @@
+//! The service's side of a check: starts the process that looks, holds it to its time, takes what it says.
+
+use crate::formats::cloud_file;
+use crate::service::store::uploads::{CLOUD, CONTENT};
+use crate::service::store::{Store, UploadRow};
+use crate::spec::uploads::Findings;
+use crate::system::artifacts;
+use serde_json::Value;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::Duration;
+
+/// Time that a check may take.
+const PATIENCE: Duration = Duration::from_secs(90);
+/// Bytes of the line that says what was found, at most.
+const LONGEST_LINE: u64 = 4 << 20;
+
+/// Wakes the inspector; dropping all of them ends it.
+#[derive(Debug, Clone)]
+pub struct InspectorHandle {
+    sender: Sender<()>,
+}
+
+impl InspectorHandle {
+    /// There is something to look into.
+    pub fn wake(&self) {
+        // After the end there is nobody to wake.
+        let _ = self.sender.send(());
+    }
+}
+
+/// Looks into one upload after another, on a thread of its own.
+///
+/// # Errors
+/// When the thread cannot be started.
+pub fn start(store: Arc<Store>, program: PathBuf) -> io::Result<InspectorHandle> {
+    let (sender, receiver) = channel();
+    std::thread::Builder::new().name("inspector".to_owned()).spawn(move || attend(&store, &program, &receiver))?;
+    Ok(InspectorHandle { sender })
+}
+
+fn attend(store: &Store, program: &Path, receiver: &Receiver<()>) {
+    loop {
+        match store.quarantined_uploads() {
+            Ok(waiting) => {
+                for upload in waiting {
+                    look_into(store, program, &upload);
+                }
+            }
+            Err(error) => tracing::error!(%error, "uploads could not be listed"),
+        }
+        match receiver.recv_timeout(Duration::from_secs(5)) {
+            Ok(()) | Err(RecvTimeoutError::Timeout) => while receiver.try_recv().is_ok() {},
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+    }
+}
+
+fn look_into(store: &Store, program: &Path, upload: &UploadRow) {
+    let directory = store.upload_directory(&upload.id);
+    let settled = check(program, upload, &directory).map_err(|error| error.to_string()).and_then(|verdict| {
+        let said = verdict.as_ref().map_or_else(String::as_str, |_| "ready");
+        tracing::info!(upload = upload.id, purpose = upload.purpose.word(), said, "upload checked");
+        store.settle_upload(&upload.id, &verdict).map_err(|error| error.to_string())
+    });
+    if let Err(error) = settled {
+        // It stays in quarantine and is looked into again.
+        tracing::error!(upload = upload.id, error, "an upload could not be checked");
+    }
+}
+
+/// What a process of its own finds in an upload.
+fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Result<Findings, String>> {
+    let mut child = Command::new(program)
+        .arg0("meniscus")
+        .args(["inspect", "--as", upload.purpose.word()])
+        .arg(directory.join(CONTENT))
+        // Nothing of our surroundings reaches libhdf5: no plug-in path, no driver of another name.
+        .env_clear()
+        .env("HDF5_PLUGIN_PRELOAD", "::")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()?;
+    let output = child.stdout.take().ok_or_else(|| io::Error::other("no pipe"))?;
+    let target = directory.join(CLOUD);
+    let (sender, receiver) = channel();
+    let reading = std::thread::Builder::new().name("inspection".to_owned()).spawn(move || {
+        // The other side may have given up waiting.
+        let _ = sender.send(take(output, &target));
+    })?;
+    let taken = receiver.recv_timeout(PATIENCE);
+    let is_late = taken.is_err();
+    if is_late {
+        child.kill()?;
+    }
+    let status = child.wait()?;
+    if !is_late {
+        let _ = reading.join();
+    }
+    if is_late {
+        return Ok(Err(format!("looking into it took longer than {} s", PATIENCE.as_secs())));
+    }
+    if let Some(signal) = status.signal() {
+        return Ok(Err(format!("looking into it took more memory or time than is granted (signal {signal})")));
+    }
+    if !status.success() {
+        return Ok(Err("looking into it failed".to_owned()));
+    }
+    taken.map_err(io::Error::other)?
+}
+
+/// Takes the line and puts the points behind it, if there are any, into a file.
+fn take(output: impl Read, target: &Path) -> io::Result<Result<Findings, String>> {
+    let mut output = BufReader::new(output);
+    let mut line = Vec::new();
+    (&mut output).take(LONGEST_LINE).read_until(b'\n', &mut line)?;
+    let Ok(mut said) = serde_json::from_slice::<Value>(&line) else {
+        return Ok(Err("looking into it failed".to_owned()));
+    };
+    if let Some(reason) = said["rejected"].as_str() {
+        return Ok(Err(reason.to_owned()));
+    }
+    if !output.fill_buf()?.is_empty() {
+        let mut file = File::create(artifacts::unfinished(target))?;
+        let written = io::copy(&mut output.take(cloud_file::MOST_BYTES), &mut file)
+            .and_then(|_| file.flush())
+            .and_then(|()| artifacts::finish(target));
+        if let Err(error) = written {
+            let _ = std::fs::remove_file(artifacts::unfinished(target));
+            // Waiting for room would keep the upload itself from being deleted.
+            if crate::system::process::is_out_of_space(&error) {
+                return Ok(Err("there was no room on the disk for its points; delete it and send it again".to_owned()));
+            }
+            return Err(error);
+        }
+    }
+    Ok(Ok(said["ready"].take()))
+}

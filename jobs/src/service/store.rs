@@ -1,0 +1,343 @@
+//! The one SQLite file of a data directory: jobs, events, files, checkpoints. Only the service opens it.
+//!
+//! One connection writes, under a lock; a few others read. Every change of a job is a compare-and-set on its `rev`
+//! inside a transaction that also writes the event, so what a client saw and what the file says never differ.
+
+pub mod answers;
+pub mod calibration;
+pub mod census;
+pub mod events;
+pub mod ids;
+pub mod import;
+pub mod integrity;
+pub mod listing;
+pub mod migrations;
+pub mod retention;
+pub mod rows;
+pub mod settle;
+pub mod studies;
+pub mod submission;
+mod together;
+pub mod transitions;
+pub mod uploads;
+
+pub use answers::{KeptAnswer, Made, Once};
+pub use events::Event;
+pub use listing::JobFilter;
+pub use rows::{CheckpointRow, FileRow, JobRow};
+pub use studies::{NewStudy, PointRow, StudyRow};
+pub use submission::{NewJob, START_CHECKPOINT};
+pub use transitions::{Change, ChangeError};
+pub use uploads::{NewUpload, UploadRow};
+
+use crate::spec::body::{Origin, RestartSource};
+use crate::spec::states::State;
+use ids::RisingIds;
+use rusqlite::config::DbConfig;
+use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use tokio::sync::watch;
+use ulid::Ulid;
+
+/// Name of the file in the data directory.
+pub const FILE_NAME: &str = "meniscus.sqlite";
+/// Size of the log from which on it is trimmed.
+const LONG_LOG_BYTES: u64 = 2 << 20;
+/// Size from which on it is trimmed though somebody writes.
+const LONGEST_LOG_BYTES: u64 = 128 << 20;
+/// Pages of the log at which a commit trims it after all.
+const LONGEST_LOG_PAGES: i64 = 65_536;
+/// Connections for reading.
+const READERS: usize = 4;
+
+/// The store of a data directory.
+pub struct Store {
+    directory: PathBuf,
+    writer: Arc<Mutex<Connection>>,
+    /// Small transactions that wait for the writer.
+    waiting: Mutex<Sender<together::Waiting>>,
+    readers: Vec<Mutex<Connection>>,
+    next_reader: std::sync::atomic::AtomicUsize,
+    /// Trims the log.
+    trimmer: Mutex<Connection>,
+    ids: RisingIds,
+    /// Counts changes; waiting clients watch it.
+    changes: watch::Sender<u64>,
+}
+
+/// The store failed.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// SQLite failed.
+    #[error("the store failed: {0}")]
+    Sqlite(#[from] rusqlite::Error),
+    /// The system failed.
+    #[error("the data directory failed: {0}")]
+    Io(#[from] std::io::Error),
+    /// The checkpoint of a restart was removed in the meantime.
+    #[error("the checkpoint is gone")]
+    CheckpointGone,
+    /// An upload that a scene names was removed in the meantime.
+    #[error("the upload is gone")]
+    UploadGone,
+    /// A transaction that was shared with others failed.
+    #[error("the store failed: {0}")]
+    Together(String),
+    /// A row does not say what it should.
+    #[error("a stored value is unreadable: {0}")]
+    Json(#[from] serde_json::Error),
+    /// The file was written by a later version of the program.
+    #[error("the store has schema {found}, this program knows {known}")]
+    Newer {
+        /// Of the file.
+        found: i64,
+        /// Of the program.
+        known: i64,
+    },
+}
+
+impl Store {
+    /// Opens or makes the store of a data directory and brings its schema up to date.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn open(directory: &Path) -> Result<Self, StoreError> {
+        std::fs::create_dir_all(directory.join("jobs"))?;
+        std::fs::create_dir_all(directory.join("uploads"))?;
+        let path = directory.join(FILE_NAME);
+        let mut writer = connect(&path)?;
+        migrations::apply(&mut writer)?;
+        let ids = RisingIds::above(&writer)?;
+        let (writer, changes) = (Arc::new(Mutex::new(writer)), watch::Sender::new(0));
+        let readers = (0..READERS).map(|_| connect(&path).map(Mutex::new)).collect::<Result<_, _>>()?;
+        Ok(Self {
+            directory: directory.to_owned(),
+            waiting: together::start(Arc::clone(&writer), changes.clone())?,
+            writer,
+            readers,
+            next_reader: std::sync::atomic::AtomicUsize::new(0),
+            trimmer: Mutex::new(connect(&path)?),
+            ids,
+            changes,
+        })
+    }
+
+    /// The directory of a job.
+    #[must_use]
+    pub fn job_directory(&self, job: &str) -> PathBuf {
+        self.directory.join("jobs").join(job)
+    }
+
+    /// The data directory.
+    #[must_use]
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// Tells of every committed change.
+    #[must_use]
+    pub fn watch(&self) -> watch::Receiver<u64> {
+        self.changes.subscribe()
+    }
+
+    pub(crate) fn read(&self) -> MutexGuard<'_, Connection> {
+        let turn = self.next_reader.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        for k in 0..READERS {
+            if let Ok(free) = self.readers[(turn + k) % READERS].try_lock() {
+                return free;
+            }
+        }
+        self.readers[turn % READERS].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Runs work in one write transaction; it is durable when this returns.
+    pub(crate) fn write<R, E: From<StoreError> + From<rusqlite::Error>>(
+        &self,
+        work: impl FnOnce(&Transaction) -> Result<R, E>,
+    ) -> Result<R, E> {
+        let mut connection = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        let result = work(&transaction)?;
+        transaction.commit()?;
+        drop(connection);
+        self.changes.send_modify(|count| *count += 1);
+        Ok(result)
+    }
+
+    fn next_id(&self) -> Ulid {
+        self.ids.next()
+    }
+
+    /// What tells two versions of a job apart: its revision and the count of its progress.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn version(&self, id: &str) -> Result<Option<(i64, i64)>, StoreError> {
+        let connection = self.read();
+        Ok(connection
+            .prepare_cached("SELECT rev, progress_count FROM jobs WHERE id = ?1")?
+            .query_row([id], |row| Ok((row.get(0)?, row.get(1)?)))
+            .optional()?)
+    }
+
+    /// Brings what the log has into the store's file while nobody writes: commits beside it would be late. Only a very long
+    /// log is trimmed in any case.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn trim_log(&self, is_idle: bool) -> Result<(), StoreError> {
+        let log = self.directory.join(format!("{FILE_NAME}-wal"));
+        let least = if is_idle { LONG_LOG_BYTES } else { LONGEST_LOG_BYTES };
+        if std::fs::metadata(log).is_ok_and(|meta| meta.len() > least) {
+            let trimmer = self.trimmer.lock().unwrap_or_else(PoisonError::into_inner);
+            trimmer.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))?;
+        }
+        Ok(())
+    }
+
+    /// A job by id.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn job(&self, id: &str) -> Result<Option<JobRow>, StoreError> {
+        rows::job(&self.read(), id)
+    }
+
+    /// A checkpoint by id.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn checkpoint(&self, id: &str) -> Result<Option<CheckpointRow>, StoreError> {
+        rows::checkpoint(&self.read(), id)
+    }
+
+    /// A job's checkpoints, newest first.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn checkpoints(&self, job: &str) -> Result<Vec<CheckpointRow>, StoreError> {
+        rows::checkpoints(&self.read(), job)
+    }
+
+    /// A job's published files in the order of their paths.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn files(&self, job: &str) -> Result<Vec<FileRow>, StoreError> {
+        rows::files(&self.read(), job)
+    }
+
+    /// A published file of a job.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn file(&self, job: &str, path: &str) -> Result<Option<FileRow>, StoreError> {
+        rows::file(&self.read(), job, path)
+    }
+
+    /// What a restart from a checkpoint needs to know; None where there is no such checkpoint.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn restart_source(&self, checkpoint: &str) -> Result<Option<RestartSource>, StoreError> {
+        let connection = self.read();
+        let Some(row) = rows::checkpoint(&connection, checkpoint)? else {
+            return Ok(None);
+        };
+        let job = rows::job(&connection, &row.job)?;
+        Ok(job.map(|job| RestartSource {
+            origin: Origin::Checkpoint(row.id),
+            resolved: job.resolved,
+            isa: row.isa,
+            step: row.step,
+        }))
+    }
+
+    /// Deletes a job in a terminal state and its files; false where it is in another state.
+    ///
+    /// The row goes first, so that a row without files never exists. A crash in between leaves files without a row; the next
+    /// start names them in the log and leaves them alone.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn delete(&self, id: &str) -> Result<bool, StoreError> {
+        let deleted = self.write(|transaction| -> Result<bool, StoreError> {
+            let state: Option<String> =
+                transaction.query_row("SELECT state FROM jobs WHERE id = ?1", [id], |row| row.get(0)).optional()?;
+            if !state.as_deref().and_then(State::from_word).is_some_and(State::is_terminal) {
+                return Ok(false);
+            }
+            delete_rows(transaction, id)?;
+            Ok(true)
+        })?;
+        if deleted {
+            remove_directory(&self.job_directory(id))?;
+        }
+        Ok(deleted)
+    }
+
+    /// Entries of the job and upload folders that the database does not list: folders of other programs, jobs of a newer
+    /// database, leftovers of a submission, an upload or a deletion that a crash cut short. None of them is touched.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn unknown_entries(&self) -> Result<Vec<PathBuf>, StoreError> {
+        let mut unknown = Vec::new();
+        for kind in ["jobs", "uploads"] {
+            let known: HashSet<String> = {
+                let connection = self.read();
+                let mut statement = connection.prepare(&format!("SELECT id FROM {kind}"))?;
+                let rows = statement.query_map([], |row| row.get(0))?;
+                rows.collect::<Result<_, _>>()?
+            };
+            for entry in std::fs::read_dir(self.directory.join(kind))? {
+                let entry = entry?;
+                if !entry.file_name().to_str().is_some_and(|name| known.contains(name)) {
+                    unknown.push(entry.path());
+                }
+            }
+        }
+        unknown.sort();
+        Ok(unknown)
+    }
+}
+
+fn delete_rows(transaction: &Transaction, job: &str) -> rusqlite::Result<()> {
+    // The point of a study that it repeated is again what it was before.
+    transaction
+        .prepare_cached(
+            "UPDATE jobs SET superseded = 0 WHERE id = (SELECT retry_of FROM jobs WHERE id = ?1 AND superseded = 0)",
+        )?
+        .execute([job])?;
+    for table in ["events", "files", "checkpoints", "inputs"] {
+        transaction.prepare_cached(&format!("DELETE FROM {table} WHERE job = ?1"))?.execute([job])?;
+    }
+    transaction.prepare_cached("DELETE FROM jobs WHERE id = ?1")?.execute([job]).map(|_| ())
+}
+
+pub(crate) fn connect(path: &Path) -> Result<Connection, rusqlite::Error> {
+    let connection = Connection::open(path)?;
+    connection.busy_timeout(Duration::from_secs(10))?;
+    connection.pragma_update(None, "journal_mode", "WAL")?;
+    connection.pragma_update(None, "synchronous", "FULL")?;
+    connection.pragma_update(None, "foreign_keys", "ON")?;
+    connection.pragma_update(None, "wal_autocheckpoint", LONGEST_LOG_PAGES)?;
+    // A plan does not depend on the values that are asked for: else statements are prepared anew for every one.
+    connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_QPSG, true)?;
+    connection.set_prepared_statement_cache_capacity(64);
+    Ok(connection)
+}
+
+fn remove_directory(path: &Path) -> std::io::Result<()> {
+    match std::fs::remove_dir_all(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,49 @@
+//! What is kept for how long.
+
+use super::{Store, StoreError, answers};
+use rusqlite::params;
+
+impl Store {
+    /// Deletes jobs that came to their end more than so many days ago, with their files, and studies of which nothing is
+    /// left, twenty at a time. Answers kept for repeated requests go after a week. Says how many jobs went.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn expire(&self, days: Option<u32>) -> Result<usize, StoreError> {
+        let day = 86_400;
+        self.write(|transaction| -> Result<(), StoreError> {
+            let before = crate::system::clock::from_now(-answers::KEPT_DAYS * day);
+            transaction.execute("DELETE FROM answers WHERE created_at < ?1", [before])?;
+            Ok(())
+        })?;
+        let Some(days) = days else { return Ok(0) };
+        let before = crate::system::clock::from_now(-i64::from(days) * day);
+        let old: Vec<String> = {
+            let connection = self.read();
+            // What a restart that has not ended began with was linked; nothing else holds on to a job.
+            let mut statement = connection.prepare_cached(
+                "SELECT id FROM jobs WHERE state IN ('succeeded', 'failed', 'canceled') AND finished_at < ?1 LIMIT 20",
+            )?;
+            let rows = statement.query_map([&before], |row| row.get(0))?;
+            rows.collect::<Result<_, _>>()?
+        };
+        for id in &old {
+            if let Err(error) = self.delete(id) {
+                tracing::error!(job = id, %error, "an old job could not be deleted");
+            }
+        }
+        self.write(|transaction| -> Result<(), StoreError> {
+            for table in ["study_events WHERE study", "studies WHERE id"] {
+                transaction.execute(
+                    &format!(
+                        "DELETE FROM {table} IN (SELECT id FROM studies s WHERE created_at < ?1
+                             AND NOT EXISTS (SELECT 1 FROM jobs WHERE study = s.id))"
+                    ),
+                    params![before],
+                )?;
+            }
+            Ok(())
+        })?;
+        Ok(old.len())
+    }
+}

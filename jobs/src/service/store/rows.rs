@@ -1,0 +1,274 @@
+//! Rows as values.
+
+use super::StoreError;
+use crate::formats::frame_index;
+use crate::spec::records::{Progress, Usage, Verdict};
+use crate::spec::states::{Reason, State};
+use crate::system::digest;
+use rusqlite::{Connection, OptionalExtension, Row};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// A job.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobRow {
+    /// Id.
+    pub id: String,
+    /// Counts changes of state.
+    pub rev: i64,
+    /// State.
+    pub state: State,
+    /// Why, if the state is not plain.
+    pub reason: Option<Reason>,
+    /// What to do about it.
+    pub hint: Option<String>,
+    /// Numbers and places of a failure.
+    pub message: Option<String>,
+    /// Name.
+    pub name: Option<String>,
+    /// Labels.
+    pub labels: BTreeMap<String, String>,
+    /// Kind of the scene.
+    pub kind: String,
+    /// Body as sent.
+    pub spec: Value,
+    /// Body with every default.
+    pub resolved: Value,
+    /// Size of the run as estimated.
+    pub estimate: Value,
+    /// Priority.
+    pub priority: i64,
+    /// Made.
+    pub created_at: String,
+    /// First started.
+    pub started_at: Option<String>,
+    /// Came to a terminal state.
+    pub finished_at: Option<String>,
+    /// Number of the latest attempt: the epoch.
+    pub attempt: u64,
+    /// Workers that died in a row without a new checkpoint.
+    pub deaths: u32,
+    /// Bytes of the attempt's records that are imported.
+    pub records_offset: u64,
+    /// Whether this attempt has made a checkpoint.
+    pub has_new_checkpoint: bool,
+    /// Process of the latest attempt.
+    pub worker_pid: Option<u32>,
+    /// The worker's last word in this attempt, once it has come.
+    pub verdict: Option<Verdict>,
+    /// Why the service ended the worker, written before it did.
+    pub condemned: Option<Reason>,
+    /// Progress.
+    pub progress: Progress,
+    /// Counts changes of progress.
+    pub progress_count: i64,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Cost of attempts that ended.
+    pub usage: Usage,
+    /// Running time at the last resume.
+    pub leg_wall_s: f64,
+    /// Checkpoint of another job that this one began with.
+    pub restarted_from: Option<String>,
+    /// Digest of that checkpoint's file.
+    pub restart_sha256: Option<String>,
+    /// Study that it is a point of.
+    pub study: Option<String>,
+    /// Number of the point.
+    pub study_index: Option<u64>,
+    /// Job that it repeats.
+    pub retry_of: Option<String>,
+    /// Errors and cost, once it has succeeded.
+    pub results: Option<Value>,
+}
+
+impl JobRow {
+    /// Bytes that its files will still need, beside what is there.
+    #[must_use]
+    pub fn disk_bytes_to_come(&self) -> u64 {
+        self.estimate["disk_bytes"].as_u64().unwrap_or(0).saturating_sub(self.usage.disk_bytes)
+    }
+}
+
+/// A published file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileRow {
+    /// Path among the job's files.
+    pub path: String,
+    /// Attempt that wrote it.
+    pub attempt: u64,
+    /// Bytes.
+    pub size_bytes: u64,
+    /// Digest.
+    pub sha256: String,
+    /// Media type.
+    pub media_type: String,
+    /// Scene time.
+    pub time: Option<f64>,
+    /// Step.
+    pub step: Option<u64>,
+    /// The whole content, where no attempt has written it.
+    pub content: Option<String>,
+}
+
+/// A verified checkpoint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckpointRow {
+    /// Id.
+    pub id: String,
+    /// Job that wrote it.
+    pub job: String,
+    /// Attempt that wrote it.
+    pub attempt: u64,
+    /// Path below the attempt's directory.
+    pub path: String,
+    /// Step.
+    pub step: u64,
+    /// Scene time.
+    pub time: f64,
+    /// Bytes.
+    pub size_bytes: u64,
+    /// Digest.
+    pub sha256: String,
+    /// When.
+    pub created_at: String,
+    /// Instruction set.
+    pub isa: String,
+    /// Program.
+    pub build: String,
+}
+
+pub(super) fn json<T: serde::de::DeserializeOwned + Default>(row: &Row, column: &str) -> rusqlite::Result<T> {
+    let text: Option<String> = row.get(column)?;
+    text.map_or_else(
+        || Ok(T::default()),
+        |text| {
+            serde_json::from_str(&text).map_err(|error| {
+                rusqlite::Error::FromSqlConversionFailure(0, rusqlite::types::Type::Text, Box::new(error))
+            })
+        },
+    )
+}
+
+pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
+    let state: String = row.get("state")?;
+    let reason: Option<String> = row.get("reason")?;
+    Ok(JobRow {
+        id: row.get("id")?,
+        rev: row.get("rev")?,
+        state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
+        reason: reason.as_deref().and_then(Reason::from_word),
+        hint: row.get("hint")?,
+        message: row.get("message")?,
+        name: row.get("name")?,
+        labels: json(row, "labels")?,
+        kind: row.get("kind")?,
+        spec: json(row, "spec")?,
+        resolved: json(row, "resolved")?,
+        estimate: json(row, "estimate")?,
+        priority: row.get("priority")?,
+        created_at: row.get("created_at")?,
+        started_at: row.get("started_at")?,
+        finished_at: row.get("finished_at")?,
+        attempt: row.get::<_, i64>("attempt")? as u64,
+        deaths: row.get("deaths")?,
+        records_offset: row.get::<_, i64>("records_offset")? as u64,
+        has_new_checkpoint: row.get::<_, i64>("checkpoint_since")? != 0,
+        worker_pid: row.get("worker_pid")?,
+        verdict: json(row, "verdict")?,
+        condemned: row.get::<_, Option<String>>("condemned")?.as_deref().and_then(Reason::from_word),
+        progress: json(row, "progress")?,
+        progress_count: row.get("progress_count")?,
+        warnings: json(row, "warnings")?,
+        usage: json(row, "usage")?,
+        leg_wall_s: row.get("leg_wall_s")?,
+        restarted_from: row.get("restarted_from")?,
+        restart_sha256: row.get("restart_sha256")?,
+        study: row.get("study")?,
+        study_index: row.get::<_, Option<i64>>("study_index")?.map(|index| index as u64),
+        retry_of: row.get("retry_of")?,
+        results: json(row, "results")?,
+    })
+}
+
+pub(super) fn job(connection: &Connection, id: &str) -> Result<Option<JobRow>, StoreError> {
+    Ok(connection.prepare_cached("SELECT * FROM jobs WHERE id = ?1")?.query_row([id], job_of).optional()?)
+}
+
+fn checkpoint_of(row: &Row) -> rusqlite::Result<CheckpointRow> {
+    Ok(CheckpointRow {
+        id: row.get("id")?,
+        job: row.get("job")?,
+        attempt: row.get::<_, i64>("attempt")? as u64,
+        path: row.get("path")?,
+        step: row.get::<_, i64>("step")? as u64,
+        time: row.get("time")?,
+        size_bytes: row.get::<_, i64>("size_bytes")? as u64,
+        sha256: row.get("sha256")?,
+        created_at: row.get("created_at")?,
+        isa: row.get("isa")?,
+        build: row.get("build")?,
+    })
+}
+
+pub(super) fn checkpoint(connection: &Connection, id: &str) -> Result<Option<CheckpointRow>, StoreError> {
+    Ok(connection
+        .prepare_cached("SELECT * FROM checkpoints WHERE id = ?1")?
+        .query_row([id], checkpoint_of)
+        .optional()?)
+}
+
+pub(super) fn checkpoints(connection: &Connection, job: &str) -> Result<Vec<CheckpointRow>, StoreError> {
+    let mut statement = connection
+        .prepare_cached("SELECT * FROM checkpoints WHERE job = ?1 ORDER BY step DESC, attempt DESC, id DESC")?;
+    let rows = statement.query_map([job], checkpoint_of)?;
+    Ok(rows.collect::<Result<_, _>>()?)
+}
+
+fn file_of(row: &Row) -> rusqlite::Result<FileRow> {
+    Ok(FileRow {
+        path: row.get("path")?,
+        attempt: row.get::<_, i64>("attempt")? as u64,
+        size_bytes: row.get::<_, i64>("size_bytes")? as u64,
+        sha256: row.get("sha256")?,
+        media_type: row.get("media_type")?,
+        time: row.get("time")?,
+        step: row.get::<_, Option<i64>>("step")?.map(|step| step as u64),
+        content: None,
+    })
+}
+
+/// All files of a job by path, the index of its frames included as long as no attempt has written one.
+pub(super) fn files(connection: &Connection, job: &str) -> Result<Vec<FileRow>, StoreError> {
+    let mut statement = connection.prepare_cached("SELECT * FROM files WHERE job = ?1 ORDER BY path")?;
+    let rows = statement.query_map([job], file_of)?;
+    let mut files = rows.collect::<Result<Vec<FileRow>, _>>()?;
+    let place = files.binary_search_by(|file| file.path.as_str().cmp(frame_index::PATH));
+    if let Err(place) = place
+        && files.iter().any(|file| file.step.is_some())
+    {
+        let frames = files.iter().filter(|file| file.step.is_some());
+        let content = frame_index::text(frames.map(|frame| (frame.path.as_str(), frame.time)));
+        let index = FileRow {
+            path: frame_index::PATH.to_owned(),
+            attempt: 0,
+            size_bytes: content.len() as u64,
+            sha256: digest::of_bytes(content.as_bytes()),
+            media_type: frame_index::MEDIA_TYPE.to_owned(),
+            time: None,
+            step: None,
+            content: Some(content),
+        };
+        files.insert(place, index);
+    }
+    Ok(files)
+}
+
+/// One file of a job.
+pub(super) fn file(connection: &Connection, job: &str, path: &str) -> Result<Option<FileRow>, StoreError> {
+    if path == frame_index::PATH {
+        return Ok(files(connection, job)?.into_iter().find(|file| file.path == path));
+    }
+    let mut statement = connection.prepare_cached("SELECT * FROM files WHERE job = ?1 AND path = ?2")?;
+    Ok(statement.query_row([job, path], file_of).optional()?)
+}

@@ -1,0 +1,112 @@
+//! What becomes of a job when its worker has ended: read, decided and written in one transaction, so that no request
+//! and no crash can come in between.
+
+use super::transitions::apply;
+use super::{Change, ChangeError, JobRow, Store, StoreError, rows};
+use crate::spec::records::Verdict;
+use crate::spec::states::{Reason, State, Trigger};
+use rusqlite::Transaction;
+
+/// How a worker that left no verdict was lost.
+#[derive(Debug, Clone, Copy)]
+pub struct Loss {
+    /// Why, unless it was condemned before.
+    pub reason: Reason,
+    /// Whether it counts towards the three deaths that fail a job.
+    pub is_death: bool,
+}
+
+/// Deaths in a row without a new checkpoint that fail a job.
+const MOST_DEATHS: u32 = 3;
+
+impl Store {
+    /// Moves a job whose worker has ended to where its verdict or its loss leads. A job that is at another attempt, or
+    /// has no worker any more, is left alone.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn settle(&self, job: &str, epoch: u64, lost: Loss) -> Result<(), StoreError> {
+        let settled = self.write(|transaction| {
+            let row = rows::job(transaction, job)?.filter(|row| row.attempt == epoch);
+            row.map_or(Ok(()), |row| decide(transaction, &row, lost))
+        });
+        match settled {
+            Ok(()) => Ok(()),
+            Err(ChangeError::Store(error)) => Err(error),
+            Err(error) => {
+                // Inside one transaction the table alone decides, and every row above has its place in it.
+                tracing::error!(job, %error, "a settlement has no row in the table");
+                Ok(())
+            }
+        }
+    }
+}
+
+fn decide(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), ChangeError> {
+    let step = |trigger: Trigger, reason: Option<Reason>, message: Option<String>| {
+        apply(transaction, &row.id, trigger, &Change { reason, message, epoch: Some(row.attempt) })
+    };
+    match row.state {
+        // Whatever the worker came to, it was canceled before.
+        State::Canceling if row.verdict.is_some() => step(Trigger::Drop, None, None).map(|_| ()),
+        State::Canceling => step(Trigger::Lose, None, None).map(|_| ()),
+        State::Interrupted => step(Trigger::Requeue, row.reason, None).map(|_| ()),
+        State::Running | State::Pausing => match row.verdict.clone() {
+            Some(Verdict::Succeeded) => step(Trigger::Finish, None, None).map(|_| ()),
+            Some(Verdict::Failed { reason, message }) => step(Trigger::Fail, Some(reason), Some(message)).map(|_| ()),
+            Some(Verdict::Paused { reason }) => {
+                let mut why = row.reason;
+                if row.state == State::Running {
+                    why = reason.or(Some(Reason::UserPause));
+                    step(Trigger::Pause, why, None)?;
+                }
+                // Who asked for a pause keeps it; what came up during a drain or a limit is the newer reason.
+                let drained = why == Some(Reason::ServerRestart) && reason.is_none();
+                let kept = if why == Some(Reason::UserPause) { why } else { reason.or(why) };
+                step(if drained { Trigger::Drain } else { Trigger::Rest }, kept, None).map(|_| ())
+            }
+            // A worker says "canceled" only when told to; without a cancellation it is as good as lost.
+            Some(Verdict::Canceled) | None => lose(transaction, row, lost),
+        },
+        _ => Ok(()),
+    }
+}
+
+fn lose(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), ChangeError> {
+    let reason = row.condemned.unwrap_or(lost.reason);
+    let step = |trigger: Trigger, reason: Reason, message: Option<String>| {
+        apply(transaction, &row.id, trigger, &Change { reason: Some(reason), message, epoch: Some(row.attempt) })
+    };
+    if matches!(reason, Reason::LimitMemory | Reason::WorkerOom) {
+        return step(Trigger::Fail, reason, None).map(|_| ());
+    }
+    if reason == Reason::StorageEnospc {
+        // It rests until there is room; whoever asked for a pause before keeps it.
+        let kept = row.reason.filter(|asked| *asked == Reason::UserPause).unwrap_or(reason);
+        step(Trigger::Lose, kept, None)?;
+        step(Trigger::Requeue, kept, None)?;
+        return step(Trigger::Pause, kept, None).map(|_| ());
+    }
+    // A worker that was ended because it did not rest in time has not died of itself.
+    let was_pausing = row.state == State::Pausing;
+    let reason = if was_pausing { row.reason.unwrap_or(reason) } else { reason };
+    step(Trigger::Lose, reason, None)?;
+    if lost.is_death && !was_pausing {
+        transaction.execute(
+            "UPDATE jobs SET deaths = CASE WHEN checkpoint_since THEN 0 ELSE deaths + 1 END, checkpoint_since = 0
+             WHERE id = ?1",
+            [&row.id],
+        )?;
+        let deaths: u32 =
+            transaction.query_row("SELECT deaths FROM jobs WHERE id = ?1", [&row.id], |row| row.get(0))?;
+        if deaths >= MOST_DEATHS {
+            let message = format!("{deaths} workers in a row ended without a new checkpoint");
+            return step(Trigger::Fail, reason, Some(message)).map(|_| ());
+        }
+    }
+    step(Trigger::Requeue, reason, None)?;
+    if was_pausing && reason != Reason::ServerRestart {
+        step(Trigger::Pause, reason, None)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,415 @@
+//! Studies: sweeps of jobs as one object. A study has no state of its own but what its jobs are in.
+
+use super::answers::{KeptAnswer, Made, Once};
+use super::submission::{NewJob, insert};
+use super::transitions::apply;
+use super::{Change, ChangeError, Store, StoreError, remove_directory, rows};
+use crate::spec::records::{Progress, Usage};
+use crate::spec::states::{Reason, State, Trigger};
+use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
+use serde_json::{Map, Value};
+use std::collections::{BTreeMap, HashSet};
+
+/// A study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudyRow {
+    /// Id.
+    pub id: String,
+    /// Name.
+    pub name: Option<String>,
+    /// Labels.
+    pub labels: BTreeMap<String, String>,
+    /// Body that all points share.
+    pub base: Value,
+    /// The sweep as sent.
+    pub sweep: Value,
+    /// Pointers that vary.
+    pub axes: Vec<String>,
+    /// Points.
+    pub points: u64,
+    /// Jobs at once.
+    pub max_parallel: Option<u64>,
+    /// `continue` or `stop`.
+    pub on_failure: String,
+    /// Whether a failure stops, or has stopped, the rest.
+    pub is_stopping: bool,
+    /// Estimated total.
+    pub estimate: Value,
+    /// Made.
+    pub created_at: String,
+    /// Points by the state of their latest job.
+    pub counts: BTreeMap<State, u64>,
+}
+
+/// A study to be made.
+#[derive(Debug, Clone)]
+pub struct NewStudy {
+    /// Name.
+    pub name: Option<String>,
+    /// Labels.
+    pub labels: BTreeMap<String, String>,
+    /// Body that all points share.
+    pub base: Value,
+    /// The sweep as sent.
+    pub sweep: Value,
+    /// Pointers that vary.
+    pub axes: Vec<String>,
+    /// Jobs at once.
+    pub max_parallel: Option<u64>,
+    /// `continue` or `stop`.
+    pub on_failure: &'static str,
+    /// Estimated total.
+    pub estimate: Value,
+    /// One a point.
+    pub jobs: Vec<NewJob>,
+}
+
+/// A point of a study with its latest job: what tables and reports need, and no more, of ten thousand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointRow {
+    /// Number of the point.
+    pub index: u64,
+    /// Latest job.
+    pub job: String,
+    /// Its state.
+    pub state: State,
+    /// Why, if not plain.
+    pub reason: Option<String>,
+    /// Its value at every axis: as it was sent, else the default that it got.
+    pub values: Vec<Value>,
+    /// Its spacing.
+    pub spacing: Option<f64>,
+    /// CPU seconds and seconds by the clock.
+    pub spent: [f64; 2],
+    /// Particles as reached, else as estimated.
+    pub particles: u64,
+    /// Steps done.
+    pub steps: u64,
+    /// Errors by `QUANTITY.NORM`, each at its latest time; None before the end.
+    pub errors: Option<Map<String, Value>>,
+}
+
+/// Jobs changed in one transaction: between two of them others get their turn.
+const CHUNK: usize = 500;
+
+impl Store {
+    /// Makes a study with all its jobs, or nothing.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn make_study(
+        &self,
+        study: NewStudy,
+        once: Option<&Once>,
+        answer: impl FnOnce(&StudyRow) -> KeptAnswer,
+    ) -> Result<Made, StoreError> {
+        let id = format!("std_{}", self.next_id());
+        let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs } = study;
+        let mut prepared = Vec::with_capacity(jobs.len());
+        for (index, mut job) in jobs.into_iter().enumerate() {
+            let job_id = format!("job_{}", self.next_id());
+            let start = self.prepare_start(&job_id, &job)?;
+            job.study = Some((id.clone(), index as u64));
+            prepared.push((job_id, job, start));
+        }
+        let made = self.make_once(once, |transaction| {
+            transaction.execute(
+                "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+                params![
+                    id,
+                    name,
+                    serde_json::to_string(&labels)?,
+                    base.to_string(),
+                    sweep.to_string(),
+                    serde_json::to_string(&axes)?,
+                    prepared.len() as i64,
+                    max_parallel.map(|most| most as i64),
+                    on_failure,
+                    estimate.to_string(),
+                    crate::system::clock::now(),
+                ],
+            )?;
+            for (job_id, job, start) in &prepared {
+                insert(transaction, job_id, job, start.as_deref())?;
+            }
+            Ok(answer(&study_of(transaction, &id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
+        });
+        if !matches!(made, Ok(Made::New(_))) {
+            for (job_id, ..) in prepared.iter().filter(|(.., start)| start.is_some()) {
+                remove_directory(&self.job_directory(job_id))?;
+            }
+        }
+        made
+    }
+
+    /// Makes new jobs for points, in place of their latest ones.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn retry_study(
+        &self,
+        study: &str,
+        jobs: &[NewJob],
+        once: Option<&Once>,
+        answer: impl FnOnce(&StudyRow) -> KeptAnswer,
+    ) -> Result<Made, StoreError> {
+        let mut prepared = Vec::with_capacity(jobs.len());
+        for job in jobs {
+            let id = format!("job_{}", self.next_id());
+            let start = self.prepare_start(&id, job)?;
+            prepared.push((id, job, start));
+        }
+        let made = self.make_once(once, |transaction| {
+            transaction.execute("UPDATE studies SET stopping = 0 WHERE id = ?1", [study])?;
+            for (id, job, start) in &prepared {
+                // Somebody else may have repeated it in the meantime.
+                let is_latest: bool = transaction
+                    .prepare_cached("SELECT EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND superseded = 0)")?
+                    .query_row([&job.retry_of], |row| row.get(0))?;
+                if is_latest {
+                    insert(transaction, id, job, start.as_deref())?;
+                }
+            }
+            Ok(answer(&study_of(transaction, study)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
+        });
+        // Directories of jobs that were not made after all.
+        for (id, ..) in prepared.iter().filter(|(.., start)| start.is_some()) {
+            if self.job(id)?.is_none() {
+                remove_directory(&self.job_directory(id))?;
+            }
+        }
+        made
+    }
+
+    /// A study by id.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn study(&self, id: &str) -> Result<Option<StudyRow>, StoreError> {
+        study_of(&self.read(), id)
+    }
+
+    /// A page of studies, newest first.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn studies(&self, cursor: Option<&str>, limit: u64) -> Result<Vec<StudyRow>, StoreError> {
+        let connection = self.read();
+        let ids: Vec<String> = {
+            let mut statement = connection
+                .prepare_cached("SELECT id FROM studies WHERE ?1 IS NULL OR id < ?1 ORDER BY id DESC LIMIT ?2")?;
+            let rows = statement.query_map(params![cursor, limit as i64], |row| row.get(0))?;
+            rows.collect::<Result<_, _>>()?
+        };
+        ids.iter().filter_map(|id| study_of(&connection, id).transpose()).collect()
+    }
+
+    /// Points of a study after a number, with their latest jobs.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn points(&self, study: &StudyRow, after: Option<u64>, limit: u64) -> Result<Vec<PointRow>, StoreError> {
+        let mut points = Vec::new();
+        let mut after = after.map_or(-1, |after| i64::try_from(after).unwrap_or(i64::MAX));
+        // A reader is held for a chunk, not for the whole: others read, too.
+        while (points.len() as u64) < limit {
+            let many = (limit - points.len() as u64).min(CHUNK as u64);
+            let connection = self.read();
+            let mut statement = connection.prepare_cached(
+                "SELECT study_index, id, state, reason, spec, resolved, usage, progress, estimate, results FROM jobs
+                 WHERE study = ?1 AND superseded = 0 AND study_index > ?2 ORDER BY study_index LIMIT ?3",
+            )?;
+            let rows = statement.query_map(params![study.id, after, many as i64], |row| point_of(row, &study.axes))?;
+            let before = points.len();
+            for row in rows {
+                let point = row?;
+                after = point.index as i64;
+                points.push(point);
+            }
+            if ((points.len() - before) as u64) < many {
+                break;
+            }
+        }
+        Ok(points)
+    }
+
+    /// Applies a trigger to every latest job of a study that the table lets it apply to.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn change_study(&self, study: &str, trigger: Trigger, change: &Change) -> Result<(), StoreError> {
+        let from: HashSet<&str> =
+            State::ALL.iter().filter(|state| state.after(trigger).is_some()).map(|state| state.word()).collect();
+        let ids: Vec<String> = {
+            let connection = self.read();
+            let mut statement =
+                connection.prepare_cached("SELECT id, state FROM jobs WHERE study = ?1 ORDER BY study_index, id")?;
+            let rows = statement.query_map([study], |row| Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?)))?;
+            let all = rows.collect::<Result<Vec<_>, _>>()?;
+            all.into_iter().filter(|(_, state)| from.contains(state.as_str())).map(|(id, _)| id).collect()
+        };
+        if trigger == Trigger::Pause {
+            // Those that rest for want of space must not go on by themselves any more.
+            self.keep_paused_where("study", study)?;
+        }
+        for chunk in ids.chunks(CHUNK) {
+            self.write(|transaction| {
+                for id in chunk {
+                    match apply(transaction, id, trigger, change) {
+                        // It has moved on since it was listed.
+                        Ok(_) | Err(ChangeError::Illegal(..) | ChangeError::NotFound | ChangeError::Stale) => {}
+                        Err(ChangeError::Store(error)) => return Err(error),
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Cancels what is left of studies that stop at their first failure.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn stop_failed_studies(&self) -> Result<(), StoreError> {
+        let ids: Vec<String> = {
+            let connection = self.read();
+            let mut statement = connection.prepare_cached("SELECT id FROM studies WHERE stopping = 1")?;
+            let rows = statement.query_map([], |row| row.get(0))?;
+            rows.collect::<Result<_, _>>()?
+        };
+        for id in ids {
+            let message = "another point of the study failed, and on_failure is \"stop\"; POST …/retry runs it anew";
+            let change = Change { message: Some(message.to_owned()), ..Change::because(Reason::UserCancel) };
+            self.change_study(&id, Trigger::Cancel, &change)?;
+            self.write(|transaction| -> Result<(), StoreError> {
+                transaction.execute("UPDATE studies SET stopping = 2 WHERE id = ?1 AND stopping = 1", [&id])?;
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Deletes a study and all its jobs, if all of them have ended; false where one has not.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn delete_study(&self, id: &str) -> Result<bool, StoreError> {
+        let deleted = self.write(|transaction| -> Result<Option<Vec<String>>, StoreError> {
+            let jobs: Vec<(String, String)> = {
+                let mut statement = transaction.prepare_cached("SELECT id, state FROM jobs WHERE study = ?1")?;
+                let rows = statement.query_map([id], |row| Ok((row.get(0)?, row.get(1)?)))?;
+                rows.collect::<Result<_, _>>()?
+            };
+            if jobs.iter().any(|(_, state)| !State::from_word(state).is_some_and(State::is_terminal)) {
+                return Ok(None);
+            }
+            for (job, _) in &jobs {
+                super::delete_rows(transaction, job)?;
+            }
+            transaction.execute("DELETE FROM study_events WHERE study = ?1", [id])?;
+            transaction.execute("DELETE FROM studies WHERE id = ?1", [id])?;
+            Ok(Some(jobs.into_iter().map(|(job, _)| job).collect()))
+        })?;
+        let Some(jobs) = deleted else { return Ok(false) };
+        for job in jobs {
+            remove_directory(&self.job_directory(&job))?;
+        }
+        Ok(true)
+    }
+}
+
+/// A study whose point has failed stops if it is to; the rest is canceled by the supervisor.
+pub(super) fn note_failure(transaction: &Transaction, study: &str) -> rusqlite::Result<()> {
+    transaction
+        .prepare_cached("UPDATE studies SET stopping = 1 WHERE id = ?1 AND on_failure = 'stop' AND stopping = 0")?
+        .execute([study])
+        .map(|_| ())
+}
+
+/// Studies none of whose queued jobs may start now: as many run as may, or one has failed and the rest is to be canceled.
+pub(super) fn without_a_free_place(connection: &Connection) -> rusqlite::Result<HashSet<String>> {
+    let mut statement = connection.prepare_cached(
+        "SELECT id FROM studies WHERE stopping = 1
+         UNION
+         SELECT s.id FROM studies s JOIN
+             (SELECT study, COUNT(*) AS many FROM jobs
+              WHERE state IN ('running', 'pausing', 'canceling', 'interrupted') AND study IS NOT NULL GROUP BY study) r
+             ON r.study = s.id WHERE r.many >= s.max_parallel",
+    )?;
+    let rows = statement.query_map([], |row| row.get(0))?;
+    rows.collect()
+}
+
+fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, StoreError> {
+    let found = connection
+        .prepare_cached("SELECT * FROM studies WHERE id = ?1")?
+        .query_row([id], |row| {
+            Ok(StudyRow {
+                id: row.get("id")?,
+                name: row.get("name")?,
+                labels: rows::json(row, "labels")?,
+                base: rows::json(row, "base")?,
+                sweep: rows::json(row, "sweep")?,
+                axes: rows::json(row, "axes")?,
+                points: row.get::<_, i64>("points")? as u64,
+                max_parallel: row.get::<_, Option<i64>>("max_parallel")?.map(|most| most as u64),
+                on_failure: row.get("on_failure")?,
+                is_stopping: row.get::<_, i64>("stopping")? != 0,
+                estimate: rows::json(row, "estimate")?,
+                created_at: row.get("created_at")?,
+                counts: BTreeMap::new(),
+            })
+        })
+        .optional()?;
+    let Some(mut study) = found else { return Ok(None) };
+    let mut statement = connection
+        .prepare_cached("SELECT state, COUNT(*) FROM jobs WHERE study = ?1 AND superseded = 0 GROUP BY state")?;
+    let counts = statement.query_map([id], |row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)? as u64)))?;
+    for count in counts {
+        let (word, many) = count?;
+        if let Some(state) = State::from_word(&word) {
+            study.counts.insert(state, many);
+        }
+    }
+    Ok(Some(study))
+}
+
+fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
+    let state: String = row.get("state")?;
+    let estimate: Value = rows::json(row, "estimate")?;
+    let progress: Progress = rows::json(row, "progress")?;
+    let usage: Usage = rows::json(row, "usage")?;
+    let (spec, resolved): (Value, Value) = (rows::json(row, "spec")?, rows::json(row, "resolved")?);
+    let value_at = |pointer: &str| {
+        let sent = spec.pointer(pointer).filter(|value| !value.is_null());
+        sent.or_else(|| resolved.pointer(pointer)).cloned().unwrap_or(Value::Null)
+    };
+    let results: Option<Value> = rows::json(row, "results")?;
+    Ok(PointRow {
+        index: row.get::<_, i64>("study_index")? as u64,
+        job: row.get("id")?,
+        state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
+        reason: row.get("reason")?,
+        values: axes.iter().map(|axis| value_at(axis)).collect(),
+        spacing: value_at("/scene/spacing").as_f64(),
+        spent: [usage.cpu_s, usage.wall_s],
+        particles: if progress.particles > 0 {
+            progress.particles
+        } else {
+            estimate["particles"].as_u64().unwrap_or(0)
+        },
+        steps: progress.step,
+        errors: results.map(|results| errors_of(&results)),
+    })
+}
+
+/// Errors come in the order of their times: the latest stays.
+fn errors_of(results: &Value) -> Map<String, Value> {
+    let word = |error: &Value, name: &str| error[name].as_str().unwrap_or_default().to_owned();
+    let listed = results["errors"].as_array().into_iter().flatten();
+    listed
+        .map(|error| (format!("{}.{}", word(error, "quantity"), word(error, "norm")), error["value"].clone()))
+        .collect()
+}

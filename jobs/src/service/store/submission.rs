@@ -1,0 +1,208 @@
+//! Making jobs: one, or all of a study, together with the answer to the request.
+
+use super::answers::{self, KeptAnswer, Made, Once};
+use super::{JobRow, Store, StoreError, events, remove_directory, rows};
+use crate::spec::body::{JobBody, Origin};
+use crate::spec::states::State;
+use rusqlite::{Transaction, params};
+use serde_json::{Value, json};
+
+/// A job to be made, as it will stand in the store.
+#[derive(Debug, Clone)]
+pub struct NewJob {
+    pub(super) name: Option<String>,
+    pub(super) labels: String,
+    pub(super) kind: String,
+    pub(super) spec: String,
+    pub(super) resolved: String,
+    pub(super) estimate: String,
+    pub(super) memory_bytes: u64,
+    /// Bytes that its files will take.
+    pub disk_bytes: u64,
+    pub(super) priority: i64,
+    pub(super) origin: Option<Origin>,
+    pub(super) uploads: Vec<String>,
+    /// The study that it is a point of, with the point's number.
+    pub study: Option<(String, u64)>,
+    /// The job that it repeats.
+    pub retry_of: Option<String>,
+}
+
+impl NewJob {
+    /// From a body that was understood.
+    #[must_use]
+    pub fn of(body: &JobBody) -> Self {
+        Self {
+            name: body.name.clone(),
+            labels: json!(body.labels).to_string(),
+            kind: body.kind.clone(),
+            spec: body.spec.to_string(),
+            resolved: body.resolved.to_string(),
+            estimate: body.forecast.to_json().to_string(),
+            memory_bytes: body.forecast.memory_bytes,
+            disk_bytes: body.forecast.disk_bytes,
+            priority: body.priority,
+            origin: body.origin.clone(),
+            uploads: body.uploads.clone(),
+            study: None,
+            retry_of: None,
+        }
+    }
+}
+
+/// Seconds of waiting that weigh as much as one point of priority: nothing waits for ever behind what is more urgent.
+pub const AGING_S: f64 = 600.0;
+
+/// Name of a restart's checkpoint in the new job's directory.
+pub const START_CHECKPOINT: &str = "start.h5";
+
+impl Store {
+    /// Makes a job; it is durable when this returns. `answer` renders what the client is told; it is kept under the
+    /// client's key in the same transaction.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn submit(
+        &self,
+        job: NewJob,
+        once: Option<Once>,
+        answer: impl FnOnce(JobRow) -> KeptAnswer + Send + 'static,
+    ) -> Result<Made, StoreError> {
+        let id = format!("job_{}", self.next_id());
+        let start = self.prepare_start(&id, &job)?;
+        let (sha256, new) = (start.clone(), id.clone());
+        let made = self.write_together(Box::new(move |transaction| {
+            once_in(transaction, once.as_ref(), |transaction| {
+                insert(transaction, &new, &job, sha256.as_deref())?;
+                let row = rows::job(transaction, &new)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
+                Ok(answer(row))
+            })
+        }));
+        if start.is_some() && !matches!(made, Ok(Made::New(_))) {
+            remove_directory(&self.job_directory(&id))?;
+        }
+        made
+    }
+
+    /// Carries out work that makes something, unless the client's key says that it was done before.
+    pub(super) fn make_once(
+        &self,
+        once: Option<&Once>,
+        work: impl FnOnce(&Transaction) -> Result<KeptAnswer, StoreError>,
+    ) -> Result<Made, StoreError> {
+        self.write(|transaction| once_in(transaction, once, work))
+    }
+
+    /// The answer that was given under a client's key before, so that nothing needs to be worked out again.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn recall(&self, once: &Once) -> Result<Option<Made>, StoreError> {
+        answers::recall(&self.read(), once)
+    }
+
+    /// Links the checkpoint that a job begins with into its directory, so that deleting the source takes nothing away;
+    /// its digest. None for a job that begins afresh.
+    pub(super) fn prepare_start(&self, id: &str, job: &NewJob) -> Result<Option<String>, StoreError> {
+        let (source, sha256) = match &job.origin {
+            None => return Ok(None),
+            Some(Origin::Checkpoint(checkpoint)) => {
+                let row = self.checkpoint(checkpoint)?.ok_or(StoreError::CheckpointGone)?;
+                let attempt = crate::spec::attempt_spec::attempt_directory(&self.job_directory(&row.job), row.attempt);
+                (attempt.join(&row.path), row.sha256)
+            }
+            Some(Origin::Upload(upload)) => {
+                let row = self.upload(upload)?.ok_or(StoreError::CheckpointGone)?;
+                (self.upload_directory(upload).join(super::uploads::CONTENT), row.sha256)
+            }
+        };
+        let folder = self.job_directory(id);
+        std::fs::create_dir_all(&folder)?;
+        let target = folder.join(START_CHECKPOINT);
+        // Its row may have been there a moment ago and its file be gone by now.
+        if std::fs::hard_link(&source, &target).is_err() && std::fs::copy(&source, &target).is_err() {
+            remove_directory(&folder)?;
+            return Err(StoreError::CheckpointGone);
+        }
+        crate::system::artifacts::sync_directory(&folder)?;
+        Ok(Some(sha256))
+    }
+}
+
+/// Carries out work in a transaction, unless the client's key says that it was done before.
+fn once_in(
+    transaction: &Transaction,
+    once: Option<&Once>,
+    work: impl FnOnce(&Transaction) -> Result<KeptAnswer, StoreError>,
+) -> Result<Made, StoreError> {
+    if let Some(made) = once.map(|once| answers::recall(transaction, once)).transpose()?.flatten() {
+        return Ok(made);
+    }
+    let answer = work(transaction)?;
+    if let Some(once) = once {
+        answers::keep(transaction, once, &answer)?;
+    }
+    Ok(Made::New(answer))
+}
+
+/// Writes the row, the first event and the inputs of a job.
+pub(super) fn insert(
+    transaction: &Transaction,
+    id: &str,
+    job: &NewJob,
+    start_sha256: Option<&str>,
+) -> Result<(), StoreError> {
+    let now_s = crate::system::clock::milliseconds() as f64 * 1e-3;
+    let (study, index) = job.study.as_ref().map_or((None, None), |(study, index)| (Some(study), Some(*index as i64)));
+    transaction
+        .prepare_cached(
+            "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
+                 restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes)
+             VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17)",
+        )?
+        .execute(params![
+            id,
+            job.name,
+            job.labels,
+            job.kind,
+            job.spec,
+            job.resolved,
+            job.estimate,
+            job.priority,
+            crate::system::clock::now(),
+            job.origin.as_ref().map(Origin::id),
+            start_sha256,
+            study,
+            index,
+            job.retry_of,
+            now_s - job.priority as f64 * AGING_S,
+            i64::try_from(job.memory_bytes).unwrap_or(i64::MAX),
+            i64::try_from(job.disk_bytes).unwrap_or(i64::MAX),
+        ])?;
+    for upload in &job.uploads {
+        let known = transaction
+            .prepare_cached("INSERT OR IGNORE INTO inputs SELECT ?1, id FROM uploads WHERE id = ?2")?
+            .execute(params![id, upload])?;
+        if known == 0 {
+            return Err(StoreError::UploadGone);
+        }
+    }
+    if let Some(old) = &job.retry_of {
+        transaction.execute("UPDATE jobs SET superseded = 1 WHERE id = ?1", [old])?;
+    }
+    let data = json!({"from": Value::Null, "to": State::Queued.word()});
+    events::append(transaction, id, study.map(String::as_str), 0, "state", &data)?;
+    Ok(())
+}
+
+#[cfg(test)]
+impl Store {
+    /// Makes a job for a test.
+    pub(crate) fn submit_row(&self, body: &JobBody) -> JobRow {
+        let answer = |row: JobRow| KeptAnswer { status: 201, location: None, body: row.id };
+        match self.submit(NewJob::of(body), None, answer).unwrap() {
+            Made::New(kept) => self.job(&kept.body).unwrap().unwrap(),
+            other => panic!("{other:?}"),
+        }
+    }
+}

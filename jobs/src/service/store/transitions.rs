@@ -1,0 +1,262 @@
+//! Changing the state of a job: the table of [`crate::spec::states`] applied as a compare-and-set.
+
+use super::{JobRow, Store, StoreError, events, rows, studies};
+use crate::spec::states::{Reason, State, Trigger};
+use rusqlite::{OptionalExtension, Transaction, params};
+use serde_json::json;
+
+/// Why a change was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum ChangeError {
+    /// No such job.
+    #[error("there is no such job")]
+    NotFound,
+    /// The table has no such row.
+    #[error("a job that is {} cannot {}", .0.word(), .1.word())]
+    Illegal(State, Trigger),
+    /// The job's epoch or revision has moved on.
+    #[error("the job has moved on")]
+    Stale,
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+impl From<rusqlite::Error> for ChangeError {
+    fn from(error: rusqlite::Error) -> Self {
+        Self::Store(error.into())
+    }
+}
+
+/// A change to make.
+#[derive(Debug, Clone, Default)]
+pub struct Change {
+    /// Why.
+    pub reason: Option<Reason>,
+    /// Numbers and places of a failure.
+    pub message: Option<String>,
+    /// Only if the job is at this attempt.
+    pub epoch: Option<u64>,
+}
+
+impl Change {
+    /// A change with a reason.
+    #[must_use]
+    pub fn because(reason: Reason) -> Self {
+        Self { reason: Some(reason), ..Self::default() }
+    }
+}
+
+impl Store {
+    /// Applies a trigger to a job.
+    ///
+    /// # Errors
+    /// [`ChangeError`].
+    pub fn change(&self, id: &str, trigger: Trigger, change: &Change) -> Result<JobRow, ChangeError> {
+        self.write(|transaction| {
+            apply(transaction, id, trigger, change)?;
+            rows::job(transaction, id)?.ok_or(ChangeError::NotFound)
+        })
+    }
+
+    /// Takes the next job of the queue whose memory and disk (in bytes) fit and whose study has a free place, as a new
+    /// attempt. Durable before any worker starts.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn claim(&self, fits: impl Fn(u64, u64) -> bool) -> Result<Option<JobRow>, StoreError> {
+        let next: Option<String> = {
+            let connection = self.read();
+            let full = studies::without_a_free_place(&connection)?;
+            // The index of the queue has every column that is asked for.
+            let mut statement = connection.prepare_cached(
+                "SELECT id, study, memory_bytes, disk_bytes FROM jobs WHERE state = 'queued' ORDER BY rank, id",
+            )?;
+            let mut found = None;
+            let mut rows = statement.query([])?;
+            while let Some(row) = rows.next()? {
+                let study: Option<String> = row.get(1)?;
+                let is_held_back = study.is_some_and(|study| full.contains(&study));
+                if !is_held_back && fits(row.get::<_, i64>(2)? as u64, row.get::<_, i64>(3)? as u64) {
+                    found = Some(row.get(0)?);
+                    break;
+                }
+            }
+            found
+        };
+        let Some(id) = next else { return Ok(None) };
+        match self.change(&id, Trigger::Claim, &Change::default()) {
+            Ok(job) => Ok(Some(job)),
+            // Canceled or paused in between.
+            Err(ChangeError::Illegal(..) | ChangeError::NotFound | ChangeError::Stale) => Ok(None),
+            Err(ChangeError::Store(error)) => Err(error),
+        }
+    }
+
+    /// Jobs that should have a worker, and those cut off between two states.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn unfinished_attempts(&self) -> Result<Vec<JobRow>, StoreError> {
+        let connection = self.read();
+        let mut statement = connection.prepare_cached(
+            "SELECT * FROM jobs WHERE state IN ('running', 'pausing', 'canceling', 'interrupted') ORDER BY id",
+        )?;
+        let rows = statement.query_map([], rows::job_of)?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Paused jobs with a reason.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn paused_for(&self, reason: Reason) -> Result<Vec<JobRow>, StoreError> {
+        let connection = self.read();
+        let mut statement =
+            connection.prepare_cached("SELECT * FROM jobs WHERE state = 'paused' AND reason = ?1 ORDER BY id")?;
+        let rows = statement.query_map([reason.word()], rows::job_of)?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Writes down why the worker of an attempt is about to be ended.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn condemn(&self, id: &str, epoch: u64, reason: Reason) -> Result<(), StoreError> {
+        self.write(|transaction| {
+            transaction
+                .prepare_cached("UPDATE jobs SET condemned = ?3 WHERE id = ?1 AND attempt = ?2")?
+                .execute(params![id, epoch as i64, reason.word()])?;
+            Ok(())
+        })
+    }
+
+    /// A pause asked for by a person of a job that rests for another reason: it must not go on by itself.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn keep_paused(&self, id: &str) -> Result<(), StoreError> {
+        self.keep_paused_where("id", id)
+    }
+
+    /// The same for every job with a value in a column.
+    pub(super) fn keep_paused_where(&self, column: &str, value: &str) -> Result<(), StoreError> {
+        self.write(|transaction| {
+            let reason = Reason::UserPause;
+            transaction.execute(
+                &format!(
+                    "UPDATE jobs SET rev = rev + 1, reason = ?2, hint = ?3
+                     WHERE {column} = ?1 AND state = 'paused' AND reason IS NOT ?2"
+                ),
+                params![value, reason.word(), reason.hint()],
+            )?;
+            Ok(())
+        })
+    }
+
+    /// Notes the process of an attempt and its lease.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn lease(&self, id: &str, epoch: u64, pid: u32, until: &str) -> Result<(), StoreError> {
+        self.write(|transaction| {
+            transaction
+                .prepare_cached("UPDATE jobs SET worker_pid = ?3, lease_until = ?4 WHERE id = ?1 AND attempt = ?2")?
+                .execute(params![id, epoch as i64, pid, until])?;
+            Ok(())
+        })
+    }
+}
+
+pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, change: &Change) -> Result<(), ChangeError> {
+    let job = standing(transaction, id)?.ok_or(ChangeError::NotFound)?;
+    if change.epoch.is_some_and(|epoch| epoch != job.attempt) {
+        return Err(ChangeError::Stale);
+    }
+    let to = job.state.after(trigger).ok_or(ChangeError::Illegal(job.state, trigger))?;
+    let now = crate::system::clock::now();
+    let is_claim = trigger == Trigger::Claim;
+    // A plain state has no reason; a pause or cancellation keeps the one that it was asked with.
+    let plain = matches!(to, State::Running | State::Succeeded);
+    let reason = if plain { None } else { change.reason.or(job.reason) };
+    let reason = if trigger == Trigger::Resume { None } else { reason };
+    let message = if plain || trigger == Trigger::Resume { None } else { change.message.clone().or(job.message) };
+    let hint = reason.map(Reason::hint);
+    // Three deaths in a row count; a person's resume begins a new row.
+    let deaths = if trigger == Trigger::Resume { 0 } else { job.deaths };
+    let changed = transaction
+        .prepare_cached(
+            "UPDATE jobs SET rev = rev + 1, state = ?3, reason = ?4, hint = ?5, message = ?6,
+                 attempt = attempt + ?7, records_offset = CASE WHEN ?7 = 1 THEN 0 ELSE records_offset END,
+                 verdict = CASE WHEN ?7 = 1 THEN NULL ELSE verdict END,
+                 condemned = CASE WHEN ?7 = 1 THEN NULL ELSE condemned END,
+                 worker_pid = CASE WHEN ?7 = 1 THEN NULL ELSE worker_pid END,
+                 started_at = CASE WHEN ?7 = 1 THEN COALESCE(started_at, ?8) ELSE started_at END,
+                 finished_at = CASE WHEN ?9 THEN ?8 ELSE NULL END, deaths = ?10, leg_wall_s = ?11
+             WHERE id = ?1 AND rev = ?2",
+        )?
+        .execute(params![
+            id,
+            job.rev,
+            to.word(),
+            reason.map(Reason::word),
+            hint,
+            message,
+            i64::from(is_claim),
+            now,
+            to.is_terminal(),
+            deaths,
+            if trigger == Trigger::Resume { job.wall_s } else { job.leg_wall_s },
+        ])?;
+    if changed != 1 {
+        return Err(ChangeError::Stale);
+    }
+    let told = reason.map_or("", Reason::word);
+    metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => told).increment(1);
+    let attempt = job.attempt + u64::from(is_claim);
+    let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
+    events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
+    if to == State::Failed
+        && let Some(study) = &job.study
+    {
+        studies::note_failure(transaction, study)?;
+    }
+    Ok(())
+}
+
+/// What a transition needs to know of a job: a study changes ten thousand at once.
+struct Standing {
+    rev: i64,
+    state: State,
+    reason: Option<Reason>,
+    message: Option<String>,
+    attempt: u64,
+    deaths: u32,
+    wall_s: f64,
+    leg_wall_s: f64,
+    study: Option<String>,
+}
+
+fn standing(transaction: &Transaction, id: &str) -> Result<Option<Standing>, ChangeError> {
+    let found = transaction
+        .prepare_cached(
+            "SELECT rev, state, reason, message, attempt, deaths, leg_wall_s, study,
+                 COALESCE(json_extract(usage, '$.wall_s'), 0.0) AS wall_s FROM jobs WHERE id = ?1",
+        )?
+        .query_row([id], |row| {
+            let (state, reason): (String, Option<String>) = (row.get("state")?, row.get("reason")?);
+            Ok(Standing {
+                rev: row.get("rev")?,
+                state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
+                reason: reason.as_deref().and_then(Reason::from_word),
+                message: row.get("message")?,
+                attempt: row.get::<_, i64>("attempt")? as u64,
+                deaths: row.get("deaths")?,
+                wall_s: row.get("wall_s")?,
+                leg_wall_s: row.get("leg_wall_s")?,
+                study: row.get("study")?,
+            })
+        })
+        .optional()?;
+    Ok(found)
+}

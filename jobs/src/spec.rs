@@ -1,0 +1,11 @@
+//! Plain data that the service and its workers exchange. Nothing here opens the store or steps a simulation.
+
+pub mod attempt_spec;
+pub mod body;
+pub mod calibration;
+pub mod forecast;
+pub mod records;
+pub mod states;
+pub mod strict_json;
+pub mod study;
+pub mod uploads;

@@ -1,0 +1,60 @@
+//! The order that a worker gets: `attempt.json` in the attempt's directory.
+
+use crate::spec::forecast::TimeForecast;
+use crate::spec::records::Usage;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Name of the file.
+pub const FILE_NAME: &str = "attempt.json";
+
+/// Everything that a worker needs to know.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Order {
+    /// The job.
+    pub job: String,
+    /// The attempt's number, the fence of its records.
+    pub epoch: u64,
+    /// The job's resolved body.
+    pub body: Value,
+    /// Directory of all attempts; paths in checkpoints start here.
+    pub attempts_directory: PathBuf,
+    /// What to begin with, newest first.
+    pub checkpoints: Vec<StartCheckpoint>,
+    /// Whether the start of the scene will do when no checkpoint is sound.
+    pub may_start_afresh: bool,
+    /// Points that the scene takes from uploads, by their ids, in the format of [`crate::formats::cloud_file`].
+    #[serde(default)]
+    pub inputs: BTreeMap<String, PathBuf>,
+    /// What the run was forecast to take.
+    #[serde(default)]
+    pub time: Option<TimeForecast>,
+    /// Free space that the worker leaves untouched: the service needs it to write down what happened.
+    #[serde(default)]
+    pub reserve_bytes: u64,
+    /// Cost of the attempts before.
+    pub usage: Usage,
+}
+
+/// A checkpoint to begin with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct StartCheckpoint {
+    /// Its id.
+    pub id: String,
+    /// The file.
+    pub path: PathBuf,
+    /// Its digest, where it is known.
+    pub sha256: Option<String>,
+    /// Whether it was written by this job: then output goes on without repeating that of its step.
+    pub is_own: bool,
+    /// Whether another instruction set is acceptable.
+    pub allow_other_isa: bool,
+}
+
+/// The directory of one attempt.
+#[must_use]
+pub fn attempt_directory(job_directory: &std::path::Path, epoch: u64) -> PathBuf {
+    job_directory.join("attempts").join(epoch.to_string())
+}

@@ -1,0 +1,141 @@
+use super::{Allowance, NoSources, Origin, RestartSource, Sources, Wishes, parse};
+use crate::spec::uploads::Purpose;
+use serde_json::{Value, json};
+
+const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30, local_files: false };
+
+/// Knows one checkpoint of a vortex.
+struct OneCheckpoint;
+
+impl Sources for OneCheckpoint {
+    fn checkpoint(&self, _: &str) -> Option<RestartSource> {
+        let first = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok()?;
+        let origin = Origin::Checkpoint("ckpt_1".into());
+        Some(RestartSource { origin, resolved: first.resolved, isa: crate::system::build::isa(), step: 240 })
+    }
+
+    fn uploaded_checkpoint(&self, _: &str) -> Option<RestartSource> {
+        None
+    }
+
+    fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
+        let purpose = match id {
+            "upl_places" => Purpose::Queries,
+            "upl_surface" => Purpose::Surface,
+            _ => Purpose::Points,
+        };
+        Some((purpose, 5000))
+    }
+}
+
+#[test]
+fn points_come_from_uploads_of_the_right_purpose() {
+    let scene = |shape: &str, places: &str| {
+        json!({"scene": {"kind": "redistance", "spacing": 0.05, "shape": {"type": "points", "upload": shape},
+               "queries": {"type": "points", "upload": places}}})
+    };
+    let job = parse(&scene("upl_points", "upl_places"), ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(job.uploads, ["upl_points", "upl_places"]);
+    assert_eq!(job.forecast.estimate.particles, 5000);
+    let found = parse(&scene("upl_places", "upl_places"), ALLOWANCE, &OneCheckpoint).err().unwrap();
+    assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/shape", "not_found"));
+    let both = json!({"scene": {"kind": "redistance", "shape": {"type": "points", "upload": "a", "file": "b"}}});
+    assert_eq!(parse(&both, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "conflict");
+    let surface = |id: &str| json!({"scene": {"kind": "surface_pde", "surface": {"type": "points", "upload": id}, "problem": "curvature"}});
+    let job = parse(&surface("upl_surface"), ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(
+        (job.uploads.as_slice(), job.forecast.estimate.particles),
+        (["upl_surface".to_owned()].as_slice(), 5000)
+    );
+    let found = parse(&surface("upl_points"), ALLOWANCE, &OneCheckpoint).err().unwrap();
+    assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/surface", "not_found"));
+    let none = json!({"scene": {"kind": "vortex", "shape": "points"}});
+    assert_eq!(parse(&none, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "required");
+}
+
+fn errors(body: &Value) -> Vec<(String, String)> {
+    match parse(body, ALLOWANCE, &NoSources) {
+        Ok(_) => Vec::new(),
+        Err(found) => found.into_iter().map(|v| (v.pointer, v.code.to_owned())).collect(),
+    }
+}
+
+#[test]
+fn files_of_this_machine_are_for_the_foreground_alone() {
+    let spec = json!({"scene": {"kind": "redistance", "shape": {"type": "points", "file": "/etc/passwd"}}});
+    let found = parse(&spec, ALLOWANCE, &NoSources).err().unwrap();
+    assert_eq!((found[0].pointer.as_str(), found[0].code), ("/scene/shape", "not_here"));
+    let foreground = Allowance { local_files: true, ..ALLOWANCE };
+    assert!(parse(&spec, foreground, &NoSources).is_ok());
+}
+
+#[test]
+fn every_default_stands_in_the_resolved_body() {
+    let body = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok().unwrap();
+    let scene = &body.resolved["scene"];
+    assert_eq!(scene["field"], "dual");
+    assert_eq!(scene["redistance"]["type"], "for_output");
+    assert_eq!(scene["method"]["neighborhood"]["type"], "material");
+    assert_eq!(body.resolved["limits"]["threads"], 2);
+    assert_eq!(body.resolved["output"]["series_every_steps"], 10);
+    assert_eq!(body.resolved["checkpoint"]["every_wall_s"], 60.0);
+    assert!(Wishes::of(&body.resolved).is_ok());
+    // What is resolved is a body of its own with the same meaning.
+    let again = parse(&json!({"scene": scene}), ALLOWANCE, &NoSources).ok().unwrap();
+    assert_eq!(&again.resolved["scene"], scene);
+}
+
+#[test]
+fn all_errors_come_at_once_with_their_places() {
+    let body = json!({
+        "scene": {"kind": "vortex", "spacing": -1, "bandh": 3, "shape": {"type": "circle", "radius": "big"}, "flow": "single_vortx"},
+        "output": {"every_time": 0, "fields": ["fi"]}, "limits": {"threads": 99}, "nme": "x"
+    });
+    let found = errors(&body);
+    for expected in [
+        ("/nme", "unknown_field"),
+        ("/scene/spacing", "range"),
+        ("/scene/bandh", "unknown_field"),
+        ("/scene/shape/radius", "type"),
+        ("/scene/flow", "unknown"),
+        ("/output/every_time", "range"),
+        ("/limits/threads", "range"),
+    ] {
+        assert!(found.iter().any(|(p, c)| p == expected.0 && c == expected.1), "{expected:?} not in {found:?}");
+    }
+    let suggestions: Vec<String> =
+        parse(&body, ALLOWANCE, &NoSources).err().unwrap().into_iter().filter_map(|v| v.did_you_mean).collect();
+    for name in ["name", "band_h", "single_vortex"] {
+        assert!(suggestions.iter().any(|s| s == name), "{name} not in {suggestions:?}");
+    }
+}
+
+#[test]
+fn more_particles_than_memory_names_both_fields() {
+    let body = json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.002}, "limits": {"memory_bytes": 100_000_000}});
+    assert_eq!(errors(&body), [("/scene/spacing".to_owned(), "memory".to_owned())]);
+    for scene in [
+        json!({"kind": "redistance", "spacing": 1e-6}),
+        json!({"kind": "redistance", "spacing": 1e-9}),
+        json!({"kind": "vortex", "spacing": 1e-300}),
+        json!({"kind": "redistance", "spacing": 1e308}),
+        json!({"kind": "redistance", "shape": {"type": "circle", "radius": 1e200}}),
+        json!({"kind": "redistance", "shape": {"type": "box", "size": [1e8, 1e-8]}, "spacing": 1e-9}),
+        json!({"kind": "vortex", "band_h": 1e10}),
+        json!({"kind": "redistance", "band_h": 1e300}),
+    ] {
+        let found = errors(&json!({"scene": scene}));
+        assert!(found.iter().any(|(pointer, _)| pointer == "/scene/spacing"), "{scene}: {found:?}");
+    }
+}
+
+#[test]
+fn restarts_change_only_what_is_safe() {
+    let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/end_time": 12.0}}});
+    let job = parse(&body, ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(job.forecast.estimate.steps, 360);
+    let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/spacing": 0.1}}});
+    assert_eq!(parse(&body, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "not_restart_safe");
+    let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/end_time": 4.0}}});
+    assert_eq!(parse(&body, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "range");
+}

@@ -1,0 +1,379 @@
+//! One attempt at a job: build, restore, run under observers, finish, say how it ended.
+
+use crate::formats::checkpoint::{self, CheckpointError, Counters, Meta};
+use crate::formats::{picture, vtkhdf};
+use crate::spec::attempt_spec::{Order, StartCheckpoint};
+use crate::spec::body::Wishes;
+use crate::spec::records::{Record, RecordSink, Verdict};
+use crate::spec::states::Reason;
+use crate::system::artifacts;
+use crate::system::process;
+use crate::worker::inputs;
+use crate::worker::observers::checkpoints::Checkpoints;
+use crate::worker::observers::frames::Frames;
+use crate::worker::observers::progress::ProgressMeter;
+use crate::worker::observers::series::{self, Series};
+use crate::worker::observers::{Control, Observers};
+use crate::worker::report;
+use meniscus::scene::{BuildContext, understand};
+use meniscus::scenes::SCENES;
+use meniscus::simulation::run::{Ending, ObserverError};
+use meniscus::simulation::{CpuClock, RunError, Simulation, State, StepError, run};
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// Name of the log in an attempt's directory.
+pub const LOG_NAME: &str = "log.txt";
+
+/// Runs one attempt to its verdict, which is also its last record. Panics become a verdict.
+pub fn run_attempt(order: &Order, directory: &Path, control: &Control, sink: &mut dyn RecordSink) -> Verdict {
+    let log = Log { path: directory.join(LOG_NAME) };
+    let outcome = catch_unwind(AssertUnwindSafe(|| attempt(order, directory, control, sink, &log)));
+    let verdict = match outcome {
+        Ok(Ok(verdict)) => verdict,
+        Ok(Err(failure)) => without_places(failure.verdict(directory), order, directory),
+        Err(_) => Verdict::Failed { reason: Reason::Internal, message: "the worker panicked".to_owned() },
+    };
+    log.line(&format!("{verdict:?}"));
+    // Without a verdict the service treats the worker as lost, which is the truth then.
+    let _ = sink.put(&Record::Verdict(verdict.clone()), true);
+    verdict
+}
+
+/// A verdict whose message names no place of this machine: clients read it.
+fn without_places(verdict: Verdict, order: &Order, directory: &Path) -> Verdict {
+    match verdict {
+        Verdict::Failed { reason, message } => Verdict::Failed { reason, message: hide(&message, order, directory) },
+        other => other,
+    }
+}
+
+/// A text without the directories of the job.
+fn hide(text: &str, order: &Order, directory: &Path) -> String {
+    let attempts = order.attempts_directory.display().to_string();
+    let job = order.attempts_directory.parent().map(|p| p.display().to_string()).filter(|p| p.len() > 1);
+    let hidden = text.replace(&directory.display().to_string(), "…").replace(&attempts, "…");
+    job.map_or_else(|| hidden.clone(), |job| hidden.replace(&job, "…"))
+}
+
+/// Whatever ends an attempt early.
+enum Failure {
+    Run(RunError),
+    Other(ObserverError),
+    Known(Reason, String),
+    Canceled,
+}
+
+impl<E: Into<ObserverError>> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::Other(error.into())
+    }
+}
+
+impl Failure {
+    fn verdict(self, directory: &Path) -> Verdict {
+        match self {
+            Self::Canceled | Self::Run(RunError::Step(StepError::Interrupted)) => Verdict::Canceled,
+            Self::Known(reason, message) => Verdict::Failed { reason, message },
+            Self::Run(RunError::Step(error)) => {
+                let reason = match error {
+                    StepError::InterfaceLost { .. } => Reason::DivergedInterface,
+                    StepError::TooFast { .. } => Reason::DivergedCfl,
+                    StepError::TimeStepFloor { .. } => Reason::DivergedDtFloor,
+                    StepError::Unsolved { .. } => Reason::DivergedUnsolved,
+                    _ => Reason::DivergedNonfinite,
+                };
+                Verdict::Failed { reason, message: error.to_string() }
+            }
+            Self::Run(RunError::Observer(error)) | Self::Other(error) => storage_verdict(error.as_ref(), directory),
+        }
+    }
+}
+
+fn storage_verdict(error: &(dyn std::error::Error + 'static), directory: &Path) -> Verdict {
+    if let Some(CheckpointError::NonFinite { .. }) = error.downcast_ref::<CheckpointError>() {
+        return Verdict::Failed { reason: Reason::DivergedNonfinite, message: error.to_string() };
+    }
+    let full = process::is_out_of_space(error) || process::free_space(directory).is_some_and(|free| free < 1 << 20);
+    if full {
+        return Verdict::Paused { reason: Some(Reason::StorageEnospc) };
+    }
+    Verdict::Failed { reason: Reason::StorageIo, message: error.to_string() }
+}
+
+fn attempt(
+    order: &Order,
+    directory: &Path,
+    control: &Control,
+    sink: &mut dyn RecordSink,
+    log: &Log,
+) -> Result<Verdict, Failure> {
+    let internal = |error: &dyn std::error::Error| Failure::Known(Reason::Internal, error.to_string());
+    let wishes = Wishes::of(&order.body).map_err(|error| internal(&error))?;
+    let scene = understand(&order.body["scene"], SCENES).map_err(|violations| {
+        Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
+    })?;
+    let threads = wishes.limits.threads.max(1) as usize;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
+    log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
+    // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
+    let mut progress = ProgressMeter::new(order.usage, order.time.clone());
+    pool.install(|| {
+        let clouds =
+            inputs::read(scene.as_ref(), order).map_err(|cause| Failure::Known(Reason::InputDamaged, cause))?;
+        let context = BuildContext {
+            clouds,
+            plan: wishes.plan(),
+            interrupt: control.interrupt().clone(),
+            cpu_clock: CpuClock(process::cpu_seconds),
+        };
+        let built = scene.build(context);
+        // What was dropped on the way says nothing of the input.
+        if control.interrupt().is_raised() {
+            return Err(Failure::Canceled);
+        }
+        let mut simulation = built.map_err(|found| {
+            let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
+            Failure::Known(Reason::InputDamaged, cause)
+        })?;
+        let start = restore(order, simulation.as_mut(), sink, log)?;
+        progress.continue_phases(start.counters.phases.clone());
+        let mut observers = prepare(order, directory, &wishes, control, sink, &start, progress)?;
+        let step = simulation.clock().step;
+        observers.sink.put(
+            &Record::Started {
+                step,
+                frames: start.counters.frames.len() as u64,
+                from_checkpoint: start.is_own,
+                pid: std::process::id(),
+            },
+            true,
+        )?;
+        log.line(&format!("start at step {step}, {} particles", simulation.particle_count()));
+        let ending = run(simulation.as_mut(), &mut observers).map_err(Failure::Run)?;
+        log.line(&format!("{ending:?} at step {}", simulation.clock().step));
+        match ending {
+            Ending::Stopped if control.interrupt().is_raised() => Ok(Verdict::Canceled),
+            Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),
+            Ending::Finished => {
+                finish(order, directory, simulation.as_ref(), &mut observers, threads, log)?;
+                Ok(Verdict::Succeeded)
+            }
+        }
+    })
+}
+
+/// What an attempt goes on from.
+#[derive(Default)]
+struct Start {
+    counters: Counters,
+    /// Whether the checkpoint was this job's own, so that the output of its step exists.
+    is_own: bool,
+    step: u64,
+}
+
+/// Restores the newest sound checkpoint of the order; damaged ones are reported and passed over.
+fn restore(
+    order: &Order,
+    simulation: &mut dyn Simulation,
+    sink: &mut dyn RecordSink,
+    log: &Log,
+) -> Result<Start, Failure> {
+    for candidate in &order.checkpoints {
+        match open_start(order, candidate) {
+            Ok((meta, state)) => match simulation.restore(&state) {
+                Ok(()) => {
+                    log.line(&format!("restored {} at step {}", candidate.id, meta.step));
+                    let mut counters = meta.counters;
+                    if !candidate.is_own {
+                        // Frame numbers go on; files, series and costs are those of another job.
+                        let before = counters.frames_before + counters.frames.len() as u64;
+                        counters = Counters { frames_before: before, ..Counters::default() };
+                    }
+                    return Ok(Start { counters, is_own: candidate.is_own, step: state.step });
+                }
+                Err(error) => refuse(order, candidate, &error.to_string(), sink, log)?,
+            },
+            Err(Refusal::Incompatible(message)) if !candidate.is_own => {
+                return Err(Failure::Known(Reason::CheckpointIncompatible, message));
+            }
+            Err(Refusal::Incompatible(message) | Refusal::Damaged(message)) => {
+                refuse(order, candidate, &message, sink, log)?;
+            }
+        }
+    }
+    if order.may_start_afresh {
+        return Ok(Start::default());
+    }
+    Err(Failure::Known(Reason::CheckpointNoneValid, format!("{} checkpoints were tried", order.checkpoints.len())))
+}
+
+enum Refusal {
+    Damaged(String),
+    Incompatible(String),
+}
+
+fn open_start(order: &Order, candidate: &StartCheckpoint) -> Result<(Meta, State), Refusal> {
+    let (meta, state) = checkpoint::read(&candidate.path, candidate.sha256.as_deref())
+        .map_err(|error| Refusal::Damaged(error.to_string()))?;
+    if !checkpoint::is_same_scene(&meta.body, &order.body) {
+        let message = "the checkpoint is of another scene: fields that are not restart-safe differ";
+        return Err(Refusal::Incompatible(message.to_owned()));
+    }
+    let isa = crate::system::build::isa();
+    if meta.isa != isa && !candidate.allow_other_isa {
+        return Err(Refusal::Incompatible(format!(
+            "the checkpoint was written on {}, this worker computes on {isa}",
+            meta.isa
+        )));
+    }
+    Ok((meta, state))
+}
+
+fn refuse(
+    order: &Order,
+    candidate: &StartCheckpoint,
+    message: &str,
+    sink: &mut dyn RecordSink,
+    log: &Log,
+) -> Result<(), Failure> {
+    let message = format!("checkpoint {} is passed over: {message}", candidate.id);
+    let message = hide(&message, order, &order.attempts_directory);
+    log.line(&message);
+    sink.put(&Record::Warning { code: "checkpoint.refused".to_owned(), message }, true)?;
+    Ok(())
+}
+
+fn prepare<'a>(
+    order: &Order,
+    directory: &Path,
+    wishes: &Wishes,
+    control: &'a Control,
+    sink: &'a mut dyn RecordSink,
+    start: &Start,
+    progress: ProgressMeter,
+) -> Result<Observers<'a>, Failure> {
+    let plan = wishes.plan();
+    let counters = &start.counters;
+    let earlier = start.is_own.then(|| {
+        (
+            order.attempts_directory.join(counters.series_epoch.to_string()).join(series::FILE_NAME),
+            counters.series_bytes,
+        )
+    });
+    Ok(Observers {
+        frames: Frames::new(
+            directory.to_owned(),
+            order.epoch,
+            plan,
+            wishes.output.fields.clone(),
+            counters.frames.clone(),
+            counters.frames_before,
+        ),
+        series: Series::open(directory, order.epoch, plan, earlier)?,
+        checkpoints: Checkpoints::new(
+            directory.to_owned(),
+            order.job.clone(),
+            order.body.clone(),
+            wishes.checkpoint.every_wall_s,
+            wishes.checkpoint.every_steps,
+        ),
+        progress,
+        control,
+        sink,
+        directory: directory.to_owned(),
+        reserve_bytes: order.reserve_bytes,
+        is_starved: false,
+        restored: start.is_own.then_some(start.step),
+    })
+}
+
+/// Report, picture and digests of a finished run.
+fn finish(
+    order: &Order,
+    directory: &Path,
+    simulation: &dyn Simulation,
+    observers: &mut Observers,
+    threads: usize,
+    log: &Log,
+) -> Result<(), Failure> {
+    let mut files: Vec<_> = observers.frames.written().iter().map(|(_, file)| file.clone()).collect();
+    // The frames may be an earlier attempt's; the index of all is this one's in any case.
+    files.push(observers.frames.write_index()?);
+    observers.sink.put(&Record::File(files[files.len() - 1].clone()), false)?;
+    observers.series.sync()?;
+    let series = artifacts::record(directory, series::FILE_NAME, "text/csv")?;
+    files.push(series.clone());
+    observers.sink.put(&Record::File(series), false)?;
+    if let Some(drawn) = draw_picture(order, directory, observers, log) {
+        files.push(drawn.clone());
+        observers.sink.put(&Record::File(drawn), false)?;
+    }
+    let phases = observers.progress.phases(simulation);
+    let usage = observers.progress.usage();
+    let steps = simulation.clock().step;
+    let particles = simulation.particle_count() as u64;
+    let report =
+        report::compose(&simulation.report(), &usage, &phases, steps, particles, threads, &order.body["scene"]);
+    artifacts::write(&directory.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
+    let report = artifacts::record(directory, "report.json", "application/json")?;
+    files.push(report.clone());
+    observers.sink.put(&Record::File(report), false)?;
+    files.sort_by(|a, b| a.path.cmp(&b.path));
+    let sums: String = files.iter().map(|file| format!("{}  {}\n", file.sha256, file.path)).collect();
+    artifacts::write(&directory.join("SHA256SUMS"), sums.as_bytes())?;
+    let sums = artifacts::record(directory, "SHA256SUMS", "text/plain")?;
+    observers.sink.put(&Record::File(sums), true)?;
+    Ok(())
+}
+
+/// The first, the middle and the last frame side by side; a picture that fails is logged and left out.
+fn draw_picture(
+    order: &Order,
+    directory: &Path,
+    observers: &Observers,
+    log: &Log,
+) -> Option<crate::spec::records::FileRecord> {
+    let frames = observers.frames.written();
+    let mut chosen = vec![0, frames.len() / 2, frames.len().saturating_sub(1)];
+    chosen.dedup();
+    let place = |epoch: u64| {
+        if epoch == order.epoch { directory.to_owned() } else { order.attempts_directory.join(epoch.to_string()) }
+    };
+    let mut views = Vec::new();
+    for (epoch, file) in chosen.iter().filter_map(|k| frames.get(*k)) {
+        match vtkhdf::read_frame(&place(*epoch).join(&file.path)) {
+            Ok(Some(view)) => views.push(view),
+            Ok(None) => return None,
+            Err(error) => {
+                log.line(&hide(&format!("no picture: {error}"), order, directory));
+                return None;
+            }
+        }
+    }
+    let spacing = picture::spacing(&order.body["scene"], &views);
+    let path = directory.join("picture.svg");
+    let drawn = picture::draw(&artifacts::unfinished(&path), &views, spacing)
+        .and_then(|()| artifacts::finish(&path).map_err(|e| e.to_string()))
+        .and_then(|()| artifacts::record(directory, "picture.svg", "image/svg+xml").map_err(|e| e.to_string()));
+    drawn.map_err(|error| log.line(&hide(&format!("no picture: {error}"), order, directory))).ok()
+}
+
+/// The attempt's log: whole lines with a time, each written at once.
+struct Log {
+    path: PathBuf,
+}
+
+impl Log {
+    fn line(&self, text: &str) {
+        let line = format!("{} {text}\n", crate::system::clock::now());
+        // A log that cannot be written must not end a run.
+        let _ = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&self.path)
+            .and_then(|mut f| f.write_all(line.as_bytes()));
+    }
+}

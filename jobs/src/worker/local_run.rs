@@ -1,0 +1,70 @@
+//! One job in this process, on so many threads, for its report alone or its frames too.
+
+use crate::spec::attempt_spec::Order;
+use crate::spec::body::{self, Allowance, JobBody, NoSources};
+use crate::spec::records::{Record, RecordSink, Usage, Verdict};
+use crate::system::process;
+use crate::worker::attempt;
+use crate::worker::observers::Control;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// What is left of a run beside its report, series and picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// Nothing: frames of large runs would fill the disk.
+    Report,
+    /// Its frames.
+    Frames,
+}
+
+/// Runs a job body into a directory, which is emptied before, and returns how it was understood.
+///
+/// # Errors
+/// A sentence.
+pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<JobBody, String> {
+    let system = |error: io::Error| error.to_string();
+    if directory.exists() {
+        fs::remove_dir_all(directory).map_err(system)?;
+    }
+    fs::create_dir_all(directory).map_err(system)?;
+    let memory_bytes = process::total_memory().unwrap_or(4 << 30) / 5 * 4;
+    let allowance = Allowance { threads, memory_bytes, local_files: false };
+    let body = body::parse(body, allowance, &NoSources).map_err(|violations| {
+        violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
+    })?;
+    let order = Order {
+        job: "local".to_owned(),
+        epoch: 1,
+        body: body.resolved.clone(),
+        attempts_directory: directory.to_owned(),
+        may_start_afresh: true,
+        checkpoints: Vec::new(),
+        inputs: BTreeMap::new(),
+        time: None,
+        reserve_bytes: 0,
+        usage: Usage::default(),
+    };
+    match attempt::run_attempt(&order, directory, &Control::default(), &mut Silent) {
+        Verdict::Succeeded => {
+            let _ = fs::remove_dir_all(directory.join("checkpoints"));
+            if keep == Keep::Report {
+                let _ = fs::remove_dir_all(directory.join("frames"));
+            }
+            Ok(body)
+        }
+        Verdict::Failed { message, .. } => Err(message),
+        other => Err(format!("ended as {other:?}")),
+    }
+}
+
+struct Silent;
+
+impl RecordSink for Silent {
+    fn put(&mut self, _record: &Record, _durable: bool) -> io::Result<()> {
+        Ok(())
+    }
+}

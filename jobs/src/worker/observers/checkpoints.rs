@@ -1,0 +1,90 @@
+//! Checkpoints by the wall clock, by steps, on request, and always of the final state.
+
+use crate::formats::checkpoint::{self, CheckpointError, Counters};
+use crate::spec::records::CheckpointRecord;
+use crate::system::build;
+use meniscus::simulation::Simulation;
+use serde_json::Value;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use ulid::Ulid;
+
+/// Writes checkpoints when they are due.
+pub struct Checkpoints {
+    directory: PathBuf,
+    job: String,
+    body: Value,
+    every: Option<Duration>,
+    every_steps: Option<u64>,
+    last: Instant,
+    last_step: Option<u64>,
+}
+
+impl Checkpoints {
+    /// For an attempt; the clock starts now.
+    #[must_use]
+    pub fn new(
+        directory: PathBuf,
+        job: String,
+        body: Value,
+        every_wall_s: Option<f64>,
+        every_steps: Option<u64>,
+    ) -> Self {
+        let every = every_wall_s.and_then(|s| Duration::try_from_secs_f64(s).ok());
+        Self { directory, job, body, every, every_steps, last: Instant::now(), last_step: None }
+    }
+
+    /// Whether to write one after this step. The initial state is not worth one.
+    #[must_use]
+    pub fn is_due(&self, step: u64, wanted: bool) -> bool {
+        let by_clock = self.every.is_some_and(|every| self.last.elapsed() >= every);
+        let by_steps = self.every_steps.is_some_and(|every| step > 0 && step.is_multiple_of(every));
+        (wanted || by_steps || by_clock && step > 0) && self.last_step != Some(step)
+    }
+
+    /// Writes and verifies one.
+    ///
+    /// # Errors
+    /// [`CheckpointError`].
+    pub fn write(
+        &mut self,
+        simulation: &dyn Simulation,
+        counters: Counters,
+    ) -> Result<CheckpointRecord, CheckpointError> {
+        let clock = simulation.clock();
+        let folder = self.directory.join("checkpoints");
+        std::fs::create_dir_all(&folder)?;
+        let name = format!("{:012}.h5", clock.step);
+        let meta = checkpoint::meta(&self.job, &self.body, clock.step, clock.time, counters);
+        let (sha256, size_bytes) = checkpoint::write_verified(&folder.join(&name), meta, &simulation.state())?;
+        self.last = Instant::now();
+        self.last_step = Some(clock.step);
+        Ok(CheckpointRecord {
+            id: format!("ckpt_{}", Ulid::generate()),
+            path: format!("checkpoints/{name}"),
+            step: clock.step,
+            time: clock.time,
+            size_bytes,
+            sha256,
+            isa: build::isa(),
+            build: build::name(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn they_are_due_by_the_clock_by_steps_and_on_request_but_once_a_step() {
+        let new = |every, steps| Checkpoints::new(PathBuf::new(), String::new(), Value::Null, every, steps);
+        let (always, later) = (new(Some(0.0), None), new(Some(3600.0), None));
+        assert!(always.is_due(1, false) && !later.is_due(1, false) && later.is_due(1, true));
+        assert!(!always.is_due(0, false), "the initial state is not worth one");
+        let mut by_steps = new(None, Some(20));
+        assert_eq!((0..=60).filter(|step| by_steps.is_due(*step, false)).collect::<Vec<_>>(), [20, 40, 60]);
+        by_steps.last_step = Some(40);
+        assert!(!by_steps.is_due(40, true));
+    }
+}

@@ -1,0 +1,99 @@
+//! Frames: one closed VTKHDF file each, and ParaView's index of them.
+
+use crate::formats::{frame_index, vtkhdf};
+use crate::spec::records::FileRecord;
+use crate::system::artifacts;
+use crate::system::digest;
+use meniscus::simulation::run::ObserverError;
+use meniscus::simulation::{OutputPlan, Simulation};
+use meniscus::time::FixedStep;
+use std::path::PathBuf;
+
+/// Media type of HDF5 files.
+pub const HDF5: &str = "application/x-hdf5";
+
+/// Writes frames when they are due.
+pub struct Frames {
+    directory: PathBuf,
+    epoch: u64,
+    plan: OutputPlan,
+    chosen: Vec<String>,
+    written: Vec<(u64, FileRecord)>,
+    before: u64,
+    /// The first look of a run that does not continue its own: its state is always a frame.
+    is_first: bool,
+}
+
+impl Frames {
+    /// For an attempt; `written` are the frames that earlier attempts wrote, `before` those of earlier jobs.
+    #[must_use]
+    pub fn new(
+        directory: PathBuf,
+        epoch: u64,
+        plan: OutputPlan,
+        chosen: Vec<String>,
+        written: Vec<(u64, FileRecord)>,
+        before: u64,
+    ) -> Self {
+        Self { directory, epoch, plan, chosen, is_first: written.is_empty(), written, before }
+    }
+
+    /// Frames of this job so far, with the attempt that wrote each.
+    #[must_use]
+    pub fn written(&self) -> &[(u64, FileRecord)] {
+        &self.written
+    }
+
+    /// Frames of earlier jobs.
+    #[must_use]
+    pub fn before(&self) -> u64 {
+        self.before
+    }
+
+    /// Writes the frame of this step, if it is due.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn observe(&mut self, simulation: &dyn Simulation) -> Result<Option<FileRecord>, ObserverError> {
+        let clock = simulation.clock();
+        let is_due = self.plan.is_frame_due(&fixed_step(simulation), clock.step) || simulation.is_finished();
+        if !self.is_first && !is_due {
+            return Ok(None);
+        }
+        self.is_first = false;
+        let name = format!("frames/{:06}.vtkhdf", self.before + self.written.len() as u64);
+        let path = self.directory.join(&name);
+        std::fs::create_dir_all(self.directory.join("frames"))?;
+        vtkhdf::write_frame(&artifacts::unfinished(&path), &simulation.fields(), &self.chosen, clock.time, clock.step)?;
+        artifacts::finish(&path)?;
+        let (sha256, size_bytes) = digest::of_file(&path)?;
+        let frame = FileRecord {
+            path: name,
+            size_bytes,
+            sha256,
+            media_type: HDF5.to_owned(),
+            time: Some(clock.time),
+            step: Some(clock.step),
+        };
+        self.written.push((self.epoch, frame.clone()));
+        Ok(Some(frame))
+    }
+
+    /// Writes the index of all frames. While a job runs the service derives it from the published frames; the end of
+    /// the run makes it a file.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write_index(&self) -> Result<FileRecord, ObserverError> {
+        let text = frame_index::text(self.written.iter().map(|(_, frame)| (frame.path.as_str(), frame.time)));
+        artifacts::write(&self.directory.join(frame_index::PATH), text.as_bytes())?;
+        Ok(artifacts::record(&self.directory, frame_index::PATH, frame_index::MEDIA_TYPE)?)
+    }
+}
+
+/// The steps of a simulation, for the output plan.
+#[must_use]
+pub fn fixed_step(simulation: &dyn Simulation) -> FixedStep {
+    let end = simulation.end();
+    FixedStep { time_step: end.time / end.step.max(1) as f64, steps: end.step }
+}
