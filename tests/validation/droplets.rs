@@ -33,7 +33,7 @@ fn last(simulation: &dyn Simulation, name: &str) -> f64 {
     simulation.observables().into_iter().find(|(n, _)| *n == name).unwrap().1
 }
 
-/// The independent reference (errata) passes zero at 0.0872 and 0.2418, with the minimum −0.1767 between; h = 1/20 is later by
+/// The independent reference (docs/errata.md) passes zero at 0.0872 and 0.2418, with the minimum −0.1767 between; h = 1/20 is later by
 /// what its smoothing adds, which falls with h (rows of the scene).
 #[test]
 fn an_ellipse_swings_as_the_reference_does_and_keeps_what_must_be_kept() {

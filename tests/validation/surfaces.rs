@@ -130,7 +130,7 @@ fn a_drop_by_dcpse_swings_as_the_reference_does() {
         "shape": {"type": "ellipse", "center": [0.0131, 0.0072], "semi_axes": [0.75, 0.5]}
     }));
     assert!(error(&report, "curvature", "mean_error", None).abs() < 0.0120);
-    // errata.md: .0872; .0883 at 1/32, .0893 at 1/25.
+    // docs/errata.md: .0872; .0883 at 1/32, .0893 at 1/25.
     assert!((error(&report, "deformation", "zero_1", None) - 0.0872).abs() < 0.005);
     assert!(error(&report, "area", "relative", None).abs() < 5e-3);
 }

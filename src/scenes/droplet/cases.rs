@@ -55,7 +55,7 @@ pub(super) fn case(name: &str, dimension: usize, spacing: f64) -> Case {
             tension: 5.0,
             density_method: json!("continuity"),
             shifting: "pst",
-            // Without force where the halves come to stay, and half way to it across (errata).
+            // The force vanishes where the halves come to rest (docs/errata.md, PCP 29 and 30).
             body_force: both(
                 json!({"type": "pulse", "coefficient": 1000.0, "duration": 0.5, "A": 0.5, "B": 0.5, "C": 0.5}),
                 json!({"type": "pulse", "coefficient": 5000.0, "duration": 0.05, "A": 0.375, "B": 0.390_625, "C": 0.390_625}),

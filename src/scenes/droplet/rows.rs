@@ -149,7 +149,7 @@ fn variants() -> [(&'static str, Value); 3] {
     ]
 }
 
-/// Passages and extremes of the deformation that errata.md gives.
+/// Zero crossings of the deformation, from docs/errata.md, "Reference of the oscillating drop".
 const DEFORMATION: [(f64, f64); 3] = [(0.0, 0.384_615), (0.0872, 0.0), (0.2418, 0.0)];
 
 fn figures() -> Vec<Figure> {

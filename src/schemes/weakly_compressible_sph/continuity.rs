@@ -1,4 +1,4 @@
-//! Rates of density and velocity in the mass form: continuity with diffusion (PCP eq. B.12, corrected by errata), pressure
+//! Rates of density and velocity in the mass form: continuity with diffusion (PCP eq. B.12, corrected in docs/errata.md), pressure
 //! with a viscosity that stands for the physical one (B.13, B.14).
 
 use super::column::Column;
