@@ -175,7 +175,8 @@ fn entries_that_the_database_does_not_list_are_named() {
     let (directory, store) = store();
     let known = submit(&store, &json!({}));
     std::fs::create_dir_all(store.job_directory(&known.id)).unwrap();
-    let foreign = ["jobs/2025-thesis", "jobs/job_of_a_newer_database", "uploads/photos"].map(|p| directory.path().join(p));
+    let foreign =
+        ["jobs/2025-thesis", "jobs/job_of_a_newer_database", "uploads/photos"].map(|p| directory.path().join(p));
     for folder in &foreign {
         std::fs::create_dir_all(folder).unwrap();
     }
