@@ -1,5 +1,6 @@
 //! How long a flow draws a front out, and what its exact motion costs, before anything is run.
 
+use crate::geometry::flows::Stretch;
 use crate::geometry::{Flow, Surface, Vector};
 use crate::schemes::exact_motion::front_points;
 use crate::time::PathIntegrator;
@@ -13,15 +14,6 @@ const MOST_STEPS: f64 = 2000.0;
 /// Units of work of a tight path through one unit of time, against the distance of one particle from a known shape.
 const PATH: f64 = 100.0;
 
-/// The length of a front by that at the start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
-    /// On the average over the run.
-    pub mean: f64,
-    /// At its longest.
-    pub most: f64,
-}
-
 /// How much a flow stretches a surface: 1 in a rigid motion, and in space, where outlines are not known. Of a flow that returns one
 /// period tells all.
 #[must_use]
@@ -34,7 +26,7 @@ pub fn stretch<const D: usize>(surface: &dyn Surface<D>, flow: &dyn Flow<D>, end
     };
     let start = length(&chains);
     if flow.is_rigid() || start.is_nan() || start <= 0.0 {
-        return Stretch { mean: 1.0, most: 1.0 };
+        return Stretch::NONE;
     }
     let steps = (end_time / LONGEST_STEP).ceil().clamp(FRONT_STEPS, MOST_STEPS);
     let step = end_time / steps;

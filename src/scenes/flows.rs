@@ -143,17 +143,3 @@ pub fn flow<const D: usize>(flow: &Flow) -> Result<Box<dyn geometry::Flow<D>>, V
         Flow::Translation { velocity } => Ok(Box::new(Translation { velocity: vector("velocity", velocity)? })),
     }
 }
-
-/// The largest speed that a point of a box can have, for limits of steps.
-#[must_use]
-pub fn top_speed<const D: usize>(flow: &Flow, (low, high): (Vector<D>, Vector<D>)) -> f64 {
-    match flow {
-        Flow::SingleVortex { .. } => 1.0,
-        Flow::Vortex3d { .. } => 2.0,
-        Flow::Rotation { center, angular_velocity } => {
-            let farthest = |d: usize| center.get(d).map_or(0.0, |c| (low[d] - c).abs().max((high[d] - c).abs()));
-            angular_velocity.abs() * farthest(0).hypot(farthest(1))
-        }
-        Flow::Translation { velocity } => velocity.iter().map(|v| v * v).sum::<f64>().sqrt(),
-    }
-}

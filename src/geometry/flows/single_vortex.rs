@@ -19,6 +19,11 @@ impl Flow<2> for SingleVortex {
         Vector::<2>::new(-0.5 * strength * (1.0 - cos_x) * sin_y, 0.5 * strength * (1.0 - cos_y) * sin_x)
     }
 
+    fn top_speed(&self, _low: &Vector<2>, _high: &Vector<2>) -> f64 {
+        // Reached in the middle of each side of the unit square; a carried point may come anywhere.
+        1.0
+    }
+
     fn return_time(&self) -> Option<f64> {
         self.period
     }
@@ -26,6 +31,7 @@ impl Flow<2> for SingleVortex {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sampling;
     use super::{Flow, SingleVortex, Vector};
     use std::f64::consts::PI;
 
@@ -39,5 +45,13 @@ mod tests {
             let expected = Vector::<2>::new(-s * sx * sx * sy * cy, s * sy * sy * sx * cx);
             assert!((u - expected).norm() < 1e-15);
         }
+    }
+
+    #[test]
+    fn the_bound_of_the_speed_is_reached_in_the_unit_square() {
+        let flow = SingleVortex { period: None };
+        let (low, high) = (Vector::<2>::zeros(), Vector::<2>::repeat(1.0));
+        let (bound, sampled) = (flow.top_speed(&low, &high), sampling::top_speed(&flow, &low, &high, 4.0));
+        assert!(sampled <= bound && sampled > 0.99 * bound, "{sampled}");
     }
 }

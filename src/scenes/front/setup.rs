@@ -3,13 +3,14 @@
 use super::parameters::{Law, Written};
 use super::wavefront::{self, WavefrontScene};
 use crate::geometry::Vector;
+use crate::geometry::flows::Stretch;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::curvature_stability::longest_step;
-use crate::scenes::flow_work::{Stretch, error_units, path_units, stretch};
-use crate::scenes::flows::{Flow, flow, top_speed};
+use crate::scenes::flow_work::{error_units, path_units, stretch};
+use crate::scenes::flows::flow;
 use crate::scenes::gbpm_parameters::{self, Chosen, Motion};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::{shapes, work_estimate};
@@ -33,8 +34,6 @@ const CURVATURE_STEP: f64 = 0.5;
 const STEPS_A_TURN: f64 = 32.0;
 /// Paths of an error in space by particle, by the cost of a tight one, beside that: three, and those of samples.
 const PATHS_IN_SPACE: f64 = 8.0;
-/// How much larger a vortex makes a surface, about.
-const DRAWN_OUT: f64 = 4.0;
 /// Resident bytes a foot-point: its columns twice, its outcome, cells, a frame and a checkpoint in the making.
 pub(super) const BYTES: u64 = 1200;
 /// The same on a refined grid, with the cells that are split in the making.
@@ -104,8 +103,14 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
     let surface = shapes::surface::<D>(&choice.shape, "/shape");
     let top = match (&surface, &choice.law) {
         (Ok(surface), Law::Flow { flow: of }) => {
-            violations.extend(flow::<D>(of).err().map(|found| at_law(found, choice.pointer)));
-            top_speed::<D>(of, surface.bounding_box())
+            let (low, high) = surface.bounding_box();
+            flow::<D>(of).map_or_else(
+                |found| {
+                    violations.push(at_law(found, choice.pointer));
+                    0.0
+                },
+                |flow| flow.top_speed(&low, &high),
+            )
         }
         (_, Law::Normal { speed } | Law::GeometricalOptics { speed }) => speed.abs(),
         _ => 0.0,
@@ -288,11 +293,12 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
 
     /// How much larger the front becomes.
     fn stretch(&self) -> Stretch {
-        let none = Stretch { mean: 1.0, most: 1.0 };
+        let none = Stretch::NONE;
         match &self.choice.law {
-            Law::Flow { flow: Flow::Vortex3d { .. } } => Stretch { mean: 0.5 * DRAWN_OUT, most: DRAWN_OUT },
             Law::Flow { flow: of } => match (shapes::surface::<D>(&self.choice.shape, "/shape"), flow::<D>(of)) {
-                (Ok(surface), Ok(flow)) => stretch(surface.as_ref(), flow.as_ref(), self.choice.end_time),
+                (Ok(surface), Ok(flow)) => flow
+                    .typical_stretch()
+                    .unwrap_or_else(|| stretch(surface.as_ref(), flow.as_ref(), self.choice.end_time)),
                 _ => none,
             },
             Law::Normal { speed } if *speed > 0.0 => {
