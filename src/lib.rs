@@ -6,6 +6,7 @@
 //! The engine knows no job, no HTTP, no file path and no wall clock; it prints nothing. A simulation's future depends
 //! on (scene, state) alone, for any number of threads. A module uses only modules above it in this list:
 
+pub mod spec;
 pub mod parallel;
 pub mod geometry;
 pub mod linear_algebra;

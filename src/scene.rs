@@ -1,54 +1,127 @@
-//! Scenes: from parameters as written to a valid scene that builds a simulation.
+//! Scenes: from declared parameters to a valid scene that builds a simulation.
 //!
-//! A scene kind declares its parameters as data ([`schema::Parameter`]); checking, defaults, presets, JSON Schema and
-//! the list of restart-safe fields all come from that declaration.
+//! A kind of scene declares its parameters once ([`crate::spec`]). What they mean together is its plan: the step from its
+//! spec to a [`Scene`], which returns everything that is wrong.
 
-pub mod check;
 pub mod cloud;
-pub mod json_schema;
 pub mod rows;
-pub mod schema;
 pub mod work;
 
-pub use check::{Violation, check};
 pub use cloud::{Cloud, CloudReference, CloudSizes, CloudSource, Clouds};
 pub use rows::Rows;
-pub use schema::{Default as DefaultValue, Kind, Parameter, Variant};
 pub use work::PhaseWork;
 
 use crate::parallel::Interrupt;
 use crate::simulation::{CpuClock, OutputPlan, Simulation};
-use serde_json::{Map, Value};
+use crate::spec::{Declaration, Given, Group, Json, Object, Preset, Violation, group, suggest};
+use serde_json::json;
+
+/// The declared parameters of a kind of scene, and their meaning together.
+pub trait SceneSpec: Group {
+    /// From parameters that are valid one by one to a scene.
+    ///
+    /// # Errors
+    /// Everything that does not fit together.
+    fn plan(self) -> Planned;
+}
+
+/// A scene, or everything that is wrong with its parameters.
+pub type Planned = Result<Box<dyn Scene>, Vec<Violation>>;
+
+/// A named preset: values that a name stands for, depending on what else is given.
+pub type NamedPreset = (&'static str, fn(Given) -> Preset);
 
 /// A kind of scene: everything that clients learn of it, and how its JSON becomes a scene.
 pub struct SceneKind {
     /// The `kind` in JSON.
     pub kind: &'static str,
-    /// One line.
+    /// What it simulates, in one line.
     pub title: &'static str,
-    /// Its parameters, `kind` and `preset` excepted.
-    pub parameters: &'static [Parameter],
-    /// Names of presets.
-    pub presets: &'static [&'static str],
-    /// Parameters of a preset, given what else stands in the scene.
-    pub preset: fn(name: &str, given: &Map<String, Value>) -> Map<String, Value>,
+    /// Presets by name.
+    pub presets: &'static [NamedPreset],
     /// A small job body that runs in seconds.
     pub example: &'static str,
     /// Short scenes by which a machine is measured: together they have every phase of the kind.
-    pub calibration: fn() -> Vec<Value>,
+    pub calibration: fn() -> Vec<Json>,
     /// What the kind must show.
     pub rows: fn() -> Rows,
-    /// From checked parameters (all defaults present) to a scene.
-    pub understand: fn(parameters: &Value) -> Understood,
+    /// Its parameters, `kind` and `preset` excepted.
+    pub declarations: fn() -> Vec<Declaration>,
+    /// From its parameters as sent, and what is already known to be wrong, to a scene.
+    pub parse: fn(given: &Object, errors: Vec<Violation>) -> Planned,
 }
 
-/// A scene, or all that is wrong with its parameters.
-pub type Understood = Result<Box<dyn Scene>, Vec<Violation>>;
+/// Parses the parameters of a kind and plans its scene: the `parse` of a [`SceneKind`].
+///
+/// # Errors
+/// Everything that is wrong with single parameters, or else with what they mean together.
+pub fn parse_as<S: SceneSpec>(given: &Object, mut errors: Vec<Violation>) -> Planned {
+    let names = S::names();
+    group::check_names(given, &names, "", &mut errors);
+    let spec = S::parse_fields(given, "", &mut errors);
+    match spec.filter(|_| errors.is_empty()) {
+        Some(spec) => spec.plan(),
+        None => Err(errors),
+    }
+}
+
+/// The resolved parameters of a scene: every field of its spec, and its kind.
+#[must_use]
+pub fn resolved(kind: &str, spec: &impl Group) -> Json {
+    let mut object = Object::from_iter([("kind".to_owned(), kind.into())]);
+    spec.write_fields(&mut object);
+    Json::Object(object)
+}
+
+impl SceneKind {
+    /// The JSON Schema of the kind: defaults, ranges, and `x-restart-safe` on what a restart may change.
+    #[must_use]
+    pub fn json_schema(&self) -> Json {
+        let mut schema = group::schema(&(self.declarations)());
+        if let Some(Json::Object(properties)) = schema.get_mut("properties") {
+            properties.shift_insert(0, "kind".into(), json!({"const": self.kind}));
+            if !self.presets.is_empty() {
+                let description = "sets every parameter that the paper states; anything given beside it wins";
+                let preset = json!({"enum": self.preset_names(), "description": description});
+                properties.shift_insert(1, "preset".into(), preset);
+            }
+        }
+        if let Some(Json::Array(required)) = schema.get_mut("required") {
+            required.insert(0, json!("kind"));
+        }
+        let mut whole = Object::new();
+        whole.insert("$schema".into(), json!("https://json-schema.org/draft/2020-12/schema"));
+        whole.insert("title".into(), json!(self.title));
+        whole.append(&mut schema);
+        Json::Object(whole)
+    }
+
+    /// Names of the presets.
+    #[must_use]
+    pub fn preset_names(&self) -> Vec<&'static str> {
+        self.presets.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// Pointers to the fields that a restart may change.
+    #[must_use]
+    pub fn restart_safe(&self) -> Vec<String> {
+        (self.declarations)().iter().filter(|d| d.is_restart_safe).map(|d| format!("/{}", d.name)).collect()
+    }
+}
 
 /// A valid scene.
 pub trait Scene: Send + Sync {
+    /// The kind.
+    fn kind(&self) -> &'static str;
+
+    /// Dimension of the space: 2 or 3.
+    fn dimension(&self) -> usize;
+
+    /// Distance of neighboring particles or points, where it is known before a run.
+    fn spacing(&self) -> Option<f64>;
+
     /// The parameters with every default and every automatic choice that is known before a run.
-    fn resolved(&self) -> Value;
+    fn resolved(&self) -> Json;
 
     /// Fields that frames can show.
     fn field_names(&self) -> Vec<&'static str>;
@@ -70,7 +143,7 @@ pub trait Scene: Send + Sync {
     /// The simulation at its start. Memory for particles is allocated here.
     ///
     /// # Errors
-    /// What turns out not to fit together only when it is made; a checked scene has nothing of that left.
+    /// What turns out not to fit together only when it is made, with points from outside above all.
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>>;
 }
 
@@ -90,68 +163,62 @@ pub struct BuildContext {
 /// The size of a run, before it is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Particles, within a few per cent.
+    /// Number of particles, within a few per cent.
     pub particles: u64,
-    /// Steps.
+    /// Number of steps.
     pub steps: u64,
-    /// Δt.
+    /// Time step Δt.
     pub time_step: f64,
     /// Scene time at the end.
     pub end_time: f64,
-    /// Resident memory of the simulation itself.
+    /// Resident memory of the simulation itself, in bytes.
     pub memory_bytes: u64,
 }
 
-/// From the JSON of a scene (`{"kind": …, …}`) to a scene. Pointers of violations start at the scene.
+/// From the JSON of a scene (`{"kind": …, …}`) to a scene. Pointers of errors begin at the scene.
 ///
-/// 1. The kind is looked up. 2. The preset is laid under what is given. 3. Parameters are checked one by one,
-///    defaults filled in. 4. The kind checks what parameters mean together.
+/// 1. The kind is looked up. 2. The preset is laid under what is given. 3. Parameters are read one by one, defaults filled in.
+/// 4. The kind checks what parameters mean together.
 ///
 /// # Errors
-/// All violations at once.
-pub fn understand(value: &Value, kinds: &[&'static SceneKind]) -> Understood {
-    let Value::Object(given) = value else {
-        return Err(vec![Violation::new("", "type", "a scene is an object", value, "an object with a kind".into())]);
+/// All of them at once.
+pub fn parse(value: &Json, kinds: &[&'static SceneKind]) -> Planned {
+    let Json::Object(given) = value else {
+        let allowed = "an object with a kind";
+        return Err(vec![Violation::new("", "type", "a scene is an object", value.clone(), allowed)]);
     };
-    let names: Vec<&str> = kinds.iter().map(|kind| kind.kind).collect();
-    let Some(kind) = given.get("kind") else {
-        let detail = "every scene names its kind";
-        return Err(vec![Violation::new("/kind", "required", detail, &Value::Null, names.into())]);
-    };
-    let Some(scene_kind) = kind.as_str().and_then(|name| kinds.iter().find(|k| k.kind == name)) else {
-        let mut violation =
-            Violation::new("/kind", "unknown", "there is no such kind of scene", kind, names.clone().into());
-        violation.did_you_mean = kind.as_str().and_then(|name| check::closest(name, &names));
-        return Err(vec![violation]);
-    };
-    let mut violations = Vec::new();
+    let kind = find_kind(given, kinds).map_err(|error| vec![error])?;
     let mut given = given.clone();
     given.shift_remove("kind");
-    if let Some(preset) = given.shift_remove("preset") {
-        match preset.as_str().filter(|name| scene_kind.presets.contains(name)) {
-            Some(name) => given = check::laid_under((scene_kind.preset)(name, &given), given),
+    let mut errors = Vec::new();
+    if let Some(name) = given.shift_remove("preset") {
+        let known = kind.presets.iter().find(|(known, _)| name == *known);
+        match known {
+            Some((_, preset)) => given = preset(Given::new(&given)).under(given),
             None => {
-                let allowed = scene_kind.presets.to_vec();
-                let mut violation =
-                    Violation::new("/preset", "unknown", "there is no such preset", &preset, allowed.into());
-                violation.did_you_mean = preset.as_str().and_then(|name| check::closest(name, scene_kind.presets));
-                violations.push(violation);
+                let names = kind.preset_names();
+                let detail = "there is no such preset";
+                errors.push(Violation::unknown("/preset", "unknown", detail, name.clone(), name.as_str(), &names));
             }
         }
     }
-    let mut resolved = check(scene_kind.parameters, &given, "", &mut violations);
-    // A name near `preset` is a likely slip, but `check` knows parameters only.
-    for violation in &mut violations {
-        if violation.code == "unknown_field" && violation.did_you_mean.is_none() {
-            let name = violation.pointer.trim_start_matches('/').to_owned();
-            violation.did_you_mean = check::closest(&name, &["preset", "kind"]);
-        }
+    (kind.parse)(&given, errors).map_err(|errors| errors.into_iter().map(suggest_own_names).collect())
+}
+
+fn find_kind(given: &Object, kinds: &[&'static SceneKind]) -> Result<&'static SceneKind, Violation> {
+    let names: Vec<&str> = kinds.iter().map(|kind| kind.kind).collect();
+    let Some(kind) = given.get("kind") else {
+        return Err(Violation::new("/kind", "required", "every scene names its kind", Json::Null, names));
+    };
+    kinds.iter().copied().find(|known| *kind == known.kind).ok_or_else(|| {
+        Violation::unknown("/kind", "unknown", "there is no such kind of scene", kind.clone(), kind.as_str(), &names)
+    })
+}
+
+/// A name near `preset` or `kind` is a likely slip, but the spec of a kind knows its parameters only.
+fn suggest_own_names(mut error: Violation) -> Violation {
+    if error.code == "unknown_field" && error.did_you_mean.is_none() {
+        error.did_you_mean = suggest(error.pointer.trim_start_matches('/'), &["preset", "kind"]);
     }
-    if !violations.is_empty() {
-        return Err(violations);
-    }
-    let mut whole = Map::new();
-    whole.insert("kind".into(), scene_kind.kind.into());
-    whole.append(&mut resolved);
-    (scene_kind.understand)(&Value::Object(whole))
+    error
 }

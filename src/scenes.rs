@@ -5,11 +5,11 @@ mod curvature_stability;
 mod dimension;
 pub mod droplet;
 mod flow_work;
-mod flows;
+pub mod flows;
 pub mod front;
-mod gbpm_parameters;
+pub mod gbpm_spec;
 pub mod particle_estimate;
-pub mod pcp_parameters;
+pub mod pcp_spec;
 pub mod redistance;
 pub mod shapes;
 pub mod surface_pde;
@@ -17,6 +17,7 @@ pub mod vortex;
 pub mod work_estimate;
 
 use crate::scene::SceneKind;
+use crate::spec::Json;
 
 /// Every kind of scene.
 pub static SCENES: &[&SceneKind] =
@@ -26,4 +27,10 @@ pub static SCENES: &[&SceneKind] =
 #[must_use]
 pub fn find(kind: &str) -> Option<&'static SceneKind> {
     SCENES.iter().copied().find(|k| k.kind == kind)
+}
+
+/// The kind of a scene's JSON.
+#[must_use]
+pub fn kind_of(scene: &Json) -> Option<&'static SceneKind> {
+    scene.get("kind").and_then(Json::as_str).and_then(find)
 }

@@ -5,6 +5,7 @@ pub mod body;
 pub mod calibration;
 pub mod forecast;
 pub mod records;
+pub mod run_options;
 pub mod states;
 pub mod strict_json;
 pub mod study;

@@ -4,7 +4,7 @@
 //! The engine opens nothing. A scene says by pointer what it needs, whoever builds it hands over the arrays.
 
 use crate::geometry::Vector;
-use crate::scene::Violation;
+use crate::spec::Violation;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -43,33 +43,32 @@ pub type Clouds = BTreeMap<&'static str, Cloud>;
 /// How many points there are, by the pointers that name them, as far as it is known.
 pub type CloudSizes = BTreeMap<&'static str, u64>;
 
-/// What a checked choice names, if it is `points`.
-///
-/// # Errors
-/// It names nothing, or two things.
-pub fn reference(choice: &Value, pointer: &'static str) -> Result<Option<CloudReference>, Violation> {
-    if choice["type"] != "points" {
-        return Ok(None);
+crate::group! {
+    /// Where points come from, as a scene names it.
+    pub struct PointsSource {
+        /// id of an upload that is ready
+        upload: Option<String>;
+        /// path of a file (valid for `meniscus run` alone)
+        file: Option<String>;
     }
-    let text = |name: &str| choice[name].as_str().map(str::to_owned);
-    let source = match (text("file"), text("upload")) {
-        (Some(file), None) => CloudSource::File(file),
-        (None, Some(upload)) => CloudSource::Upload(upload),
-        (given, _) => {
-            let code = if given.is_some() { "conflict" } else { "required" };
-            let detail = "points come from an upload, or in `meniscus run` from a file; name one of them";
-            return Err(Violation::new(pointer, code, detail, choice, json!({"type": "points", "upload": "upl_…"})));
-        }
-    };
-    Ok(Some(CloudReference { pointer, source }))
 }
 
-/// The same, where what is wrong is added to `violations`.
-pub fn named(choice: &Value, pointer: &'static str, violations: &mut Vec<Violation>) -> Option<CloudReference> {
-    reference(choice, pointer).unwrap_or_else(|violation| {
-        violations.push(violation);
-        None
-    })
+impl PointsSource {
+    /// The points that stand at a pointer of the scene. None, with an error, where none or two are named.
+    pub fn reference(&self, pointer: &'static str, errors: &mut Vec<Violation>) -> Option<CloudReference> {
+        let source = match (&self.file, &self.upload) {
+            (Some(file), None) => CloudSource::File(file.clone()),
+            (None, Some(upload)) => CloudSource::Upload(upload.clone()),
+            (given, upload) => {
+                let code = if given.is_some() { "conflict" } else { "required" };
+                let detail = "points come from an upload, or in `meniscus run` from a file; name one of them";
+                let got = json!({"type": "points", "upload": upload, "file": given});
+                errors.push(Violation::new(pointer, code, detail, got, json!({"type": "points", "upload": "upl_…"})));
+                return None;
+            }
+        };
+        Some(CloudReference { pointer, source })
+    }
 }
 
 /// The points of a cloud in `D` dimensions.
@@ -77,7 +76,7 @@ pub fn named(choice: &Value, pointer: &'static str, violations: &mut Vec<Violati
 /// # Errors
 /// No cloud, no points, numbers that are none, or a z in the plane.
 pub fn points<const D: usize>(clouds: &Clouds, pointer: &'static str) -> Result<Vec<Vector<D>>, Violation> {
-    let refuse = |detail: String| Violation::new(pointer, "data", detail, &Value::Null, Value::Null);
+    let refuse = |detail: String| Violation::new(pointer, "data", detail, Value::Null, Value::Null);
     let Some(cloud) = clouds.get(pointer) else {
         return Err(refuse("the points were not handed over".to_owned()));
     };
@@ -105,7 +104,7 @@ pub fn points_with_levels<const D: usize>(
     clouds: &Clouds,
     pointer: &'static str,
 ) -> Result<(Vec<Vector<D>>, Vec<f64>), Violation> {
-    let refuse = |detail: String| Violation::new(pointer, "data", detail, &Value::Null, json!("PointData/phi"));
+    let refuse = |detail: String| Violation::new(pointer, "data", detail, Value::Null, json!("PointData/phi"));
     let points = points::<D>(clouds, pointer)?;
     let Some(level) = clouds.get(pointer).and_then(|cloud| cloud.level.as_ref()) else {
         return Err(refuse("the points have no phi".to_owned()));
@@ -126,7 +125,7 @@ pub fn points_with_levels<const D: usize>(
 /// # Errors
 /// Another number of them than of points, or a z in the plane.
 pub fn normals<const D: usize>(clouds: &Clouds, pointer: &'static str) -> Result<Option<Vec<Vector<D>>>, Violation> {
-    let refuse = |detail: String| Violation::new(pointer, "data", detail, &Value::Null, json!("PointData/normal"));
+    let refuse = |detail: String| Violation::new(pointer, "data", detail, Value::Null, json!("PointData/normal"));
     let Some((cloud, normals)) = clouds.get(pointer).and_then(|cloud| Some((cloud, cloud.normals.as_ref()?))) else {
         return Ok(None);
     };
@@ -170,5 +169,5 @@ pub fn check_spacing<const D: usize>(points: &[Vector<D>], spacing: f64) -> Opti
         return None;
     }
     let detail = format!("the points lie {median:.3e} apart (median distance to the nearest other one)");
-    Some(Violation::new("/spacing", "conflict", detail, &json!(spacing), json!(median)))
+    Some(Violation::new("/spacing", "conflict", detail, spacing, median))
 }

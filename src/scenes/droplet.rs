@@ -2,21 +2,21 @@
 
 mod cases;
 mod flow;
-mod parameters;
 mod rows;
-mod setup;
+mod plan;
+pub mod spec;
 
-use crate::scene::SceneKind;
+use crate::scene::{self, SceneKind};
+use crate::spec::Group;
 
 /// The kind.
 pub static KIND: SceneKind = SceneKind {
     kind: "droplet",
     title: "Two fluids with surface tension: oscillating, dividing and resting drops (PCP paper, sections 4.3 and 4.4)",
-    parameters: parameters::PARAMETERS,
-    presets: &["paper"],
-    preset: parameters::preset,
+    presets: &[("paper", spec::paper)],
     example: include_str!("droplet/example.json"),
-    understand: setup::understand,
+    declarations: spec::Droplet::declarations,
+    parse: scene::parse_as::<spec::Droplet>,
     calibration: rows::calibration,
     rows: rows::rows,
 };

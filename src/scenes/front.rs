@@ -2,25 +2,25 @@
 
 mod cases;
 mod figures;
-mod parameters;
 mod rows;
-mod setup;
+mod plan;
+pub mod spec;
 mod wavefront;
 
-pub(super) use parameters::Law;
-pub(super) use setup::{FrontChoice, understand_choice};
+pub(super) use plan::{FrontChoice, plan_front};
+pub(super) use spec::Law;
 
-use crate::scene::SceneKind;
+use crate::scene::{self, SceneKind};
+use crate::spec::Group;
 
 /// The kind.
 pub static KIND: SceneKind = SceneKind {
     kind: "front",
     title: "A front moved by a flow, along its normal or by its curvature, as grid-based particles (GBPM paper)",
-    parameters: parameters::PARAMETERS,
-    presets: &["paper"],
-    preset: parameters::preset,
+    presets: &[("paper", spec::paper)],
     example: include_str!("front/example.json"),
-    understand: setup::understand,
+    declarations: spec::Front::declarations,
+    parse: scene::parse_as::<spec::Front>,
     calibration: rows::calibration,
     rows: rows::rows,
 };

@@ -4,7 +4,7 @@ use crate::closest_point::PcpMethod;
 use crate::closest_point::method::NeighborhoodChoice;
 use crate::geometry::{Surface, Vector};
 use crate::polynomials::multi_index::term_count;
-use crate::scene::Violation;
+use crate::spec::Violation;
 use serde_json::json;
 
 /// The thinnest band that is measured as it is, as a part of its shape's extent.
@@ -24,7 +24,7 @@ pub fn check_extent<const D: usize>(surface: &dyn Surface<D>, reach: f64, spacin
     let detail =
         "the shape and its band are too large, too far from the origin or too fine for a lattice of this spacing";
     let allowed = json!(format!("a number ≥ {:e}", farthest / MOST_NODES));
-    Some(Violation::new("/spacing", "range", detail, &json!(spacing), allowed))
+    Some(Violation::new("/spacing", "range", detail, spacing, allowed))
 }
 
 /// Particles of spacing h within `reach` of a surface: the measure of the band over h^D.

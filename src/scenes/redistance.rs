@@ -1,20 +1,20 @@
 //! `redistance`: static geometry (PCP paper, section 4.1).
 
-mod parameters;
+mod plan;
 mod rows;
-mod setup;
+pub mod spec;
 
-use crate::scene::SceneKind;
+use crate::scene::{self, SceneKind};
+use crate::spec::Group;
 
 /// The kind.
 pub static KIND: SceneKind = SceneKind {
     kind: "redistance",
     title: "Redistancing of resting particles about a known shape (PCP paper, section 4.1)",
-    parameters: parameters::PARAMETERS,
-    presets: &["paper"],
-    preset: parameters::preset,
+    presets: &[("paper", spec::paper)],
     example: include_str!("redistance/example.json"),
-    understand: setup::understand,
+    declarations: spec::Redistance::declarations,
+    parse: scene::parse_as::<spec::Redistance>,
     calibration: rows::calibration,
     rows: rows::rows,
 };

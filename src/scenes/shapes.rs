@@ -1,325 +1,392 @@
-//! Shapes as parameters: their JSON and the surfaces they stand for.
+//! Shapes as parameters, and the surfaces they stand for.
 
 use crate::geometry::Vector;
 use crate::geometry::surfaces::{Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, ZalesakDisk};
-use crate::scene::schema::POSITIVE;
-use crate::scene::{DefaultValue, Kind, Parameter, Variant, Violation};
+use crate::scene::cloud::{CloudReference, PointsSource};
 use crate::scenes::dimension::in_dimension;
-use serde::Deserialize;
-use serde_json::{Map, Value, json};
+use crate::spec::{AtLeast, Choice, Coordinates, POSITIVE, Parameter, Sign, Violation};
+use serde_json::{Value, json};
 
-const CENTER: Parameter = Parameter::new(
-    "center",
-    "centre; the origin when not given",
-    Kind::Vector { positive: false },
-    DefaultValue::Absent,
-);
-
-const fn positive(name: &'static str, doc: &'static str) -> Parameter {
-    Parameter::new(name, doc, POSITIVE, DefaultValue::Required)
-}
-
-const BALL: &[Parameter] = &[CENTER, positive("radius", "radius")];
-const ELLIPSOID: &[Parameter] = &[
-    CENTER,
-    Parameter::new(
-        "semi_axes",
-        "semi-axes along x, y (and z)",
-        Kind::Vector { positive: true },
-        DefaultValue::Required,
-    ),
-];
-const SIZE: Parameter =
-    Parameter::new("size", "full edge lengths", Kind::Vector { positive: true }, DefaultValue::Required);
-
-macro_rules! plain_shapes {
-    ($($more:expr),*) => {
-        &[
-            Variant { name: "circle", doc: "circle (2D)", parameters: BALL },
-            Variant { name: "sphere", doc: "sphere (3D)", parameters: BALL },
-            Variant { name: "ellipse", doc: "ellipse with axes along the coordinates (2D)", parameters: ELLIPSOID },
-            Variant { name: "ellipsoid", doc: "ellipsoid with axes along the coordinates (3D)", parameters: ELLIPSOID },
-            Variant { name: "box", doc: "rectangle or cuboid", parameters: &[CENTER, SIZE] },
-            Variant {
-                name: "rounded_box",
-                doc: "rectangle or cuboid with rounded edges",
-                parameters: &[CENTER, SIZE, positive("corner_radius", "radius of the rounding, less than half of every edge")],
-            },
-            Variant {
-                name: "zalesak_disk",
-                doc: "disk with a slot cut in from below (2D)",
-                parameters: &[
-                    CENTER,
-                    positive("radius", "radius of the disk"),
-                    positive("slot_width", "width of the slot, less than the diameter"),
-                    positive("slot_depth", "height of the slot above the lowest point of the disk"),
-                ],
-            },
-            Variant {
-                name: "torus",
-                doc: "torus about the z axis (3D)",
-                parameters: &[
-                    CENTER,
-                    positive("major_radius", "radius of the core circle"),
-                    positive("minor_radius", "radius of the tube, less than the major radius"),
-                ],
-            },
-            Variant {
-                name: "dumbbell",
-                doc: "two balls on the x axis joined by a straight neck",
-                parameters: &[
-                    CENTER,
-                    positive("separation", "distance of the balls' centres"),
-                    positive("radius", "radius of the balls"),
-                    positive("neck_radius", "radius of the neck, less than the balls'"),
-                ],
-            },
-            $($more,)*
-        ]
-    };
-}
-
-static PLAIN: &[Variant] = plain_shapes!();
-const UNION: Variant = Variant {
-    name: "union",
-    doc: "separate shapes taken together",
-    parameters: &[Parameter::new(
-        "of",
-        "the shapes; they must not overlap",
-        Kind::Choices { variants: || PLAIN, least: 1 },
-        DefaultValue::Required,
-    )],
-};
-
-/// Points from an upload or a file: frames of earlier runs are such files.
-pub const POINTS: Variant = Variant {
-    name: "points",
-    doc: "points of a VTKHDF file; as a shape with PointData/phi, which is their level",
-    parameters: &[
-        Parameter::new("upload", "id of an upload that is ready", Kind::Text, DefaultValue::Absent),
-        Parameter::new("file", "path of a file (valid for `meniscus run` alone)", Kind::Text, DefaultValue::Absent),
-    ],
-};
-
-static ALL: &[Variant] = plain_shapes!(UNION, POINTS);
-
-/// The variants of `shape`.
-#[must_use]
-pub fn variants() -> &'static [Variant] {
-    ALL
-}
-
-/// A shape, as checked.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(tag = "type", rename_all = "snake_case")]
-enum Shape {
-    Circle { center: Option<Vec<f64>>, radius: f64 },
-    Sphere { center: Option<Vec<f64>>, radius: f64 },
-    Ellipse { center: Option<Vec<f64>>, semi_axes: Vec<f64> },
-    Ellipsoid { center: Option<Vec<f64>>, semi_axes: Vec<f64> },
-    Box { center: Option<Vec<f64>>, size: Vec<f64> },
-    RoundedBox { center: Option<Vec<f64>>, size: Vec<f64>, corner_radius: f64 },
-    ZalesakDisk { center: Option<Vec<f64>>, radius: f64, slot_width: f64, slot_depth: f64 },
-    Torus { center: Option<Vec<f64>>, major_radius: f64, minor_radius: f64 },
-    Dumbbell { center: Option<Vec<f64>>, separation: f64, radius: f64, neck_radius: f64 },
-    Union { of: Vec<Shape> },
-}
-
-/// The dimension that a checked shape implies: by its type, else by the length of its vectors.
-#[must_use]
-pub fn implied_dimension(shape: &Value) -> Option<usize> {
-    let length = |name: &str| shape.get(name).and_then(Value::as_array).map(Vec::len);
-    match shape.get("type").and_then(Value::as_str)? {
-        "circle" | "ellipse" | "zalesak_disk" => Some(2),
-        "sphere" | "ellipsoid" | "torus" => Some(3),
-        "union" => shape.get("of")?.as_array()?.iter().find_map(implied_dimension),
-        _ => length("size").or_else(|| length("center")),
-    }
-}
-
-/// Whether a scene as written is of three dimensions: as it says, else as its shape implies.
-#[must_use]
-pub fn is_in_space(given: &Map<String, Value>) -> bool {
-    let implied = || given.get("shape").and_then(implied_dimension).map(|dimension| dimension as u64);
-    given.get("dimension").and_then(Value::as_u64).or_else(implied) == Some(3)
-}
-
-/// The surface of a checked shape in `D` dimensions. Pointers of violations start with `pointer`.
-///
-/// # Errors
-/// Everything that does not fit together.
-pub fn surface<const D: usize>(shape: &Value, pointer: &str) -> Result<Box<dyn Surface<D>>, Vec<Violation>> {
-    let parsed: Shape = serde_json::from_value(shape.clone())
-        .map_err(|error| vec![Violation::new(pointer, "type", error.to_string(), shape, Value::Null)])?;
-    parsed.build::<D>(shape, pointer)
-}
-
-/// The parts of a checked shape: those of a union, else the shape itself.
-///
-/// # Errors
-/// As [`surface`].
-pub fn parts<const D: usize>(shape: &Value, pointer: &str) -> Result<Vec<Box<dyn Surface<D>>>, Vec<Violation>> {
-    // The whole first: parts must not overlap.
-    let whole = surface::<D>(shape, pointer)?;
-    match shape.get("of").and_then(Value::as_array) {
-        Some(of) => of.iter().enumerate().map(|(k, part)| surface::<D>(part, &format!("{pointer}/of/{k}"))).collect(),
-        None => Ok(vec![whole]),
-    }
-}
-
-/// The ball that a checked shape is, if it is one.
-#[must_use]
-pub fn ball<const D: usize>(shape: &Value) -> Option<Ball<D>> {
-    match serde_json::from_value(shape.clone()).ok()? {
-        Shape::Circle { center, radius } | Shape::Sphere { center, radius } => {
-            let center = center.unwrap_or_else(|| vec![0.0; D]);
-            (center.len() == D).then(|| Ball { center: Vector::<D>::from_column_slice(&center), radius })
+crate::choice! {
+    /// A shape whose distance is known exactly.
+    pub enum PlainShape {
+        /// circle (2D)
+        Circle = "circle" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// radius
+            radius: f64, in POSITIVE;
         }
-        _ => None,
+        /// sphere (3D)
+        Sphere = "sphere" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// radius
+            radius: f64, in POSITIVE;
+        }
+        /// ellipse with axes along the coordinates (2D)
+        Ellipse = "ellipse" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// semi-axes along x and y
+            semi_axes: Coordinates, in Sign::Positive;
+        }
+        /// ellipsoid with axes along the coordinates (3D)
+        Ellipsoid = "ellipsoid" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// semi-axes along x, y and z
+            semi_axes: Coordinates, in Sign::Positive;
+        }
+        /// rectangle or cuboid
+        Box = "box" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// full edge lengths
+            size: Coordinates, in Sign::Positive;
+        }
+        /// rectangle or cuboid with rounded edges
+        RoundedBox = "rounded_box" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// full edge lengths
+            size: Coordinates, in Sign::Positive;
+            /// radius of the rounding, less than half of every edge
+            corner_radius: f64, in POSITIVE;
+        }
+        /// disk with a slot cut in from below (2D)
+        ZalesakDisk = "zalesak_disk" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// radius of the disk
+            radius: f64, in POSITIVE;
+            /// width of the slot, less than the diameter
+            slot_width: f64, in POSITIVE;
+            /// height of the slot above the lowest point of the disk
+            slot_depth: f64, in POSITIVE;
+        }
+        /// torus about the z axis (3D)
+        Torus = "torus" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// radius of the core circle
+            major_radius: f64, in POSITIVE;
+            /// radius of the tube, less than the major radius
+            minor_radius: f64, in POSITIVE;
+        }
+        /// two balls on the x axis joined by a straight neck
+        Dumbbell = "dumbbell" {
+            /// center; the origin when not given
+            center: Option<Coordinates>;
+            /// distance of the centers of the balls
+            separation: f64, in POSITIVE;
+            /// radius of the balls
+            radius: f64, in POSITIVE;
+            /// radius of the neck, less than that of the balls
+            neck_radius: f64, in POSITIVE;
+        }
+    }
+}
+
+crate::choice! {
+    /// A shape: one that is known exactly, several of them, or points from outside.
+    pub enum Shape {
+        ..Plain(PlainShape)
+        /// separate shapes taken together
+        Union = "union" {
+            /// the shapes; they must not overlap
+            of: Vec<PlainShape>, in AtLeast(1);
+        }
+        /// points of a VTKHDF file with PointData/phi, which is their level
+        Points = "points" {
+            /// where the points come from
+            source: PointsSource => flatten;
+        }
     }
 }
 
 impl Shape {
-    fn build<const D: usize>(&self, written: &Value, pointer: &str) -> Result<Box<dyn Surface<D>>, Vec<Violation>> {
-        let mut violations = Vec::new();
-        let only = |dimension: usize, violations: &mut Vec<Violation>| {
-            if D != dimension {
-                let detail = format!("this shape exists in {dimension} dimensions, the scene has {D}");
-                violations.push(Violation::new(
-                    format!("{pointer}/type"),
-                    "conflict",
-                    detail,
-                    &written["type"],
-                    Value::Null,
-                ));
+    /// The circle, or in space the sphere, of a radius about the origin.
+    #[must_use]
+    pub fn ball(dimension: usize, radius: f64) -> Self {
+        Self::Plain(if dimension == 2 {
+            PlainShape::Circle { center: None, radius }
+        } else {
+            PlainShape::Sphere { center: None, radius }
+        })
+    }
+
+    /// The ellipse, or in space the ellipsoid, of these semi-axes about the origin; in the plane the first two count.
+    #[must_use]
+    pub fn ellipsoid(dimension: usize, semi_axes: [f64; 3]) -> Self {
+        let axes = Coordinates(semi_axes[..dimension].to_vec());
+        Self::Plain(if dimension == 2 {
+            PlainShape::Ellipse { center: None, semi_axes: axes }
+        } else {
+            PlainShape::Ellipsoid { center: None, semi_axes: axes }
+        })
+    }
+
+    /// The dimension that the shape implies: by its type, else by the length of its vectors.
+    #[must_use]
+    pub fn dimension(&self) -> Option<usize> {
+        match self {
+            Self::Plain(shape) => shape.dimension(),
+            Self::Union { of } => of.iter().find_map(PlainShape::dimension),
+            Self::Points { .. } => None,
+        }
+    }
+
+    /// Whether the shape is a circle, sphere, ellipse or ellipsoid: the zero of a quadric.
+    #[must_use]
+    pub fn quadric<const D: usize>(&self) -> Option<(Vector<D>, Vector<D>)> {
+        let at = |center: &Option<Coordinates>| {
+            Vector::<D>::from_fn(|d, _| center.as_ref().and_then(|c| c.get(d)).copied().unwrap_or(0.0))
+        };
+        match self {
+            Self::Plain(PlainShape::Circle { center, radius } | PlainShape::Sphere { center, radius }) => {
+                Some((at(center), Vector::<D>::repeat(*radius)))
             }
-        };
-        let vector = |name: &str, numbers: &[f64], violations: &mut Vec<Violation>| {
-            if numbers.len() != D {
-                let detail = format!("the scene has {D} dimensions");
-                let allowed = json!(format!("{D} numbers"));
-                violations.push(Violation::new(
-                    format!("{pointer}/{name}"),
-                    "conflict",
-                    detail,
-                    &json!(numbers),
-                    allowed,
-                ));
+            Self::Plain(PlainShape::Ellipse { center, semi_axes } | PlainShape::Ellipsoid { center, semi_axes }) => {
+                Some((at(center), Vector::<D>::from_fn(|d, _| semi_axes.get(d).copied().unwrap_or(1.0))))
             }
-            Vector::<D>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(1.0))
+            _ => None,
+        }
+    }
+
+    /// The ball that the shape is, if it is one.
+    #[must_use]
+    pub fn as_ball<const D: usize>(&self) -> Option<Ball<D>> {
+        let Self::Plain(PlainShape::Circle { center, radius } | PlainShape::Sphere { center, radius }) = self else {
+            return None;
         };
-        let place = |center: &Option<Vec<f64>>, violations: &mut Vec<Violation>| match center {
-            Some(numbers) => vector("center", numbers, violations),
-            None => Vector::<D>::zeros(),
-        };
-        let less = |name: &str, got: f64, bound: f64, violations: &mut Vec<Violation>| {
-            if got >= bound {
-                let allowed = json!(format!("a number > 0 and < {bound}"));
-                violations.push(Violation::new(
-                    format!("{pointer}/{name}"),
-                    "range",
-                    "it does not fit the shape",
-                    &json!(got),
-                    allowed,
-                ));
+        let numbers = center.as_ref().map_or_else(|| vec![0.0; D], |center| center.0.clone());
+        (numbers.len() == D).then(|| Ball { center: Vector::<D>::from_column_slice(&numbers), radius: *radius })
+    }
+
+    /// The points from outside that the shape names, if it does. Errors are added to `errors`.
+    pub fn points_reference(&self, pointer: &'static str, errors: &mut Vec<Violation>) -> Option<CloudReference> {
+        match self {
+            Self::Points { source } => source.reference(pointer, errors),
+            Self::Plain(_) | Self::Union { .. } => None,
+        }
+    }
+
+    /// The surface of the shape in `D` dimensions. Pointers of errors begin with `pointer`.
+    ///
+    /// # Errors
+    /// Everything that does not fit together; points from outside have no surface before they are read.
+    pub fn surface<const D: usize>(&self, pointer: &str) -> Result<Box<dyn Surface<D>>, Vec<Violation>> {
+        match self {
+            Self::Plain(shape) => shape.surface::<D>(pointer),
+            Self::Union { of } => {
+                let whole = Union::new(parts_of::<D>(of, pointer)?);
+                whole.map(|union| -> Box<dyn Surface<D>> { Box::new(union) }).map_err(|overlap| {
+                    let at = format!("{pointer}/of");
+                    vec![Violation::new(at, "conflict", overlap.to_string(), of.to_json(), Value::Null)]
+                })
             }
-        };
-        let errors = &mut violations;
+            Self::Points { .. } => {
+                let detail = "points from outside are not a shape that is known exactly";
+                Err(vec![Violation::new(pointer, "conflict", detail, "points", Value::Null)])
+            }
+        }
+    }
+
+    /// The parts of the shape: those of a union, else the shape itself.
+    ///
+    /// # Errors
+    /// As [`Self::surface`].
+    pub fn parts<const D: usize>(&self, pointer: &str) -> Result<Vec<Box<dyn Surface<D>>>, Vec<Violation>> {
+        // The whole first: parts must not overlap.
+        let whole = self.surface::<D>(pointer)?;
+        match self {
+            Self::Union { of } => parts_of::<D>(of, pointer),
+            _ => Ok(vec![whole]),
+        }
+    }
+}
+
+/// The surfaces of the members of a union, or all that is wrong with them.
+fn parts_of<const D: usize>(of: &[PlainShape], pointer: &str) -> Result<Vec<Box<dyn Surface<D>>>, Vec<Violation>> {
+    let mut errors = Vec::new();
+    let mut surfaces = Vec::new();
+    for (k, part) in of.iter().enumerate() {
+        match part.surface::<D>(&format!("{pointer}/of/{k}")) {
+            Ok(surface) => surfaces.push(surface),
+            Err(found) => errors.extend(found),
+        }
+    }
+    if errors.is_empty() { Ok(surfaces) } else { Err(errors) }
+}
+
+impl PlainShape {
+    fn dimension(&self) -> Option<usize> {
+        match self {
+            Self::Circle { .. } | Self::Ellipse { .. } | Self::ZalesakDisk { .. } => Some(2),
+            Self::Sphere { .. } | Self::Ellipsoid { .. } | Self::Torus { .. } => Some(3),
+            Self::Box { size, .. } | Self::RoundedBox { size, .. } => Some(size.len()),
+            Self::Dumbbell { center, .. } => center.as_ref().map(|center| center.len()),
+        }
+    }
+
+    fn surface<const D: usize>(&self, pointer: &str) -> Result<Box<dyn Surface<D>>, Vec<Violation>> {
+        let mut check = Fitting::<D> { shape: self.name(), pointer, errors: Vec::new() };
         let surface: Option<Box<dyn Surface<D>>> = match self {
             Self::Circle { center, radius } | Self::Sphere { center, radius } => {
-                only(if matches!(self, Self::Circle { .. }) { 2 } else { 3 }, errors);
-                Some(Box::new(Ball { center: place(center, errors), radius: *radius }))
+                check.exists_in(if matches!(self, Self::Circle { .. }) { 2 } else { 3 });
+                Some(Box::new(Ball { center: check.center(center), radius: *radius }))
             }
             Self::Ellipse { center, semi_axes } | Self::Ellipsoid { center, semi_axes } => {
-                only(if matches!(self, Self::Ellipse { .. }) { 2 } else { 3 }, errors);
-                Some(Box::new(Ellipsoid {
-                    center: place(center, errors),
-                    semi_axes: vector("semi_axes", semi_axes, errors),
-                }))
+                check.exists_in(if matches!(self, Self::Ellipse { .. }) { 2 } else { 3 });
+                let (center, semi_axes) = (check.center(center), check.vector("semi_axes", semi_axes));
+                Some(Box::new(Ellipsoid { center, semi_axes }))
             }
             Self::Box { center, size } => {
-                Some(Box::new(Cuboid { center: place(center, errors), size: vector("size", size, errors) }))
+                Some(Box::new(Cuboid { center: check.center(center), size: check.vector("size", size) }))
             }
             Self::RoundedBox { center, size, corner_radius } => {
-                less("corner_radius", *corner_radius, 0.5 * size.iter().copied().fold(f64::INFINITY, f64::min), errors);
-                let (center, size) = (place(center, errors), vector("size", size, errors));
+                check.is_below("corner_radius", *corner_radius, 0.5 * size.iter().copied().fold(f64::INFINITY, f64::min));
+                let (center, size) = (check.center(center), check.vector("size", size));
                 Some(Box::new(RoundedCuboid { center, size, corner_radius: *corner_radius }))
             }
             Self::ZalesakDisk { center, radius, slot_width, slot_depth } => {
-                only(2, errors);
-                less("slot_width", *slot_width, 2.0 * radius, errors);
-                let half = 0.5 * slot_width;
-                let roof = radius + (radius * radius - half * half).max(0.0).sqrt();
-                less("slot_depth", *slot_depth, roof, errors);
-                // Where the circle meets the slot's sides, above the lowest point.
-                let mouth = radius - (radius * radius - half * half).max(0.0).sqrt();
-                if *slot_depth <= mouth {
-                    let allowed = json!(format!("a number > {mouth}"));
-                    let detail = "the slot would end below its own mouth";
-                    let at = format!("{pointer}/slot_depth");
-                    errors.push(Violation::new(at, "range", detail, &json!(slot_depth), allowed));
-                }
-                let center = place(center, errors);
-                let flat = Vector::<2>::new(center[0], center[1]);
-                let disk: Box<dyn Surface<2>> = Box::new(ZalesakDisk::new(flat, *radius, *slot_width, *slot_depth));
-                in_dimension(disk)
+                zalesak_disk(&mut check, center, *radius, [*slot_width, *slot_depth])
             }
             Self::Torus { center, major_radius, minor_radius } => {
-                only(3, errors);
-                less("minor_radius", *minor_radius, *major_radius, errors);
-                let center = place(center, errors);
+                check.exists_in(3);
+                check.is_below("minor_radius", *minor_radius, *major_radius);
+                let center = check.center(center);
                 let center = Vector::<3>::from_fn(|d, _| if d < D { center[d] } else { 0.0 });
                 let torus: Box<dyn Surface<3>> =
                     Box::new(Torus { center, major_radius: *major_radius, minor_radius: *minor_radius });
                 in_dimension(torus)
             }
             Self::Dumbbell { center, separation, radius, neck_radius } => {
-                less("neck_radius", *neck_radius, *radius, errors);
+                check.is_below("neck_radius", *neck_radius, *radius);
                 let joint = 2.0 * (radius * radius - neck_radius * neck_radius).max(0.0).sqrt();
-                if *separation <= joint {
-                    let allowed = json!(format!("a number > {joint}"));
-                    let detail = "the balls would swallow the neck";
-                    errors.push(Violation::new(
-                        format!("{pointer}/separation"),
-                        "range",
-                        detail,
-                        &json!(separation),
-                        allowed,
-                    ));
-                }
-                Some(Box::new(Dumbbell::new(place(center, errors), *separation, *radius, *neck_radius)))
-            }
-            Self::Union { of } => {
-                let mut parts = Vec::new();
-                for (k, part) in of.iter().enumerate() {
-                    match part.build::<D>(&written["of"][k], &format!("{pointer}/of/{k}")) {
-                        Ok(surface) => parts.push(surface),
-                        Err(found) => errors.extend(found),
-                    }
-                }
-                if errors.is_empty() {
-                    match Union::new(parts) {
-                        Ok(union) => Some(Box::new(union)),
-                        Err(overlap) => {
-                            let at = format!("{pointer}/of");
-                            errors.push(Violation::new(
-                                at,
-                                "conflict",
-                                overlap.to_string(),
-                                &written["of"],
-                                Value::Null,
-                            ));
-                            None
-                        }
-                    }
-                } else {
-                    None
-                }
+                check.is_above("separation", *separation, joint, "the balls would touch and leave no neck between them");
+                Some(Box::new(Dumbbell::new(check.center(center), *separation, *radius, *neck_radius)))
             }
         };
         match surface {
-            Some(surface) if violations.is_empty() => Ok(surface),
-            _ => Err(violations),
+            Some(surface) if check.errors.is_empty() => Ok(surface),
+            _ => Err(check.errors),
         }
+    }
+}
+
+fn zalesak_disk<const D: usize>(
+    check: &mut Fitting<D>,
+    center: &Option<Coordinates>,
+    radius: f64,
+    [slot_width, slot_depth]: [f64; 2],
+) -> Option<Box<dyn Surface<D>>> {
+    check.exists_in(2);
+    check.is_below("slot_width", slot_width, 2.0 * radius);
+    let half = 0.5 * slot_width;
+    let height = (radius * radius - half * half).max(0.0).sqrt();
+    check.is_below("slot_depth", slot_depth, radius + height);
+    // Where the circle meets the sides of the slot, above the lowest point.
+    check.is_above("slot_depth", slot_depth, radius - height, "the slot would end below its own mouth");
+    let center = check.center(center);
+    let disk: Box<dyn Surface<2>> =
+        Box::new(ZalesakDisk::new(Vector::<2>::new(center[0], center[1]), radius, slot_width, slot_depth));
+    in_dimension(disk)
+}
+
+/// Checks how the numbers of a shape fit together, and to the dimension of the scene.
+struct Fitting<'a, const D: usize> {
+    shape: &'static str,
+    pointer: &'a str,
+    errors: Vec<Violation>,
+}
+
+impl<const D: usize> Fitting<'_, D> {
+    fn refuse(&mut self, name: &str, code: &'static str, detail: impl Into<String>, got: Value, allowed: Value) {
+        self.errors.push(Violation::new(format!("{}/{name}", self.pointer), code, detail, got, allowed));
+    }
+
+    fn exists_in(&mut self, dimension: usize) {
+        if D != dimension {
+            let detail = format!("this shape exists in {dimension} dimensions, the scene has {D}");
+            self.refuse("type", "conflict", detail, json!(self.shape), Value::Null);
+        }
+    }
+
+    fn vector(&mut self, name: &str, numbers: &Coordinates) -> Vector<D> {
+        if numbers.len() != D {
+            let detail = format!("the scene has {D} dimensions");
+            self.refuse(name, "conflict", detail, numbers.to_json(), json!(format!("{D} numbers")));
+        }
+        Vector::<D>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(1.0))
+    }
+
+    fn center(&mut self, center: &Option<Coordinates>) -> Vector<D> {
+        center.as_ref().map_or_else(Vector::<D>::zeros, |numbers| self.vector("center", numbers))
+    }
+
+    fn is_below(&mut self, name: &str, got: f64, bound: f64) {
+        if got >= bound {
+            let allowed = json!(format!("a number > 0 and < {bound}"));
+            self.refuse(name, "range", "the number does not fit the other lengths of the shape", json!(got), allowed);
+        }
+    }
+
+    fn is_above(&mut self, name: &str, got: f64, bound: f64, detail: &str) {
+        if got <= bound {
+            self.refuse(name, "range", detail, json!(got), json!(format!("a number > {bound}")));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PlainShape, Shape};
+    use crate::spec::{Parameter, Violation};
+    use serde_json::{Value, json};
+
+    fn parse(given: &Value) -> Result<Shape, Vec<Violation>> {
+        let mut errors = Vec::new();
+        Shape::parse(given, (), "/shape", &mut errors).ok_or(errors)
+    }
+
+    #[test]
+    fn shapes_read_what_they_write() {
+        for given in [
+            json!({"type": "circle", "center": [0.5, 0.75], "radius": 0.15}),
+            json!({"type": "union", "of": [{"type": "box", "center": null, "size": [1.0, 2.0]}]}),
+            json!({"type": "points", "upload": "upl_1", "file": null}),
+        ] {
+            assert_eq!(parse(&given).unwrap().to_json(), given);
+        }
+    }
+
+    #[test]
+    fn unions_hold_plain_shapes_alone() {
+        let nested = json!({"type": "union", "of": [{"type": "union", "of": []}]});
+        let errors = parse(&nested).unwrap_err();
+        assert_eq!((errors[0].pointer.as_str(), errors[0].code), ("/shape/of/0/type", "unknown"));
+    }
+
+    #[test]
+    fn everything_that_does_not_fit_is_told_at_once() {
+        let disk = PlainShape::ZalesakDisk {
+            center: Some([0.0, 0.0, 0.0].into()),
+            radius: 1.0,
+            slot_width: 3.0,
+            slot_depth: 9.0,
+        };
+        let places: Vec<String> =
+            Shape::Plain(disk).surface::<2>("/shape").err().unwrap().into_iter().map(|error| error.pointer).collect();
+        assert_eq!(places, ["/shape/slot_width", "/shape/slot_depth", "/shape/center"]);
+    }
+
+    #[test]
+    fn a_shape_implies_its_dimension() {
+        let dimension = |given: Value| parse(&given).unwrap().dimension();
+        assert_eq!(dimension(json!({"type": "torus", "major_radius": 1, "minor_radius": 0.2})), Some(3));
+        assert_eq!(dimension(json!({"type": "box", "size": [1, 1, 1]})), Some(3));
+        assert_eq!(dimension(json!({"type": "dumbbell", "separation": 2, "radius": 0.5, "neck_radius": 0.1})), None);
     }
 }

@@ -1,23 +1,23 @@
 //! `surface_pde`: operators and equations on surfaces (Surface DC-PSE paper).
 
-mod parameters;
 mod points;
 mod problems;
 mod rows;
-mod setup;
+mod plan;
+pub mod spec;
 mod surfaces;
 
-use crate::scene::SceneKind;
+use crate::scene::{self, SceneKind};
+use crate::spec::Group;
 
 /// The kind.
 pub static KIND: SceneKind = SceneKind {
     kind: "surface_pde",
     title: "Operators on surfaces known by points with normals (Surface DC-PSE paper)",
-    parameters: parameters::PARAMETERS,
     presets: &[],
-    preset: parameters::preset,
     example: include_str!("surface_pde/example.json"),
-    understand: setup::understand,
+    declarations: spec::SurfacePde::declarations,
+    parse: scene::parse_as::<spec::SurfacePde>,
     calibration: rows::calibration,
     rows: rows::rows,
 };

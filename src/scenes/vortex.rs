@@ -1,20 +1,20 @@
 //! `vortex`: an interface in a prescribed flow (PCP paper, section 4.2).
 
-mod parameters;
 mod rows;
-mod setup;
+mod plan;
+pub mod spec;
 
-use crate::scene::SceneKind;
+use crate::scene::{self, SceneKind};
+use crate::spec::Group;
 
 /// The kind.
 pub static KIND: SceneKind = SceneKind {
     kind: "vortex",
     title: "An interface carried by a prescribed flow (PCP paper, section 4.2)",
-    parameters: parameters::PARAMETERS,
-    presets: &["paper"],
-    preset: parameters::preset,
+    presets: &[("paper", spec::paper)],
     example: include_str!("vortex/example.json"),
-    understand: setup::understand,
+    declarations: spec::Vortex::declarations,
+    parse: scene::parse_as::<spec::Vortex>,
     calibration: rows::calibration,
     rows: rows::rows,
 };

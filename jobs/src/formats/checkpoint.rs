@@ -12,6 +12,8 @@ use crate::system::breakpoints::pass;
 use crate::system::build;
 use crate::system::digest;
 use crate::system::process::free_space;
+use meniscus::scene;
+use meniscus::scenes::SCENES;
 use meniscus::simulation::State;
 use meniscus::simulation::state::{CountArray, RealArray};
 use serde::{Deserialize, Serialize};
@@ -208,9 +210,10 @@ pub fn read(path: &Path, sha256: Option<&str>) -> Result<(Meta, State), Checkpoi
 #[must_use]
 pub fn is_same_scene(a: &Value, b: &Value) -> bool {
     let plain = |body: &Value| {
-        let mut scene = body["scene"].clone();
-        let safe =
-            scene["kind"].as_str().and_then(meniscus::scenes::find).map(meniscus::scene::json_schema::restart_safe);
+        // A build before may have left out what this one writes as null: what is resolved resolves to the same again.
+        let scene = &body["scene"];
+        let mut scene = scene::parse(scene, SCENES).map_or_else(|_| scene.clone(), |scene| scene.resolved());
+        let safe = meniscus::scenes::kind_of(&scene).map(scene::SceneKind::restart_safe);
         if let Some(map) = scene.as_object_mut() {
             for pointer in safe.unwrap_or_default() {
                 map.shift_remove(pointer.trim_start_matches('/'));

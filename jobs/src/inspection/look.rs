@@ -4,9 +4,9 @@ use super::sandbox;
 use crate::formats::checkpoint;
 use crate::formats::mesh;
 use crate::formats::{cloud_file, structure, vtkhdf};
-use crate::spec::body::Wishes;
+use crate::spec::run_options::RunOptions;
 use crate::spec::uploads::{Findings, MOST_POINTS, Purpose};
-use meniscus::scene::{Cloud, understand};
+use meniscus::scene::{self, Cloud};
 use meniscus::scenes::SCENES;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -142,11 +142,11 @@ fn of_checkpoint(file: &File, path: &Path) -> Result<Findings, String> {
     }
     sandbox::shut_the_door(file).map_err(|error| error.to_string())?;
     let (meta, state) = checkpoint::read(path, None).map_err(|error| error.to_string())?;
-    let scene = understand(&meta.body["scene"], SCENES).map_err(|found| {
+    let scene = scene::parse(&meta.body["scene"], SCENES).map_err(|found| {
         let first = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
         format!("its scene is none of this build: {first}")
     })?;
-    Wishes::of(&meta.body).map_err(|error| format!("its body is none of this build: {error}"))?;
+    RunOptions::from_resolved(&meta.body).map_err(|error| format!("its body is none of this build: {error}"))?;
     if !scene.clouds().is_empty() {
         return Err("its scene takes points from elsewhere, which are not part of the checkpoint".to_owned());
     }

@@ -251,7 +251,7 @@ impl Store {
         let job = rows::job(&connection, &row.job)?;
         Ok(job.map(|job| RestartSource {
             origin: Origin::Checkpoint(row.id),
-            resolved: job.resolved,
+            scene: job.resolved["scene"].clone(),
             isa: row.isa,
             step: row.step,
         }))

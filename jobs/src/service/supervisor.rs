@@ -9,7 +9,7 @@ use crate::service::store::import::{Imported, ProgressPace};
 use crate::service::store::settle::Loss;
 use crate::service::store::{Change, ChangeError, JobRow, START_CHECKPOINT, Store, StoreError};
 use crate::spec::attempt_spec::{self, Order, StartCheckpoint, attempt_directory};
-use crate::spec::body::Wishes;
+use crate::spec::run_options::RunOptions;
 use crate::spec::records::Usage;
 use crate::spec::states::{Reason, State, Trigger};
 use crate::system::breakpoints::pass;
@@ -88,7 +88,7 @@ struct Running {
     job: String,
     epoch: u64,
     worker: Box<dyn Worker>,
-    wishes: Wishes,
+    options: RunOptions,
     pace: ProgressPace,
     began: Instant,
     usage_before: Usage,
@@ -334,7 +334,7 @@ impl Supervisor {
         let running = &self.running[k];
         pass("checkpoint/imported");
         let directory = self.store.job_directory(&running.job);
-        for old in self.store.prune_checkpoints(&running.job, running.wishes.checkpoint.keep as usize)? {
+        for old in self.store.prune_checkpoints(&running.job, running.options.checkpoint.keep as usize)? {
             pass("checkpoint/pruned");
             if let Err(error) = std::fs::remove_file(attempt_directory(&directory, old.attempt).join(&old.path)) {
                 tracing::warn!(job = running.job, %error, "an old checkpoint could not be removed");
@@ -378,7 +378,7 @@ impl Supervisor {
     }
 
     fn start(&mut self, job: &JobRow) -> std::io::Result<()> {
-        let wishes = Wishes::of(&job.resolved)?;
+        let options = RunOptions::from_resolved(&job.resolved)?;
         let job_directory = self.store.job_directory(&job.id);
         let directory = attempt_directory(&job_directory, job.attempt);
         std::fs::create_dir_all(&directory)?;
@@ -388,7 +388,7 @@ impl Supervisor {
         let news = Box::new(move || {
             let _ = sender.send(Message::News);
         });
-        let worker = self.executor.start(&directory, wishes.limits.memory_bytes, news)?;
+        let worker = self.executor.start(&directory, options.limits.memory_bytes, news)?;
         tracing::info!(job = job.id, attempt = job.attempt, pid = worker.pid(), "worker started");
         let now = Instant::now();
         let until = limits::lease_end(self.settings.lease);
@@ -397,7 +397,7 @@ impl Supervisor {
             job: job.id.clone(),
             epoch: job.attempt,
             worker,
-            wishes,
+            options,
             pace: ProgressPace::default(),
             began: now,
             usage_before: job.usage,

@@ -1,46 +1,93 @@
-//! The body of a job: as written by a client, and as understood with every default.
+//! The body of a job: as a client writes it, and with every default.
 
+mod fields;
 mod restart;
 mod sources;
-mod wishes;
 
-pub use restart::{Origin, RestartSource};
+pub use fields::{Labels, Name, Priority};
+pub use restart::{Origin, RestartSource, RestartSpec};
 pub use sources::{NoSources, Sources};
-pub use wishes::{CheckpointWishes, Limits, Output, Wishes};
 
 use crate::spec::forecast::{self, Forecast, WORKER_BASE_BYTES};
-use meniscus::scene::schema::{NOT_NEGATIVE, POSITIVE};
-use meniscus::scene::{CloudSizes, CloudSource, DefaultValue, Kind, Parameter, Scene, Violation, check, understand};
+use crate::spec::run_options::{
+    CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions,
+};
+use meniscus::scene::{self, CloudSizes, CloudSource, Estimate, Scene};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::OutputPlan;
-use serde_json::{Map, Value, json};
+use meniscus::spec::{Given, Group, Json, Parameter, Raw, Violation, group};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
+
+meniscus::group! {
+    /// A job.
+    pub struct JobSpec {
+        /// name, for people
+        name: Option<Name>;
+        /// labels, for filters
+        labels: Option<Labels>;
+        /// the scene: an object with a kind and its parameters
+        scene: Raw = Raw::default();
+        /// a scene taken from a checkpoint, instead of `scene`
+        restart: Option<RestartSpec>;
+        /// what to write
+        output: Option<OutputSpec>;
+        /// when to write checkpoints
+        checkpoint: Option<CheckpointSpec>;
+        /// limits of the run
+        limits: Option<LimitsSpec>;
+        /// rank in the queue: higher goes first
+        priority: Option<Priority>;
+    }
+}
 
 /// What the machine and the operator allow.
 #[derive(Debug, Clone, Copy)]
 pub struct Allowance {
     /// Threads a job may ask for; also the default.
     pub threads: u64,
-    /// Memory a job may ask for; also the default.
+    /// Memory a job may ask for, in bytes; also the default.
     pub memory_bytes: u64,
-    /// Whether scenes may name files of this machine: the one who runs them in the foreground may read them anyway.
+    /// Whether scenes may name files of this machine: a person who runs them in the foreground may read those anyway.
     pub local_files: bool,
 }
 
-/// A job body with every default, and its scene.
-pub struct JobBody {
-    /// The body as sent.
-    pub spec: Value,
-    /// The body with every default.
-    pub resolved: Value,
+/// A body with everything filled in, as it stands in the store and in answers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResolvedBody {
     /// Name, for people.
     pub name: Option<String>,
     /// Labels, for filters.
     pub labels: BTreeMap<String, String>,
+    /// The resolved scene.
+    pub scene: Value,
+    /// The restart as sent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restart: Option<Value>,
+    /// Output, checkpoints and limits.
+    #[serde(flatten)]
+    pub options: RunOptions,
+    /// Rank in the queue.
+    pub priority: i64,
+}
+
+impl ResolvedBody {
+    /// The body as JSON.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        // Texts, numbers and JSON always have a JSON form.
+        serde_json::to_value(self).unwrap_or_default()
+    }
+}
+
+/// A valid job body with every default, and its scene.
+pub struct JobBody {
+    /// The body as sent.
+    pub spec: Value,
+    /// The body with every default.
+    pub resolved: ResolvedBody,
     /// Kind of the scene.
     pub kind: String,
-    /// Higher goes first.
-    pub priority: i64,
     /// The scene.
     pub scene: Box<dyn Scene>,
     /// What it will take.
@@ -51,360 +98,187 @@ pub struct JobBody {
     pub uploads: Vec<String>,
 }
 
-static OUTPUT: &[Parameter] = &[
-    Parameter::restart_safe(
-        "every_time",
-        "a frame at every multiple of this time; first and last only when not given",
-        POSITIVE,
-        DefaultValue::Absent,
-    ),
-    Parameter::restart_safe(
-        "series_every_steps",
-        "a series row every so many steps",
-        Kind::Integer { least: 1, most: u64::MAX },
-        DefaultValue::Json("10"),
-    ),
-];
-
-static CHECKPOINT: &[Parameter] = &[
-    Parameter::restart_safe(
-        "every_wall_s",
-        "a checkpoint every so many seconds; 60 when neither it nor every_steps is given",
-        POSITIVE,
-        DefaultValue::Absent,
-    ),
-    Parameter::restart_safe(
-        "every_steps",
-        "a checkpoint every so many steps",
-        Kind::Integer { least: 1, most: u64::MAX },
-        DefaultValue::Absent,
-    ),
-    Parameter::restart_safe(
-        "keep",
-        "verified checkpoints to keep",
-        Kind::Integer { least: 2, most: 1000 },
-        DefaultValue::Json("2"),
-    ),
-];
-
-static LIMITS: &[Parameter] = &[
-    Parameter::restart_safe(
-        "wall_s",
-        "running time until the job is paused; it counts anew after a resume",
-        POSITIVE,
-        DefaultValue::Absent,
-    ),
-    Parameter::restart_safe(
-        "memory_bytes",
-        "resident memory of the worker",
-        Kind::Integer { least: 1 << 20, most: u64::MAX },
-        DefaultValue::Absent,
-    ),
-    Parameter::restart_safe(
-        "disk_bytes",
-        "size of all files of the job, checkpoints included",
-        NOT_NEGATIVE,
-        DefaultValue::Absent,
-    ),
-    Parameter::restart_safe(
-        "threads",
-        "threads of the worker",
-        Kind::Integer { least: 1, most: 1024 },
-        DefaultValue::Absent,
-    ),
-];
-
-const FIELDS: [&str; 8] = ["name", "labels", "scene", "restart", "output", "checkpoint", "limits", "priority"];
-const OUTPUT_FIELDS: [&str; 3] = ["every_time", "fields", "series_every_steps"];
-
 /// From a client's JSON to a job.
 ///
-/// `sources` knows the checkpoints and uploads that a body may name.
+/// 1. Every field by itself. 2. The scene, or the one of the checkpoint. 3. Points from outside. 4. Fields of frames and limits, by
+/// what the scene and the machine allow. `sources` knows the checkpoints and uploads that a body may name.
 ///
 /// # Errors
-/// All violations at once, with pointers from the body's root.
+/// All of them at once, with pointers from the body's root.
 pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Result<JobBody, Vec<Violation>> {
-    let Value::Object(given) = spec else {
-        return Err(vec![Violation::new("", "type", "a job is an object", spec, json!("an object with a scene"))]);
+    let Value::Object(object) = spec else {
+        let allowed = "an object with a scene";
+        return Err(vec![Violation::new("", "type", "a job is an object", spec.clone(), allowed)]);
     };
     let mut errors = Vec::new();
-    for (name, value) in given {
-        if !FIELDS.contains(&name.as_str()) {
-            let at = format!("/{}", check::escaped(name));
-            let mut violation = Violation::new(at, "unknown_field", "there is no such field", value, json!(FIELDS));
-            violation.did_you_mean = check::closest(name, &FIELDS);
-            errors.push(violation);
-        }
-    }
-    let name = text(given, "name", &mut errors);
-    let labels = labels(given, &mut errors);
-    let priority = priority(given, &mut errors);
-    let restart = match (given.get("scene"), given.get("restart")) {
-        (None, None) => {
-            let detail = "a job names a scene or a restart";
-            errors.push(Violation::new("/scene", "required", detail, &Value::Null, json!("an object with a kind")));
-            None
-        }
-        (Some(_), Some(restart)) => {
-            let detail = "a restart takes its scene from the checkpoint; give one of them";
-            errors.push(Violation::new("/restart", "conflict", detail, restart, Value::Null));
-            None
-        }
-        (Some(_), None) => None,
-        (None, Some(restart)) => restart::parse(restart, sources, &mut errors),
-    };
-    let scene_json = restart.as_ref().map(|(_, scene)| scene.clone()).or_else(|| given.get("scene").cloned());
-    let prefix = if restart.is_some() { "/restart/overrides" } else { "/scene" };
-    let scene = scene_json.and_then(|value| {
-        understand(&value, SCENES).map_err(|found| errors.extend(found.into_iter().map(|v| v.under(prefix)))).ok()
-    });
-    let mut sizes = CloudSizes::new();
-    let mut uploads = Vec::new();
-    for cloud in scene.iter().flat_map(|scene| scene.clouds()) {
-        match sources::size_of(&cloud, sources, allowance.local_files) {
-            Ok(size) => sizes.extend(size.map(|size| (cloud.pointer, size))),
-            Err(violation) => errors.push(violation.under(prefix)),
-        }
-        if let CloudSource::Upload(upload) = cloud.source {
-            uploads.push(upload);
-        }
-    }
-    let mut output = section(given, "output", OUTPUT, Some(&OUTPUT_FIELDS), &mut errors);
-    let fields = output_fields(given, scene.as_deref(), &mut errors);
-    output.insert("fields".into(), fields);
-    let mut checkpoint = section(given, "checkpoint", CHECKPOINT, None, &mut errors);
-    if checkpoint.get("every_wall_s").is_none_or(Value::is_null)
-        && checkpoint.get("every_steps").is_none_or(Value::is_null)
-    {
-        checkpoint.insert("every_wall_s".into(), json!(60.0));
-    }
-    let mut limits = section(given, "limits", LIMITS, None, &mut errors);
-    default_limit(&mut limits, "threads", allowance.threads, &mut errors);
-    default_limit(&mut limits, "memory_bytes", allowance.memory_bytes, &mut errors);
+    group::check_names(object, &JobSpec::names(), "", &mut errors);
+    let parsed = JobSpec::parse_fields(object, "", &mut errors);
+    // What follows reads single fields, so that an error in one of them does not hide those of others.
+    let given = Given::new(object);
+    let start = start(given, sources, &mut errors);
+    let (scene, uploads, sizes) = planned_scene(&start, allowance, sources, &mut errors);
+    let fields = field_names(given, scene.as_deref(), &mut errors);
+    let limits = limits(given, allowance, &mut errors);
     let estimate = scene.as_ref().map(|scene| scene.estimate(&sizes));
-    if let (Some(estimate), Some(memory)) = (estimate, limits.get("memory_bytes").and_then(Value::as_u64)) {
-        // An estimate is good within a quarter.
-        let needed = WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes).saturating_mul(5) / 4;
-        if needed > memory {
-            let detail = format!(
-                "about {} particles need {needed} bytes, the limit is {memory} (/limits/memory_bytes); a larger spacing or a narrower band needs less",
-                estimate.particles
-            );
-            let spacing = scene.as_ref().map_or(Value::Null, |s| s.resolved()["spacing"].clone());
-            errors.push(Violation::new(
-                format!("{prefix}/spacing"),
-                "memory",
-                detail,
-                &spacing,
-                json!(format!("≤ {memory} bytes")),
-            ));
-        }
+    if let (Some(scene), Some(estimate), Some(limits)) = (&scene, estimate, &limits) {
+        errors.extend(check_memory(start.prefix, scene.as_ref(), &estimate, limits.memory_bytes));
     }
-    if let (Some((source, _)), Some(estimate)) = (&restart, estimate)
-        && estimate.steps < source.step
-    {
-        let detail = format!("the checkpoint is at step {}, this scene ends at step {}", source.step, estimate.steps);
-        errors.push(Violation::new("/restart/overrides", "range", detail, &json!(estimate.end_time), Value::Null));
+    if let (Some(source), Some(estimate)) = (&start.source, estimate) {
+        errors.extend(check_end(source, &estimate));
     }
-    let (Some(scene), Some(estimate)) = (scene, estimate) else {
+    let (Some(parsed), Some(scene), Some(estimate), Some(limits)) = (parsed, scene, estimate, limits) else {
         return Err(errors);
     };
     if !errors.is_empty() {
         return Err(errors);
     }
-    let threads = limits.get("threads").and_then(Value::as_u64).unwrap_or(1);
-    let plan = OutputPlan {
-        every_time: output.get("every_time").and_then(Value::as_f64),
-        series_every_steps: output.get("series_every_steps").and_then(Value::as_u64).unwrap_or(10),
+    let options = run_options(&parsed, fields, limits);
+    let forecast = forecast(scene.as_ref(), estimate, &options);
+    let resolved = ResolvedBody {
+        name: parsed.name.map(|name| name.0),
+        labels: parsed.labels.unwrap_or_default().0,
+        scene: scene.resolved(),
+        restart: parsed.restart.map(|restart| restart.to_json()),
+        options,
+        priority: parsed.priority.unwrap_or_default().0,
     };
-    let of_scene = scene.resolved();
-    let forecast = Forecast {
-        estimate,
-        work: scene.work(&estimate, &plan),
-        family: scene.family(),
-        threads,
-        memory_bytes: WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes),
-        disk_bytes: forecast::disk_bytes(
-            of_scene["dimension"].as_u64().unwrap_or(2),
-            &estimate,
-            &plan,
-            &output,
-            &checkpoint,
-        ),
-        time: None,
-    };
-    let mut resolved = Map::new();
-    resolved.insert("name".into(), json!(name));
-    resolved.insert("labels".into(), json!(labels));
-    resolved.insert("scene".into(), of_scene);
-    if let Some(restart) = given.get("restart") {
-        resolved.insert("restart".into(), restart.clone());
-    }
-    resolved.insert("output".into(), Value::Object(output));
-    resolved.insert("checkpoint".into(), Value::Object(checkpoint));
-    resolved.insert("limits".into(), Value::Object(limits));
-    resolved.insert("priority".into(), json!(priority));
-    Ok(JobBody {
-        spec: spec.clone(),
-        kind: scene.resolved()["kind"].as_str().unwrap_or_default().to_owned(),
-        resolved: Value::Object(resolved),
-        name,
-        labels,
-        priority,
-        scene,
-        forecast,
-        origin: restart.map(|(source, _)| source.origin),
-        uploads,
-    })
+    let origin = start.source.map(|source| source.origin);
+    Ok(JobBody { spec: spec.clone(), kind: scene.kind().to_owned(), resolved, scene, forecast, origin, uploads })
 }
 
-pub(crate) fn text(given: &Map<String, Value>, name: &str, errors: &mut Vec<Violation>) -> Option<String> {
-    match given.get(name) {
-        None | Some(Value::Null) => None,
-        Some(Value::String(text)) if text.len() <= 200 => Some(text.clone()),
-        Some(value) => {
-            errors.push(Violation::new(
-                format!("/{name}"),
-                "type",
-                "a text is needed",
-                value,
-                json!("a text of at most 200 bytes"),
-            ));
-            None
+/// Where the scene of a job comes from.
+struct SceneStart {
+    scene: Option<Json>,
+    source: Option<RestartSource>,
+    /// What stands before the pointers of the scene's errors.
+    prefix: &'static str,
+}
+
+fn start(given: Given, sources: &dyn Sources, errors: &mut Vec<Violation>) -> SceneStart {
+    let scene = given.read(JobSpec::scene()).and_then(|raw| raw.0);
+    let own = |scene| SceneStart { scene, source: None, prefix: "/scene" };
+    match (scene, given.has(JobSpec::restart())) {
+        (None, false) => {
+            let (detail, allowed) = ("a job names a scene or a restart", "an object with a kind");
+            errors.push(Violation::new("/scene", "required", detail, Value::Null, allowed));
+            own(None)
         }
-    }
-}
-
-pub(crate) fn labels(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> BTreeMap<String, String> {
-    let mut labels = BTreeMap::new();
-    match given.get("labels") {
-        None | Some(Value::Null) => {}
-        Some(Value::Object(map)) if map.len() <= 64 => {
-            for (key, value) in map {
-                match value.as_str() {
-                    Some(text) if text.len() <= 200 && key.len() <= 100 => {
-                        labels.insert(key.clone(), text.to_owned());
-                    }
-                    _ => {
-                        let at = format!("/labels/{}", check::escaped(key));
-                        errors.push(Violation::new(
-                            at,
-                            "type",
-                            "a label is a text",
-                            value,
-                            json!("a text of at most 200 bytes"),
-                        ));
-                    }
-                }
+        (Some(scene), true) => {
+            let detail = "a restart takes its scene from the checkpoint; give one of them";
+            errors.push(Violation::new("/restart", "conflict", detail, given.raw(JobSpec::restart()), Value::Null));
+            own(Some(scene))
+        }
+        (Some(scene), false) => own(Some(scene)),
+        (None, true) => {
+            let spec = given.read(JobSpec::restart()).flatten();
+            if spec.is_none() && given.raw(JobSpec::restart()).is_null() {
+                let allowed = json!({"checkpoint": "ckpt_…"});
+                errors.push(Violation::new("/restart", "type", "a restart is an object", Value::Null, allowed));
             }
+            let found = spec.and_then(|spec| restart::scene(&spec, sources, errors));
+            let (source, scene) = found.unzip();
+            SceneStart { scene, source, prefix: "/restart/overrides" }
         }
-        Some(value) => {
-            errors.push(Violation::new(
-                "/labels",
-                "type",
-                "labels are an object of texts",
-                value,
-                json!("at most 64 texts by key"),
-            ));
-        }
-    }
-    labels
-}
-
-fn priority(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> i64 {
-    match given.get("priority") {
-        None | Some(Value::Null) => 0,
-        Some(value) => match value.as_i64() {
-            Some(number) if (-100..=100).contains(&number) => number,
-            _ => {
-                errors.push(Violation::new(
-                    "/priority",
-                    "range",
-                    "a priority is a whole number",
-                    value,
-                    json!("−100 to 100"),
-                ));
-                0
-            }
-        },
     }
 }
 
-fn section(
-    given: &Map<String, Value>,
-    name: &str,
-    parameters: &[Parameter],
-    known: Option<&[&str]>,
+type PlannedScene = (Option<Box<dyn Scene>>, Vec<String>, CloudSizes);
+
+/// The scene, the uploads that it names, and how many points they have.
+fn planned_scene(
+    start: &SceneStart,
+    allowance: Allowance,
+    sources: &dyn Sources,
     errors: &mut Vec<Violation>,
-) -> Map<String, Value> {
-    let empty = Map::new();
-    let section = match given.get(name) {
-        None | Some(Value::Null) => &empty,
-        Some(Value::Object(map)) => map,
-        Some(value) => {
-            errors.push(Violation::new(format!("/{name}"), "type", "an object is needed", value, Value::Null));
-            &empty
+) -> PlannedScene {
+    let mut refuse = |found: Vec<Violation>| errors.extend(found.into_iter().map(|error| error.under(start.prefix)));
+    let scene = start.scene.as_ref().and_then(|value| scene::parse(value, SCENES).map_err(&mut refuse).ok());
+    let (mut uploads, mut sizes) = (Vec::new(), CloudSizes::new());
+    for cloud in scene.iter().flat_map(|scene| scene.clouds()) {
+        match sources::size_of(&cloud, sources, allowance.local_files) {
+            Ok(size) => sizes.extend(size.map(|size| (cloud.pointer, size))),
+            Err(violation) => errors.push(violation.under(start.prefix)),
         }
-    };
-    // `fields` depends on the scene and is checked apart.
-    let mut rest = section.clone();
-    if known.is_some() {
-        rest.shift_remove("fields");
-    }
-    let before = errors.len();
-    let checked = check(parameters, &rest, &format!("/{name}"), errors);
-    if let Some(known) = known {
-        for violation in &mut errors[before..] {
-            if violation.code == "unknown_field" {
-                let field = violation.pointer.rsplit('/').next().unwrap_or_default().to_owned();
-                violation.did_you_mean = check::closest(&field, known);
-                violation.allowed = json!(known);
-            }
+        if let CloudSource::Upload(upload) = cloud.source {
+            uploads.push(upload);
         }
     }
-    checked
+    (scene, uploads, sizes)
 }
 
-fn output_fields(given: &Map<String, Value>, scene: Option<&dyn Scene>, errors: &mut Vec<Violation>) -> Value {
+/// The fields of frames: those given, else all of the scene.
+fn field_names(given: Given, scene: Option<&dyn Scene>, errors: &mut Vec<Violation>) -> Vec<String> {
     let known = scene.map(Scene::field_names).unwrap_or_default();
-    match given.get("output").and_then(|output| output.get("fields")) {
-        None | Some(Value::Null) => json!(known),
-        Some(Value::Array(list)) => {
-            for (k, value) in list.iter().enumerate() {
-                let is_known = value.as_str().is_some_and(|name| known.contains(&name));
-                if !is_known && scene.is_some() {
-                    let detail = "the scene has no such field";
-                    let mut violation =
-                        Violation::new(format!("/output/fields/{k}"), "unknown", detail, value, json!(known));
-                    violation.did_you_mean = value.as_str().and_then(|name| check::closest(name, &known));
-                    errors.push(violation);
-                }
+    let Some(list) = given.read_inside(JobSpec::output(), OutputSpec::fields()).flatten() else {
+        return known.iter().map(|name| (*name).to_owned()).collect();
+    };
+    let mut names = Vec::new();
+    for (k, value) in list.0.iter().enumerate() {
+        match value.as_str().filter(|name| scene.is_none() || known.contains(name)) {
+            Some(name) => names.push(name.to_owned()),
+            None if scene.is_some() => {
+                let (at, detail) = (format!("/output/fields/{k}"), "the scene has no such field");
+                errors.push(Violation::unknown(at, "unknown", detail, value.clone(), value.as_str(), &known));
             }
-            Value::Array(list.clone())
-        }
-        Some(value) => {
-            errors.push(Violation::new("/output/fields", "type", "a list of names is needed", value, json!(known)));
-            Value::Null
+            None => {}
         }
     }
+    names
 }
 
-fn default_limit(limits: &mut Map<String, Value>, name: &str, most: u64, errors: &mut Vec<Violation>) {
-    match limits.get(name).and_then(Value::as_u64) {
-        None => {
-            limits.insert(name.to_owned(), json!(most));
+/// The limits, with what the service gives where nothing is asked for.
+fn limits(given: Given, allowance: Allowance, errors: &mut Vec<Violation>) -> Option<Limits> {
+    let mut granted = |asked: Option<u64>, name: &str, most: u64| {
+        if let Some(asked) = asked.filter(|asked| *asked > most) {
+            let (at, detail) = (format!("/limits/{name}"), "more than this service gives to a job");
+            errors.push(Violation::new(at, "range", detail, asked, format!("at most {most}")));
         }
-        Some(asked) if asked > most => {
-            let detail = "more than this service gives to a job";
-            errors.push(Violation::new(
-                format!("/limits/{name}"),
-                "range",
-                detail,
-                &json!(asked),
-                json!(format!("at most {most}")),
-            ));
-        }
-        Some(_) => {}
+        asked.unwrap_or(most)
+    };
+    let asked = |key| given.read_inside(JobSpec::limits(), key).flatten();
+    let threads = granted(asked(LimitsSpec::threads()), "threads", allowance.threads);
+    let memory_bytes = granted(asked(LimitsSpec::memory_bytes()), "memory_bytes", allowance.memory_bytes);
+    let whole = given.read(JobSpec::limits()).map(Option::unwrap_or_default);
+    let whole = whole.or_else(|| (!given.has(JobSpec::limits())).then(LimitsSpec::default));
+    whole.map(|LimitsSpec { wall_s, disk_bytes, .. }| Limits { wall_s, memory_bytes, disk_bytes, threads })
+}
+
+/// An error where a scene needs more memory than its limit; an estimate is good within a quarter.
+fn check_memory(prefix: &str, scene: &dyn Scene, estimate: &Estimate, limit: u64) -> Option<Violation> {
+    let needed = WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes).saturating_mul(5) / 4;
+    let detail = format!(
+        "about {} particles need {needed} bytes, the limit is {limit} (/limits/memory_bytes); a larger spacing or a narrower \
+         band needs less",
+        estimate.particles
+    );
+    let at = format!("{prefix}/spacing");
+    (needed > limit)
+        .then(|| Violation::new(at, "memory", detail, json!(scene.spacing()), format!("≤ {limit} bytes")))
+}
+
+/// An error where the checkpoint lies behind the end of the scene.
+fn check_end(source: &RestartSource, estimate: &Estimate) -> Option<Violation> {
+    let detail = format!("the checkpoint is at step {}, this scene ends at step {}", source.step, estimate.steps);
+    (estimate.steps < source.step)
+        .then(|| Violation::new("/restart/overrides", "range", detail, estimate.end_time, Value::Null))
+}
+
+fn run_options(spec: &JobSpec, fields: Vec<String>, limits: Limits) -> RunOptions {
+    let output = spec.output.clone().unwrap_or_default();
+    let checkpoint = Checkpoints::from(spec.checkpoint.clone().unwrap_or_default());
+    let (every_time, series_every_steps) = (output.every_time, output.series_every_steps);
+    RunOptions { output: Output { every_time, fields, series_every_steps }, checkpoint, limits }
+}
+
+fn forecast(scene: &dyn Scene, estimate: Estimate, options: &RunOptions) -> Forecast {
+    Forecast {
+        estimate,
+        work: scene.work(&estimate, &options.plan()),
+        family: scene.family(),
+        threads: options.limits.threads,
+        memory_bytes: WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes),
+        disk_bytes: forecast::disk_bytes(scene.dimension(), &estimate, options),
+        time: None,
     }
 }
 

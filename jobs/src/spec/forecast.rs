@@ -4,7 +4,7 @@ use crate::formats::hdf5_file::CHUNK_ROWS;
 use crate::spec::calibration::Calibration;
 use meniscus::scene::{Estimate, PhaseWork};
 use meniscus::scenes::work_estimate;
-use meniscus::simulation::OutputPlan;
+use crate::spec::run_options::RunOptions;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -75,20 +75,18 @@ impl Forecast {
 /// Bytes of all files of a run: its frames, its series, its picture, and its checkpoints: the last one, and where they come by
 /// steps as many as are kept.
 pub(crate) fn disk_bytes(
-    dimension: u64,
+    dimension: usize,
     estimate: &Estimate,
-    plan: &OutputPlan,
-    output: &Map<String, Value>,
-    checkpoint: &Map<String, Value>,
+    options: &RunOptions,
 ) -> u64 {
     const FILE: u64 = 24 << 10;
     const CHUNK: u64 = CHUNK_ROWS as u64;
-    let frames = work_estimate::frames(estimate.steps, estimate.end_time, plan) as u64;
+    let plan = options.plan();
+    let frames = work_estimate::frames(estimate.steps, estimate.end_time, &plan) as u64;
     // Topology, position and the fields that were chosen; vectors and numbers weigh alike here.
-    let fields = output.get("fields").and_then(Value::as_array).map_or(6, Vec::len) as u64;
+    let fields = options.output.fields.len() as u64;
     let frame = 40 + 14 * fields;
-    let kept = checkpoint.get("keep").and_then(Value::as_u64).unwrap_or(2);
-    let written = if checkpoint.get("every_steps").is_some_and(|every| !every.is_null()) { kept } else { 1 };
+    let written = if options.checkpoint.every_steps.is_some() { options.checkpoint.keep } else { 1 };
     // Data sets grow by whole chunks: a part of the last stays empty.
     let rows_of = estimate.particles;
     let rows_of = if rows_of > CHUNK { rows_of.saturating_add(CHUNK / 4) } else { rows_of };

@@ -3,41 +3,64 @@
 //! `{"base": {job body}, "sweep": {"mode": "grid" | "zip" | "list", "axes": {POINTER: [values]} | "points": [{POINTER:
 //! value}]}, "max_parallel", "on_failure": "continue" | "stop", "name", "labels"}`. Pointers start at the job's body.
 
-use crate::service::store::{NewJob, NewStudy};
-use crate::spec::body::{self, Allowance, JobBody, Sources};
+mod sweep;
+
+pub use sweep::{Axes, MOST_POINTS, Points, Sweep, SweepPoint};
+
+use crate::spec::body::{self, Allowance, JobBody, Labels, Name, Sources};
 use crate::spec::calibration::Calibration;
-use meniscus::scene::{Violation, check};
-use serde_json::{Map, Value, json};
+use meniscus::spec::{Group, Json, Raw, Violation, Word, group, whole};
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashSet};
 
-/// Points of a study at most.
-pub const MOST_POINTS: usize = 10_000;
+meniscus::words! {
+    /// What to do when a point fails.
+    pub enum OnFailure {
+        /// The other points go on.
+        Continue = "continue",
+        /// No further point starts.
+        Stop = "stop",
+    }
+}
+
+meniscus::group! {
+    /// A study.
+    pub struct StudySpec {
+        /// a job body that the points share
+        base: Raw = Raw::default();
+        /// the points
+        sweep: Sweep;
+        /// number of jobs of the study that may run at once
+        max_parallel: Option<u64>, in whole(1, 1_000_000);
+        /// what to do when a point fails
+        on_failure: Option<OnFailure>;
+        /// name, for people
+        name: Option<Name>;
+        /// labels, for filters
+        labels: Option<Labels>;
+    }
+}
+
 /// Pointers that vary at most.
 const MOST_AXES: usize = 64;
-/// Bytes of a body, and of one value of an axis, at most: there are ten thousand of them.
+/// Bytes of a base body at most: ten thousand copies are made of it.
 const LARGEST_BODY: usize = 64 << 10;
-const LARGEST_VALUE: usize = 16 << 10;
 /// Violations that are listed at most; the rest is counted.
 const MOST_VIOLATIONS: usize = 100;
-const FIELDS: [&str; 6] = ["base", "sweep", "max_parallel", "on_failure", "name", "labels"];
-const MODES: [&str; 3] = ["grid", "zip", "list"];
-
-/// A point: values by pointer.
-type Point = Vec<(String, Value)>;
 
 /// What all points of a study will take together.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Total {
     /// CPU seconds, where all points could be judged.
     pub cpu_s: Option<f64>,
-    /// Most memory of one.
+    /// Largest memory of a point, in bytes.
     pub memory_bytes: u64,
-    /// Bytes of all files.
+    /// Size of all files, in bytes.
     pub disk_bytes: u64,
 }
 
 impl Total {
-    /// As JSON; the clock goes by how many run at once.
+    /// The total as JSON; the wall time is that of `at_once` jobs side by side.
     #[must_use]
     pub fn to_json(self, points: usize, at_once: usize) -> Value {
         let at_once = at_once.clamp(1, points.max(1)) as f64;
@@ -48,70 +71,90 @@ impl Total {
     }
 }
 
-/// A study as understood.
-pub struct Study {
-    /// What is to be stored.
-    pub new: NewStudy,
-    /// The values of every point.
-    pub points: Vec<Value>,
+/// A valid study; `J` is what is kept of the body of each point.
+pub struct Study<J> {
+    /// Name, for people.
+    pub name: Option<String>,
+    /// Labels, for filters.
+    pub labels: BTreeMap<String, String>,
+    /// Body that all points share.
+    pub base: Json,
+    /// The sweep as sent.
+    pub sweep: Json,
+    /// Pointers that vary, in the order in which they first occur.
+    pub axes: Vec<String>,
+    /// Number of jobs at once at most.
+    pub max_parallel: Option<u64>,
+    /// `continue` or `stop`.
+    pub on_failure: &'static str,
+    /// The values of every point by pointer.
+    pub points: Vec<Json>,
+    /// What is kept of the body of each point.
+    pub jobs: Vec<J>,
     /// What all points will take.
     pub total: Total,
+    /// The total as JSON.
+    pub estimate: Json,
 }
 
-/// From a client's JSON to a study; `slots` jobs run at once.
+/// From a client's JSON to a study; `slots` jobs run at once, `keep` makes of each body what is needed later.
 ///
 /// # Errors
-/// All violations at once (the first hundred of them), nothing is made then. A violation at an axis' pointer is reported
+/// All violations at once (the first hundred of them); nothing is made then. A violation at an axis' pointer is reported
 /// once, at the axis' value.
-pub fn parse(
+pub fn parse<J>(
     spec: &Value,
     allowance: Allowance,
     slots: usize,
     sources: &dyn Sources,
     calibration: &Calibration,
-) -> Result<Study, Vec<Violation>> {
-    let Value::Object(given) = spec else {
-        return Err(vec![Violation::new("", "type", "a study is an object", spec, json!(FIELDS))]);
+    keep: impl Fn(&JobBody) -> J,
+) -> Result<Study<J>, Vec<Violation>> {
+    let Value::Object(object) = spec else {
+        return Err(vec![Violation::new("", "type", "a study is an object", spec.clone(), StudySpec::names())]);
     };
     let mut errors = Vec::new();
-    for (name, value) in given.iter().filter(|(name, _)| !FIELDS.contains(&name.as_str())) {
-        let at = format!("/{}", check::escaped(name));
-        let mut violation = Violation::new(at, "unknown_field", "there is no such field", value, json!(FIELDS));
-        violation.did_you_mean = check::closest(name, &FIELDS);
-        errors.push(violation);
-    }
-    let name = body::text(given, "name", &mut errors);
-    let labels = body::labels(given, &mut errors);
-    let max_parallel = max_parallel(given, &mut errors);
-    let on_failure = match given.get("on_failure") {
-        None | Some(Value::Null) => "continue",
-        Some(Value::String(word)) if word == "continue" => "continue",
-        Some(Value::String(word)) if word == "stop" => "stop",
-        Some(other) => {
-            let detail = "what to do when a point fails";
-            errors.push(Violation::new("/on_failure", "unknown", detail, other, json!(["continue", "stop"])));
-            "continue"
-        }
-    };
-    let base = given.get("base").cloned().unwrap_or(Value::Null);
-    if !base.is_object() {
-        errors.push(Violation::new(
-            "/base",
-            "required",
-            "a study has a job body that its points share",
-            &base,
-            Value::Null,
-        ));
-    }
-    let base_bytes = base.to_string().len();
-    if base_bytes > LARGEST_BODY {
-        let detail = format!("a job body in a study has at most {LARGEST_BODY} bytes");
-        errors.push(Violation::new("/base", "range", detail, &json!(base_bytes), json!(LARGEST_BODY)));
-    }
-    let points = if errors.is_empty() { sweep(given.get("sweep"), &mut errors) } else { Vec::new() };
-    if !errors.is_empty() {
+    group::check_names(object, &StudySpec::names(), "", &mut errors);
+    let parsed = StudySpec::parse_fields(object, "", &mut errors);
+    let base = parsed.as_ref().and_then(|spec| spec.base.0.clone()).or_else(|| object.get("base").cloned());
+    check_base(base.as_ref(), &mut errors);
+    let (Some(parsed), Some(base), true) = (parsed, base, errors.is_empty()) else {
         return Err(errors);
+    };
+    let points = parsed.sweep.points().map_err(|error| vec![error])?;
+    let axes = axes_of(&points)?;
+    let (jobs, total) = bodies(&base, &points, (allowance, sources), calibration, keep)?;
+    let at_once = parsed.max_parallel.map_or(slots, |most| slots.min(most as usize));
+    Ok(Study {
+        name: parsed.name.map(|name| name.0),
+        labels: parsed.labels.map(|labels| labels.0).unwrap_or_default(),
+        base,
+        sweep: object.get("sweep").cloned().unwrap_or_default(),
+        axes,
+        max_parallel: parsed.max_parallel,
+        on_failure: parsed.on_failure.unwrap_or(OnFailure::Continue).word(),
+        estimate: total.to_json(jobs.len(), at_once),
+        points: points.into_iter().map(|point| Value::Object(point.values.into_iter().collect())).collect(),
+        jobs,
+        total,
+    })
+}
+
+fn check_base(base: Option<&Json>, errors: &mut Vec<Violation>) {
+    let Some(base) = base.filter(|base| base.is_object()) else {
+        let detail = "a study has a job body that its points share";
+        errors.push(Violation::new("/base", "required", detail, base.cloned().unwrap_or_default(), Value::Null));
+        return;
+    };
+    let bytes = base.to_string().len();
+    if bytes > LARGEST_BODY {
+        let detail = format!("a job body in a study has at most {LARGEST_BODY} bytes");
+        errors.push(Violation::new("/base", "range", detail, bytes, LARGEST_BODY));
     }
+}
+
+/// The pointers that vary, in the order in which they first occur.
+fn axes_of(points: &[SweepPoint]) -> Result<Vec<String>, Vec<Violation>> {
     let mut axes: Vec<String> = Vec::new();
     let mut seen: HashSet<&str> = HashSet::new();
     for (pointer, _) in points.iter().flat_map(|point| &point.values) {
@@ -121,194 +164,40 @@ pub fn parse(
     }
     if axes.len() > MOST_AXES {
         let detail = format!("a study has at most {MOST_AXES} axes");
-        return Err(vec![Violation::new("/sweep", "range", detail, &json!(axes.len()), json!(MOST_AXES))]);
+        return Err(vec![Violation::new("/sweep", "range", detail, axes.len(), MOST_AXES)]);
     }
+    Ok(axes)
+}
+
+/// What is kept of the body of each point, and what all of them will take.
+fn bodies<J>(
+    base: &Json,
+    points: &[SweepPoint],
+    (allowance, sources): (Allowance, &dyn Sources),
+    calibration: &Calibration,
+    keep: impl Fn(&JobBody) -> J,
+) -> Result<(Vec<J>, Total), Vec<Violation>> {
     let mut jobs = Vec::with_capacity(points.len());
     let mut total = Total { cpu_s: Some(0.0), ..Total::default() };
     let mut found = Found::default();
-    for point in &points {
-        match understand(&base, point, allowance, sources) {
+    for point in points {
+        match point_body(base, point, allowance, sources) {
             Ok(mut body) => {
                 body.forecast.time_by(calibration);
                 let time = body.forecast.time.as_ref().map(|time| time.cpu_s);
                 total.cpu_s = total.cpu_s.zip(time).map(|(a, b)| a + b);
                 total.memory_bytes = total.memory_bytes.max(body.forecast.memory_bytes);
                 total.disk_bytes = total.disk_bytes.saturating_add(body.forecast.disk_bytes);
-                jobs.push(NewJob::of(&body));
+                jobs.push(keep(&body));
             }
             Err(violations) => found.add(point, violations),
         }
     }
-    if !found.by_pointer.is_empty() {
-        return Err(found.listed());
-    }
-    let at_once = max_parallel.map_or(slots, |most| slots.min(most as usize));
-    let estimate = total.to_json(jobs.len(), at_once);
-    let values = points.into_iter().map(|point| Value::Object(point.values.into_iter().collect())).collect();
-    let sweep = given.get("sweep").cloned().unwrap_or(Value::Null);
-    let new = NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs };
-    Ok(Study { new, points: values, total })
-}
-
-fn max_parallel(given: &Map<String, Value>, errors: &mut Vec<Violation>) -> Option<u64> {
-    match given.get("max_parallel") {
-        None | Some(Value::Null) => None,
-        Some(value) => {
-            let number = value.as_u64().filter(|most| (1..=1_000_000).contains(most));
-            if number.is_none() {
-                let detail = "so many jobs of the study may run at once";
-                errors.push(Violation::new("/max_parallel", "range", detail, value, json!("a whole number ≥ 1")));
-            }
-            number
-        }
-    }
-}
-
-/// A point, and where each of its values stands in the sweep.
-struct SweepPoint {
-    values: Point,
-    places: Vec<String>,
-}
-
-/// The points of a sweep in order: of a grid the last axis runs fastest.
-fn sweep(sweep: Option<&Value>, errors: &mut Vec<Violation>) -> Vec<SweepPoint> {
-    let empty = Value::Null;
-    let sweep = sweep.unwrap_or(&empty);
-    let mode = sweep["mode"].as_str().filter(|mode| MODES.contains(mode));
-    let Some(mode) = mode else {
-        let detail = "a sweep names its mode";
-        errors.push(Violation::new("/sweep/mode", "unknown", detail, &sweep["mode"], json!(MODES)));
-        return Vec::new();
-    };
-    let wanted = if mode == "list" { "points" } else { "axes" };
-    for (name, value) in sweep.as_object().into_iter().flatten() {
-        if name != "mode" && name != wanted {
-            let at = format!("/sweep/{}", check::escaped(name));
-            let detail = format!("a sweep of mode {mode} has a mode and {wanted}");
-            errors.push(Violation::new(at, "unknown_field", detail, value, json!(["mode", wanted])));
-        }
-    }
-    let points = if mode == "list" { list(&sweep["points"], errors) } else { axes(mode, &sweep["axes"], errors) };
-    if errors.is_empty() && points.is_empty() {
-        let detail = "a sweep has at least one point";
-        errors.push(Violation::new(format!("/sweep/{wanted}"), "required", detail, &sweep[wanted], Value::Null));
-    }
-    points
-}
-
-fn check_pointer(pointer: &str, at: &str, errors: &mut Vec<Violation>) {
-    if !pointer.starts_with('/') || pointer.len() > 200 {
-        let detail = "an axis is a JSON pointer into the job's body";
-        errors.push(Violation::new(at, "type", detail, &json!(pointer), json!("/scene/spacing, for instance")));
-    }
-}
-
-/// Refuses a value that is too large to be had ten thousand times.
-fn check_value(value: &Value, at: &str, errors: &mut Vec<Violation>) {
-    // Numbers, the usual values, are not written out for that.
-    if !value.is_number() && value.to_string().len() > LARGEST_VALUE {
-        let detail = format!("a value of an axis has at most {LARGEST_VALUE} bytes");
-        errors.push(Violation::new(at, "range", detail, &Value::Null, json!(LARGEST_VALUE)));
-    }
-}
-
-fn too_many(count: usize, errors: &mut Vec<Violation>) -> bool {
-    if count > MOST_POINTS {
-        let detail = format!("a study has at most {MOST_POINTS} points");
-        errors.push(Violation::new("/sweep", "range", detail, &json!(count), json!(MOST_POINTS)));
-    }
-    count > MOST_POINTS
-}
-
-fn list(points: &Value, errors: &mut Vec<Violation>) -> Vec<SweepPoint> {
-    let Some(points) = points.as_array() else {
-        let detail = "a list has points: objects from JSON pointers to values";
-        errors.push(Violation::new("/sweep/points", "type", detail, points, json!([{"/scene/spacing": 0.01}])));
-        return Vec::new();
-    };
-    if too_many(points.len(), errors) {
-        return Vec::new();
-    }
-    let mut found = Vec::with_capacity(points.len());
-    for (k, point) in points.iter().enumerate() {
-        let at = format!("/sweep/points/{k}");
-        let Some(map) = point.as_object() else {
-            let detail = "a point is an object from JSON pointers to values";
-            errors.push(Violation::new(at, "type", detail, point, Value::Null));
-            continue;
-        };
-        let mut one = SweepPoint { values: Vec::new(), places: Vec::new() };
-        for (pointer, value) in map {
-            let place = format!("{at}/{}", check::escaped(pointer));
-            check_pointer(pointer, &place, errors);
-            check_value(value, &place, errors);
-            one.values.push((pointer.clone(), value.clone()));
-            one.places.push(place);
-        }
-        found.push(one);
-    }
-    found
-}
-
-fn axes(mode: &str, axes: &Value, errors: &mut Vec<Violation>) -> Vec<SweepPoint> {
-    let Some(axes) = axes.as_object().filter(|axes| !axes.is_empty()) else {
-        let detail = "axes are an object from JSON pointers to lists of values";
-        errors.push(Violation::new("/sweep/axes", "type", detail, axes, json!({"/scene/spacing": [0.02, 0.01]})));
-        return Vec::new();
-    };
-    let mut lists: Vec<(&String, &Vec<Value>)> = Vec::new();
-    for (pointer, values) in axes {
-        let at = format!("/sweep/axes/{}", check::escaped(pointer));
-        check_pointer(pointer, &at, errors);
-        match values.as_array().filter(|values| !values.is_empty()) {
-            Some(values) => {
-                for (k, value) in values.iter().enumerate() {
-                    check_value(value, &format!("{at}/{k}"), errors);
-                }
-                lists.push((pointer, values));
-            }
-            None => {
-                errors.push(Violation::new(at, "type", "an axis has a list of values", values, json!([0.02, 0.01])));
-            }
-        }
-    }
-    if !errors.is_empty() {
-        return Vec::new();
-    }
-    let lengths = lists.iter().map(|(_, values)| values.len());
-    let count = if mode == "grid" {
-        lengths.fold(1_usize, usize::saturating_mul)
-    } else {
-        let count = lengths.clone().next().unwrap_or(0);
-        if let Some((pointer, values)) = lists.iter().find(|(_, values)| values.len() != count) {
-            let detail = format!("axes of a zip are of one length; the first has {count} values");
-            let at = format!("/sweep/axes/{}", check::escaped(pointer));
-            errors.push(Violation::new(at, "range", detail, &json!(values.len()), json!(count)));
-            return Vec::new();
-        }
-        count
-    };
-    if too_many(count, errors) {
-        return Vec::new();
-    }
-    let point = |index: usize| {
-        let mut rest = index;
-        let mut one = SweepPoint { values: Vec::new(), places: Vec::new() };
-        for (pointer, values) in lists.iter().rev() {
-            let k = if mode == "grid" { rest % values.len() } else { index };
-            rest /= values.len();
-            one.values.push(((*pointer).clone(), values[k].clone()));
-            one.places.push(format!("/sweep/axes/{}/{k}", check::escaped(pointer)));
-        }
-        one.values.reverse();
-        one.places.reverse();
-        one
-    };
-    (0..count).map(point).collect()
+    if found.by_pointer.is_empty() { Ok((jobs, total)) } else { Err(found.listed()) }
 }
 
 /// The body of one point.
-fn understand(
+fn point_body(
     base: &Value,
     point: &SweepPoint,
     allowance: Allowance,
@@ -318,7 +207,7 @@ fn understand(
     for (pointer, value) in &point.values {
         if !place_value(&mut body, pointer, value) {
             let detail = "the pointer leads through something that is no object";
-            return Err(vec![Violation::new(pointer.clone(), "type", detail, value, Value::Null)]);
+            return Err(vec![Violation::new(pointer.clone(), "type", detail, value.clone(), Value::Null)]);
         }
     }
     body::parse(&body, allowance, sources)
@@ -382,7 +271,7 @@ impl Found {
         let mut all: Vec<Violation> = self.by_pointer.into_values().collect();
         if self.more > 0 {
             let detail = format!("{} more things are wrong", self.more);
-            all.push(Violation::new("", "more", detail, &Value::Null, Value::Null));
+            all.push(Violation::new("", "more", detail, Value::Null, Value::Null));
         }
         all
     }
@@ -398,11 +287,11 @@ mod tests {
     const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30, local_files: false };
 
     fn points(spec: &Value) -> Vec<Value> {
-        parse(spec, ALLOWANCE, 1, &NoSources, &Calibration::default()).ok().unwrap().points
+        parse(spec, ALLOWANCE, 1, &NoSources, &Calibration::default(), |_| ()).ok().unwrap().points
     }
 
     fn errors(spec: &Value) -> Vec<(String, &'static str)> {
-        let found = parse(spec, ALLOWANCE, 1, &NoSources, &Calibration::default()).err().unwrap();
+        let found = parse(spec, ALLOWANCE, 1, &NoSources, &Calibration::default(), |_| ()).err().unwrap();
         found.into_iter().map(|v| (v.pointer, v.code)).collect()
     }
 

@@ -3,7 +3,7 @@
 use crate::formats::checkpoint::{self, CheckpointError, Counters, Meta};
 use crate::formats::{picture, vtkhdf};
 use crate::spec::attempt_spec::{Order, StartCheckpoint};
-use crate::spec::body::Wishes;
+use crate::spec::run_options::RunOptions;
 use crate::spec::records::{Record, RecordSink, Verdict};
 use crate::spec::states::Reason;
 use crate::system::artifacts;
@@ -15,7 +15,7 @@ use crate::worker::observers::progress::ProgressMeter;
 use crate::worker::observers::series::{self, Series};
 use crate::worker::observers::{Control, Observers};
 use crate::worker::report;
-use meniscus::scene::{BuildContext, understand};
+use meniscus::scene::{self, BuildContext};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
 use meniscus::simulation::{CpuClock, RunError, Simulation, State, StepError, run};
@@ -111,11 +111,11 @@ fn attempt(
     log: &Log,
 ) -> Result<Verdict, Failure> {
     let internal = |error: &dyn std::error::Error| Failure::Known(Reason::Internal, error.to_string());
-    let wishes = Wishes::of(&order.body).map_err(|error| internal(&error))?;
-    let scene = understand(&order.body["scene"], SCENES).map_err(|violations| {
+    let options = RunOptions::from_resolved(&order.body).map_err(|error| internal(&error))?;
+    let scene = scene::parse(&order.body["scene"], SCENES).map_err(|violations| {
         Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
     })?;
-    let threads = wishes.limits.threads.max(1) as usize;
+    let threads = options.limits.threads.max(1) as usize;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
     log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
     // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
@@ -125,7 +125,7 @@ fn attempt(
             inputs::read(scene.as_ref(), order).map_err(|cause| Failure::Known(Reason::InputDamaged, cause))?;
         let context = BuildContext {
             clouds,
-            plan: wishes.plan(),
+            plan: options.plan(),
             interrupt: control.interrupt().clone(),
             cpu_clock: CpuClock(process::cpu_seconds),
         };
@@ -140,7 +140,7 @@ fn attempt(
         })?;
         let start = restore(order, simulation.as_mut(), sink, log)?;
         progress.continue_phases(start.counters.phases.clone());
-        let mut observers = prepare(order, directory, &wishes, control, sink, &start, progress)?;
+        let mut observers = prepare(order, directory, &options, control, sink, &start, progress)?;
         let step = simulation.clock().step;
         observers.sink.put(
             &Record::Started {
@@ -249,13 +249,13 @@ fn refuse(
 fn prepare<'a>(
     order: &Order,
     directory: &Path,
-    wishes: &Wishes,
+    options: &RunOptions,
     control: &'a Control,
     sink: &'a mut dyn RecordSink,
     start: &Start,
     progress: ProgressMeter,
 ) -> Result<Observers<'a>, Failure> {
-    let plan = wishes.plan();
+    let plan = options.plan();
     let counters = &start.counters;
     let earlier = start.is_own.then(|| {
         (
@@ -268,7 +268,7 @@ fn prepare<'a>(
             directory.to_owned(),
             order.epoch,
             plan,
-            wishes.output.fields.clone(),
+            options.output.fields.clone(),
             counters.frames.clone(),
             counters.frames_before,
         ),
@@ -277,8 +277,8 @@ fn prepare<'a>(
             directory.to_owned(),
             order.job.clone(),
             order.body.clone(),
-            wishes.checkpoint.every_wall_s,
-            wishes.checkpoint.every_steps,
+            options.checkpoint.every_wall_s,
+            options.checkpoint.every_steps,
         ),
         progress,
         control,

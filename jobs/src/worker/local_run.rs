@@ -39,7 +39,7 @@ pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<J
     let order = Order {
         job: "local".to_owned(),
         epoch: 1,
-        body: body.resolved.clone(),
+        body: body.resolved.to_json(),
         attempts_directory: directory.to_owned(),
         may_start_afresh: true,
         checkpoints: Vec::new(),

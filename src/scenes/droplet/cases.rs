@@ -1,78 +1,90 @@
 //! The cases: what holds for each when it is not given.
 
-use serde_json::{Value, json};
+use super::spec::{CaseName, Corners, DensityChoice, ForceChoice, Shifting};
+use crate::scenes::shapes::Shape;
+use crate::spec::Coordinates;
 
-/// A case in a dimension.
+/// A case in a dimension, at a spacing.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Case {
-    pub shape: Option<Value>,
-    pub low: Vec<f64>,
-    pub high: Vec<f64>,
+    /// The drop at the start; a custom one has none.
+    pub shape: Option<Shape>,
+    pub domain: Corners,
     pub tension: f64,
-    pub density_method: Value,
-    pub shifting: &'static str,
-    pub body_force: Value,
+    pub density_method: DensityChoice,
+    pub shifting: Shifting,
+    pub body_force: ForceChoice,
     pub time_step: Option<f64>,
+    /// Smoothing length ε in h.
     pub smoothing_h: f64,
-    /// Degree and r_c/h of the fits.
-    pub fits: (u64, f64),
+    /// Degree of the fits, and their radius in h.
+    pub fits: (usize, f64),
 }
+
+/// Coefficient of the density diffusion, where none is given.
+pub(super) const DEFAULT_DIFFUSION: f64 = 0.05;
 
 /// ε/h that grows with the resolution, as in the paper: 3 at 1/32, 3.25 at 1/48, … 3.75 at 1/80.
 fn growing_smoothing(spacing: f64) -> f64 {
     3.0 + 0.25 * ((1.0 / spacing - 32.0) / 16.0).clamp(0.0, 3.0)
 }
 
-/// The case of a name; `oscillating` for one that is not known.
-pub(super) fn case(name: &str, dimension: usize, spacing: f64) -> Case {
-    let is_flat = dimension == 2;
-    let both = |plane: Value, space: Value| if is_flat { plane } else { space };
-    let cube = |half: f64| (vec![-half; dimension], vec![half; dimension]);
-    let (low, high) = cube(1.22);
-    let oscillating = Case {
-        shape: Some(both(
-            json!({"type": "ellipse", "center": null, "semi_axes": [0.75, 0.5]}),
-            json!({"type": "ellipsoid", "center": null, "semi_axes": [0.75, 0.5, 0.5]}),
-        )),
-        low,
-        high,
-        tension: if is_flat { 50.0 } else { 25.0 },
-        density_method: json!("summation"),
-        shifting: "none",
-        body_force: json!({"type": "none"}),
-        time_step: None,
-        smoothing_h: if is_flat { 3.0 } else { 2.0 },
-        fits: (4, 2.8),
-    };
-    match name {
-        "dividing" => Case {
-            shape: Some(both(
-                json!({"type": "circle", "center": null, "radius": 0.25}),
-                json!({"type": "sphere", "center": null, "radius": 0.25}),
-            )),
-            low: if is_flat { vec![-1.0, -0.5] } else { vec![-0.75, -0.390_625, -0.390_625] },
-            high: if is_flat { vec![1.0, 0.5] } else { vec![0.75, 0.390_625, 0.390_625] },
+/// A box about the origin with these half edge lengths; in the plane the first two count.
+fn centered_box(dimension: usize, half: [f64; 3]) -> Corners {
+    let high = &half[..dimension];
+    Corners { low: Coordinates(high.iter().map(|x| -x).collect()), high: Coordinates(high.to_vec()) }
+}
+
+impl Case {
+    /// The case of a name.
+    pub fn new(name: CaseName, dimension: usize, spacing: f64) -> Self {
+        match name {
+            CaseName::Oscillating => Self::oscillating(dimension),
+            CaseName::Dividing => Self::dividing(dimension, spacing),
+            CaseName::Static => {
+                Self { shape: Some(Shape::ball(dimension, 0.5)), ..Self::oscillating(dimension) }
+            }
+            CaseName::Custom => Self { shape: None, ..Self::oscillating(dimension) },
+        }
+    }
+
+    /// PCP paper, section 4.3.
+    fn oscillating(dimension: usize) -> Self {
+        let is_flat = dimension == 2;
+        Self {
+            shape: Some(Shape::ellipsoid(dimension, [0.75, 0.5, 0.5])),
+            domain: centered_box(dimension, [1.22; 3]),
+            tension: if is_flat { 50.0 } else { 25.0 },
+            density_method: DensityChoice::Summation,
+            shifting: Shifting::None,
+            body_force: ForceChoice::None,
+            time_step: None,
+            smoothing_h: if is_flat { 3.0 } else { 2.0 },
+            fits: (4, 2.8),
+        }
+    }
+
+    /// PCP paper, section 4.4.
+    fn dividing(dimension: usize, spacing: f64) -> Self {
+        let is_flat = dimension == 2;
+        let half = if is_flat { [1.0, 0.5, 0.0] } else { [0.75, 0.390_625, 0.390_625] };
+        // Without force where the halves come to stay, and half way to it across (docs/errata.md).
+        let body_force = if is_flat {
+            ForceChoice::Pulse { coefficient: 1000.0, duration: 0.5, a: 0.5, b: 0.5, c: 0.5 }
+        } else {
+            ForceChoice::Pulse { coefficient: 5000.0, duration: 0.05, a: 0.375, b: 0.390_625, c: 0.390_625 }
+        };
+        Self {
+            shape: Some(Shape::ball(dimension, 0.25)),
+            domain: centered_box(dimension, half),
             tension: 5.0,
-            density_method: json!("continuity"),
-            shifting: "pst",
-            // The force vanishes where the halves come to rest (docs/errata.md, PCP 29 and 30).
-            body_force: both(
-                json!({"type": "pulse", "coefficient": 1000.0, "duration": 0.5, "A": 0.5, "B": 0.5, "C": 0.5}),
-                json!({"type": "pulse", "coefficient": 5000.0, "duration": 0.05, "A": 0.375, "B": 0.390_625, "C": 0.390_625}),
-            ),
+            density_method: DensityChoice::Continuity { diffusion: DEFAULT_DIFFUSION },
+            shifting: Shifting::Pst,
+            body_force,
             time_step: Some(if is_flat { 1e-4 } else { 1.5e-4 }),
             smoothing_h: if is_flat { growing_smoothing(spacing) } else { 2.0 },
             fits: (3, 3.0),
-        },
-        "static" => Case {
-            shape: Some(both(
-                json!({"type": "circle", "center": null, "radius": 0.5}),
-                json!({"type": "sphere", "center": null, "radius": 0.5}),
-            )),
-            ..oscillating
-        },
-        "custom" => Case { shape: None, ..oscillating },
-        _ => oscillating,
+        }
     }
 }
 

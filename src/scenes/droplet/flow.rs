@@ -1,81 +1,71 @@
 //! How the flow of a droplet scene is discretized: kernels or fits, and where densities come from.
 
-use super::cases::Case;
-use super::parameters::{Density, Discretization as WrittenFlow, Written};
+use super::cases::{Case, DEFAULT_DIFFUSION};
+use super::spec::{DensityChoice, DiscretizationChoice, Droplet, GeometryChoice, KernelWord, Shifting};
 use crate::operators::Support;
-use crate::scene::Violation;
 use crate::schemes::weakly_compressible_sph::{DensityMethod, Discretization, KernelChoice};
+use crate::spec::Violation;
 use serde_json::{Value, json};
 
-/// The flow as understood.
-pub(super) struct Flow {
+/// The discretization of the flow, as planned.
+pub(super) struct FlowPlan {
     pub discretization: Discretization,
     pub kernel: KernelChoice,
+    /// Smoothing length ε in h.
     pub smoothing_h: f64,
     pub density: DensityMethod,
-    /// Its parameters with what was left open.
-    pub full: Value,
-    /// Those of the density.
-    pub full_density: Value,
+    /// Shifting where none is given: fits have no forces that keep particles apart.
+    pub default_shifting: Shifting,
 }
 
-/// A kernel by its name.
-fn kernel(name: &str) -> KernelChoice {
-    match name {
-        "wendland_c4" => KernelChoice::WendlandC4,
-        "cubic_spline" => KernelChoice::CubicSpline,
-        "quintic_spline" => KernelChoice::QuinticSpline,
-        _ => KernelChoice::WendlandC2,
+impl From<KernelWord> for KernelChoice {
+    fn from(word: KernelWord) -> Self {
+        match word {
+            KernelWord::WendlandC2 => Self::WendlandC2,
+            KernelWord::WendlandC4 => Self::WendlandC4,
+            KernelWord::CubicSpline => Self::CubicSpline,
+            KernelWord::QuinticSpline => Self::QuinticSpline,
+        }
     }
 }
 
-impl Flow {
-    /// Shifting that is not given: fits have no forces that keep particles apart.
-    pub fn shifting(&self, case: &Case) -> &'static str {
-        if self.discretization == Discretization::Kernels { case.shifting } else { "pst" }
-    }
-
-    pub fn understand(written: &Written, case: &Case, spacing: f64, violations: &mut Vec<Violation>) -> Self {
-        let default = if case.density_method == "continuity" {
-            Density::Continuity { diffusion: 0.05 }
-        } else {
-            Density::Summation
-        };
-        match &written.discretization {
-            WrittenFlow::Sph { kernel: name, smoothing_h } => {
-                let smoothing_h = smoothing_h.unwrap_or(case.smoothing_h);
-                let (density, full_density) = match written.density_method.unwrap_or(default) {
-                    Density::Summation => (DensityMethod::Summation, json!({"type": "summation"})),
-                    Density::Continuity { diffusion } => {
-                        (DensityMethod::Continuity { diffusion }, json!({"type": "continuity", "diffusion": diffusion}))
-                    }
-                };
+impl FlowPlan {
+    /// Plans the flow of a scene; the spec gets what was left open.
+    pub fn new(spec: &mut Droplet, case: &Case, errors: &mut Vec<Violation>) -> Self {
+        if let DiscretizationChoice::Dcpse { order, .. } = spec.discretization {
+            check_fits(spec, order, errors);
+        }
+        let given_density = spec.density_method.clone();
+        match &mut spec.discretization {
+            DiscretizationChoice::Sph { kernel, smoothing_h } => {
+                let density = given_density.unwrap_or_else(|| case.density_method.clone());
+                spec.density_method = Some(density.clone());
                 Self {
                     discretization: Discretization::Kernels,
-                    kernel: kernel(name),
-                    smoothing_h,
-                    density,
-                    full: json!({"type": "sph", "kernel": name, "smoothing_h": smoothing_h}),
-                    full_density,
+                    kernel: (*kernel).into(),
+                    smoothing_h: *smoothing_h.get_or_insert(case.smoothing_h),
+                    density: match density {
+                        DensityChoice::Summation => DensityMethod::Summation,
+                        DensityChoice::Continuity { diffusion } => DensityMethod::Continuity { diffusion },
+                    },
+                    default_shifting: case.shifting,
                 }
             }
-            WrittenFlow::Dcpse { order, cutoff_h, smoothing_h } => {
-                check_fits(written, *order, violations);
-                let smoothing_h = smoothing_h.unwrap_or(case.smoothing_h);
-                // Less, and particles crowd.
-                let cutoff_h = cutoff_h.unwrap_or(if *order == 4 { 5.5 } else { 3.5 });
-                let support = Support { degree: *order as usize + 1, radius: cutoff_h * spacing };
-                let diffusion = match written.density_method {
-                    Some(Density::Continuity { diffusion }) => diffusion,
-                    _ => 0.05,
+            DiscretizationChoice::Dcpse { order, cutoff_h, smoothing_h } => {
+                // With less, particles crowd.
+                let cutoff_h = *cutoff_h.get_or_insert(if *order == 4 { 5.5 } else { 3.5 });
+                let diffusion = match given_density {
+                    Some(DensityChoice::Continuity { diffusion }) => diffusion,
+                    Some(DensityChoice::Summation) | None => DEFAULT_DIFFUSION,
                 };
+                spec.density_method = Some(DensityChoice::Continuity { diffusion });
+                let support = Support { degree: *order as usize + 1, radius: cutoff_h * spec.spacing };
                 Self {
                     discretization: Discretization::Dcpse(support),
-                    kernel: kernel("wendland_c2"),
-                    smoothing_h,
+                    kernel: KernelChoice::WendlandC2,
+                    smoothing_h: *smoothing_h.get_or_insert(case.smoothing_h),
                     density: DensityMethod::Continuity { diffusion },
-                    full: json!({"type": "dcpse", "order": order, "cutoff_h": cutoff_h, "smoothing_h": smoothing_h}),
-                    full_density: json!({"type": "continuity", "diffusion": diffusion}),
+                    default_shifting: Shifting::Pst,
                 }
             }
         }
@@ -83,24 +73,24 @@ impl Flow {
 }
 
 /// What fits do not go together with.
-fn check_fits(written: &Written, order: u64, violations: &mut Vec<Violation>) {
+fn check_fits(spec: &Droplet, order: u64, errors: &mut Vec<Violation>) {
     let mut refuse = |pointer: &str, detail: &str, got: Value, allowed: Value| {
-        violations.push(Violation::new(pointer, "conflict", detail, &got, allowed));
+        errors.push(Violation::new(pointer, "conflict", detail, got, allowed));
     };
     if order != 2 && order != 4 {
         refuse("/discretization/order", "there is no discretization of this order", json!(order), json!([2, 4]));
     }
-    if let Some(Density::Summation) = written.density_method {
+    if let Some(DensityChoice::Summation) = spec.density_method {
         let detail = "dcpse finds densities by continuity";
         refuse("/density_method", detail, json!("summation"), json!(["continuity"]));
     }
-    if written.geometry["type"] == "colorfield" {
-        let detail = "colour fields are sums over kernels";
+    if spec.geometry == GeometryChoice::Colorfield {
+        let detail = "color fields are sums over kernels";
         refuse("/geometry", detail, json!("colorfield"), json!(["pcp"]));
     }
-    let (inside, outside) = (&written.fluids.inside, &written.fluids.outside);
+    let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
     if inside.viscosity != outside.viscosity || inside.density != outside.density {
-        let detail = "fits go across the interface: both fluids must have one density and one viscosity";
+        let detail = "the fits of dcpse reach across the interface: both fluids must have one density and one viscosity";
         let got = json!([inside.density, outside.density, inside.viscosity, outside.viscosity]);
         refuse("/fluids", detail, got, Value::Null);
     }

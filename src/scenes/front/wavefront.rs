@@ -1,43 +1,46 @@
 //! A wave front of geometrical optics: a curve in (x, y, θ).
 
-use super::setup::{BYTES, FrontChoice, labels};
+use super::plan::{BYTES, FrontChoice, labels};
 use crate::geometry::flows::Rays;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
-use crate::scene::{BuildContext, Estimate, Scene, Violation};
-use crate::scenes::gbpm_parameters::Chosen;
+use crate::scene::{BuildContext, Estimate, Scene};
+use crate::scenes::gbpm_spec::GbpmPlan;
+use crate::scenes::shapes::{PlainShape, Shape};
 use crate::scenes::work_estimate;
 use crate::schemes::grid_based_particle::{
     EllipticalWavefront, ExactFrontMotion, FrontParts, FrontSystem, Grid, GridBasedParticles, Law,
 };
 use crate::simulation::{OutputPlan, Simulation};
+use crate::spec::{Choice, Coordinates, Violation};
 use crate::time::FixedStep;
 use serde_json::{Value, json};
 
 pub(super) struct WavefrontScene {
-    pub resolved: Value,
+    /// The kind and the resolved parameters.
+    pub resolved: (&'static str, Value),
     pub choice: FrontChoice,
-    pub chosen: Chosen,
+    pub chosen: GbpmPlan,
     pub fixed: FixedStep,
     pub front: EllipticalWavefront,
 }
 
-/// The wave front that starts on a checked circle or ellipse.
-pub(super) fn of_shape(shape: &Value, speed: f64) -> Result<EllipticalWavefront, Violation> {
-    let pair = |name: &str| {
-        let numbers = shape.get(name).and_then(Value::as_array);
-        numbers.and_then(|numbers| Some([numbers.first()?.as_f64()?, numbers.get(1)?.as_f64()?]))
+/// The wave front that starts on a circle or an ellipse.
+pub(super) fn from_shape(shape: &Shape, speed: f64) -> Result<EllipticalWavefront, Violation> {
+    let pair = |numbers: &Coordinates| numbers.first().zip(numbers.get(1)).map(|(x, y)| [*x, *y]);
+    let found = match shape {
+        Shape::Plain(PlainShape::Circle { center, radius }) => Some((center, [*radius; 2])),
+        Shape::Plain(PlainShape::Ellipse { center, semi_axes }) => pair(semi_axes).map(|axes| (center, axes)),
+        _ => None,
     };
-    let radius = || shape.get("radius").and_then(Value::as_f64).map(|radius| [radius; 2]);
-    let is_known = shape["type"] == "circle" || shape["type"] == "ellipse";
-    match pair("semi_axes").or_else(radius).filter(|_| is_known) {
-        Some(semi_axes) => Ok(EllipticalWavefront { center: pair("center").unwrap_or_default(), semi_axes, speed }),
-        None => {
-            let detail = "geometrical_optics starts from a shape whose directions are known, in the plane";
-            Err(Violation::new("/shape/type", "conflict", detail, &shape["type"], json!(["circle", "ellipse"])))
-        }
-    }
+    let Some((center, semi_axes)) = found else {
+        let detail = "geometrical_optics starts from a shape whose directions are known, in the plane";
+        let allowed = json!(["circle", "ellipse"]);
+        return Err(Violation::new("/shape/type", "conflict", detail, shape.name(), allowed));
+    };
+    let center = center.as_ref().and_then(pair).unwrap_or_default();
+    Ok(EllipticalWavefront { center, semi_axes, speed })
 }
 
 impl WavefrontScene {
@@ -56,8 +59,20 @@ impl WavefrontScene {
 }
 
 impl Scene for WavefrontScene {
+    fn kind(&self) -> &'static str {
+        self.resolved.0
+    }
+
+    fn dimension(&self) -> usize {
+        2
+    }
+
+    fn spacing(&self) -> Option<f64> {
+        Some(self.choice.spacing)
+    }
+
     fn resolved(&self) -> Value {
-        self.resolved.clone()
+        self.resolved.1.clone()
     }
 
     fn field_names(&self) -> Vec<&'static str> {
@@ -99,7 +114,7 @@ impl Scene for WavefrontScene {
         let system = self.system(context.interrupt);
         if system.particle_count() <= 2 {
             let detail = "no grid point of this spacing has a foot-point on the curve";
-            return Err(vec![Violation::new("/spacing", "range", detail, &json!(self.choice.spacing), Value::Null)]);
+            return Err(vec![Violation::new("/spacing", "range", detail, self.choice.spacing, Value::Null)]);
         }
         let said = labels(&self.chosen, self.fixed, None);
         let exact = ExactFrontMotion::Rays(self.front);

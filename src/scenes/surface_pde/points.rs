@@ -1,16 +1,17 @@
 //! A surface that is known by points from outside alone: read, examined, given normals where it has none. Nothing is known
 //! of it exactly, so that no error is reported and what wants an exact answer was refused before.
 
-use super::setup::{Normals, Scheme, SurfaceScene, choices};
+use super::plan::{Normals, Scheme, SurfaceScene, choices};
 use super::surfaces::{Extent, Sampling, Shape};
 use crate::geometry::Vector;
 use crate::point_clouds::Examined;
 use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
 use crate::point_clouds::normals;
 use crate::scene::cloud::{self, Clouds};
-use crate::scene::{BuildContext, Violation};
+use crate::scene::BuildContext;
 use crate::schemes::surface_equation::{SurfaceCloud, SurfaceEquation};
 use crate::simulation::{Finding, Simulation};
+use crate::spec::Violation;
 use serde_json::Value;
 
 /// Where a scene names them.
@@ -30,12 +31,8 @@ pub(super) fn build<const D: usize, const M: usize>(
     let examined = Examined::new(&points).map_err(|reason| refuse(reason.to_string()))?;
     let shape = Shape::Points(Extent::of(&points, examined.spacing));
     let mut violations = Vec::new();
-    let (scheme, problem) = choices(
-        &scene.written,
-        (&shape, Sampling::Fibonacci, points.len() as u64),
-        &mut scene.resolved.clone(),
-        &mut violations,
-    );
+    let (scheme, problem) =
+        choices(&mut scene.given.clone(), (&shape, Sampling::Fibonacci, points.len() as u64), &mut violations);
     let (Some(Scheme::Dcpse(method)), Some(problem), true) = (scheme, problem, violations.is_empty()) else {
         return Err(violations);
     };
@@ -57,7 +54,7 @@ pub(super) fn build<const D: usize, const M: usize>(
     );
     let findings = flaws.into_iter().map(finding).collect();
     let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
-    let problem = problem.build(&shape, &cloud, scene.written.seed, scene.fixed.time_step)?;
+    let problem = problem.build(&shape, &cloud, scene.given.seed, scene.fixed.time_step)?;
     let equation = SurfaceEquation::<D, M>::new(cloud, method, problem, scene.fixed, interrupt, cpu_clock);
     Ok(Box::new(equation.on_points(origin, findings)))
 }
@@ -75,5 +72,5 @@ fn given_normals<const D: usize>(clouds: &Clouds, wanted: Normals) -> Result<Opt
 }
 
 fn refuse(detail: String) -> Vec<Violation> {
-    vec![Violation::new(PLACE, "data", detail, &Value::Null, Value::Null)]
+    vec![Violation::new(PLACE, "data", detail, Value::Null, Value::Null)]
 }

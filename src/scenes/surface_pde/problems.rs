@@ -1,17 +1,20 @@
-//! The problem of a scene: what it was understood as, what it is made of, what it costs.
+//! The problem of a scene: what it is made of, what it costs.
 
-use super::parameters::Written;
+use super::spec::{
+    ConditionWord, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SolverChoice, StoppingSpec,
+    SurfacePde,
+};
 use super::surfaces::{DEFAULT_COUNT, Shape};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::linear_algebra::krylov::Stopping;
 use crate::operators::charts::tangent::Metric;
-use crate::scene::Violation;
 use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{
     Condition, Curvature, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, ExactField, Model, Pointwise,
     Poisson, Problem, Reaction, Solver, SurfaceCloud,
 };
+use crate::spec::{Choice, Coordinates, Parameter, Violation};
 use serde_json::{Value, json};
 
 /// The problem.
@@ -34,195 +37,209 @@ pub(super) enum Start {
 const DEFAULT_STEPS: f64 = 100.0;
 /// Tolerance where neither it nor Δt is given.
 const DEFAULT_TOLERANCE: f64 = 1e-7;
-/// k of a plane wave that is not given, by the reach of the surface.
+/// Wave vector that is not given, by the extent of the surface.
 const DEFAULT_WAVE: [f64; 3] = [2.0, -1.0, 3.0];
+/// Wave numbers, by the extent of the surface, for which a wave has a length that numbers can tell.
+const WAVE_SIZES: std::ops::Range<f64> = 1e-6..1e6;
 
-/// A vector of three numbers.
-pub(super) fn in_space(value: &Value, pointer: &str, violations: &mut Vec<Violation>) -> Vector<3> {
-    if value.as_array().map_or(0, Vec::len) != 3 {
-        violations.push(Violation::new(pointer, "range", "a vector in space has three numbers", value, json!(3)));
+/// A vector of three numbers; NaN where there are fewer, with an error.
+pub(super) fn vector_in_space(numbers: &Coordinates, pointer: &str, errors: &mut Vec<Violation>) -> Vector<3> {
+    if numbers.len() != 3 {
+        let detail = "a vector in space has three numbers";
+        errors.push(Violation::new(pointer, "range", detail, numbers.to_json(), 3));
     }
-    Vector::<3>::from_fn(|d, _| value[d].as_f64().unwrap_or(f64::NAN))
+    Vector::<3>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(f64::NAN))
 }
 
 fn is_sphere(shape: &Shape) -> bool {
     matches!(shape, Shape::Ellipsoid(e) if e.semi_axes.max() == e.semi_axes.min())
 }
 
-/// A field as written, completed in `full`.
-fn field(
-    written: &Value,
-    pointer: &str,
-    shape: &Shape,
-    count: u64,
-    full: &mut Value,
-    violations: &mut Vec<Violation>,
-) -> Option<ExactField> {
-    let default = match shape {
-        Shape::Circle { .. } => json!({"type": "sin_plus_cos", "m": 1}),
-        shape if is_sphere(shape) => json!({"type": "spherical_harmonic", "l": 4, "m": 0.0, "axis": "z"}),
-        _ => json!({"type": "plane_wave"}),
-    };
-    let mut chosen = if written.is_null() { default } else { written.clone() };
-    let belongs = |is_there: bool, detail: &str, violations: &mut Vec<Violation>| {
-        if !is_there {
-            violations.push(Violation::new(pointer, "conflict", detail, &chosen, json!(["plane_wave"])));
-        }
-    };
-    let found = match chosen["type"].as_str() {
-        Some("spherical_harmonic") => {
-            belongs(is_sphere(shape), "spherical harmonics belong to a sphere", violations);
-            let (l, m) = (chosen["l"].as_u64().unwrap_or(4) as u32, chosen["m"].as_f64().unwrap_or(0.0));
-            if m.abs() > f64::from(l) || m.fract() != 0.0 {
-                let detail = format!("the order is a whole number from −{l} to {l}");
-                let (place, allowed) = (format!("{pointer}/m"), json!([-f64::from(l), l]));
-                violations.push(Violation::new(place, "range", detail, &json!(m), allowed));
-            }
-            let axis = ["x", "y", "z"].iter().position(|axis| chosen["axis"] == *axis).unwrap_or(2);
-            ExactField::SphericalHarmonic { l, m: m as i32, axis }
-        }
-        Some("sin_plus_cos") => {
-            belongs(matches!(shape, Shape::Circle { .. }), "sin mθ + cos mθ belongs to a circle", violations);
-            let m = chosen["m"].as_u64().unwrap_or(1);
-            if m > count / 2 {
-                let detail = format!("a wave has two points at least, and there are {count}");
-                let (place, allowed) = (format!("{pointer}/m"), json!({"most": count / 2}));
-                violations.push(Violation::new(place, "range", detail, &json!(m), allowed));
-            }
-            ExactField::SinPlusCos { m: m as u32 }
-        }
-        Some("truncated_gaussian") => {
-            let center = in_space(&chosen["center"], &format!("{pointer}/center"), violations);
-            ExactField::TruncatedGaussian { center, sigma: chosen["sigma"].as_f64().unwrap_or(0.2) }
-        }
-        _ => {
-            // Before points are read their size is not known, and so neither what a wave is by it.
-            let is_sized = !matches!(shape, Shape::Points(extent) if !extent.is_known);
-            if chosen["k"].is_null() {
-                let wave = DEFAULT_WAVE.iter().take(shape.dimension()).map(|k| k / shape.reach());
-                chosen["k"] = is_sized.then(|| wave.collect::<Vec<f64>>()).into();
-            }
-            let k = if chosen["k"].is_null() {
-                Vector::<3>::from(DEFAULT_WAVE)
-            } else if shape.is_curve() {
-                if chosen["k"].as_array().map_or(0, Vec::len) != 2 {
-                    let (place, detail) = (format!("{pointer}/k"), "a vector in the plane has two numbers");
-                    violations.push(Violation::new(place, "range", detail, &chosen["k"], json!(2)));
-                }
-                Vector::<3>::from_fn(|d, _| if d < 2 { chosen["k"][d].as_f64().unwrap_or(f64::NAN) } else { 0.0 })
-            } else {
-                in_space(&chosen["k"], &format!("{pointer}/k"), violations)
-            };
-            let size = k.norm() * shape.reach();
-            if is_sized && !size.is_nan() && !(1e-6..1e6).contains(&size) {
-                let detail = "by the size of the surface a wave must have a length that numbers can tell";
-                violations.push(Violation::new(format!("{pointer}/k"), "range", detail, &chosen["k"], Value::Null));
-            }
-            ExactField::PlaneWave { k }
-        }
-    };
-    *full = chosen;
-    Some(found)
+/// The field that is taken where none is given: an eigenfunction where the surface has known ones.
+fn default_field(shape: &Shape) -> FieldChoice {
+    use super::spec::AxisWord;
+    match shape {
+        Shape::Circle { .. } => FieldChoice::SinPlusCos { m: 1 },
+        shape if is_sphere(shape) => FieldChoice::SphericalHarmonic { l: 4, m: 0.0, axis: AxisWord::Z },
+        _ => FieldChoice::PlaneWave { k: None },
+    }
 }
 
-pub(super) fn understand(
-    written: &Written,
+/// Where a field stands, and on what.
+#[derive(Clone, Copy)]
+struct Site<'a> {
+    pointer: &'a str,
+    shape: &'a Shape,
+    /// Number of points.
+    count: u64,
+}
+
+impl Site<'_> {
+    /// The exact field of a choice, which gets what was left open.
+    fn field(self, chosen: &mut FieldChoice, errors: &mut Vec<Violation>) -> ExactField {
+        let written = chosen.to_json();
+        let belongs = |is_there: bool, detail: &str, errors: &mut Vec<Violation>| {
+            if !is_there {
+                errors.push(Violation::new(self.pointer, "conflict", detail, written, json!(["plane_wave"])));
+            }
+        };
+        match chosen {
+            FieldChoice::SphericalHarmonic { l, m, axis } => {
+                belongs(is_sphere(self.shape), "spherical harmonics belong to a sphere", errors);
+                if m.abs() > f64::from(*l) || m.fract() != 0.0 {
+                    let detail = format!("the order is a whole number from −{l} to {l}");
+                    let (at, allowed) = (format!("{}/m", self.pointer), json!([-f64::from(*l), l]));
+                    errors.push(Violation::new(at, "range", detail, *m, allowed));
+                }
+                ExactField::SphericalHarmonic { l: *l, m: *m as i32, axis: *axis as usize }
+            }
+            FieldChoice::SinPlusCos { m } => {
+                let is_circle = matches!(self.shape, Shape::Circle { .. });
+                belongs(is_circle, "sin mθ + cos mθ belongs to a circle", errors);
+                if *m > self.count / 2 {
+                    let detail = format!("a wave needs two points at least, and there are {}", self.count);
+                    let (at, allowed) = (format!("{}/m", self.pointer), json!({"most": self.count / 2}));
+                    errors.push(Violation::new(at, "range", detail, *m, allowed));
+                }
+                ExactField::SinPlusCos { m: *m as u32 }
+            }
+            FieldChoice::PlaneWave { k } => ExactField::PlaneWave { k: self.wave_vector(k, errors) },
+        }
+    }
+
+    /// The wave vector; one that is not given is set by the extent of the surface, where it is known.
+    fn wave_vector(self, given: &mut Option<Coordinates>, errors: &mut Vec<Violation>) -> Vector<3> {
+        let shape = self.shape;
+        // Before points are read their extent is not known.
+        let is_sized = !matches!(shape, Shape::Points(extent) if !extent.is_known);
+        if given.is_none() && is_sized {
+            let wave = DEFAULT_WAVE.iter().take(shape.dimension()).map(|k| k / shape.reach());
+            *given = Some(Coordinates(wave.collect()));
+        }
+        let Some(numbers) = given else { return Vector::<3>::from(DEFAULT_WAVE) };
+        let at = format!("{}/k", self.pointer);
+        let k = if shape.is_curve() {
+            if numbers.len() != 2 {
+                let detail = "a vector in the plane has two numbers";
+                errors.push(Violation::new(at.clone(), "range", detail, numbers.to_json(), 2));
+            }
+            Vector::<3>::from_fn(|d, _| if d < 2 { numbers.get(d).copied().unwrap_or(f64::NAN) } else { 0.0 })
+        } else {
+            vector_in_space(numbers, &at, errors)
+        };
+        let size = k.norm() * shape.reach();
+        if is_sized && !size.is_nan() && !WAVE_SIZES.contains(&size) {
+            let detail = "the wave length is too small or too large beside the surface";
+            errors.push(Violation::new(at, "range", detail, numbers.to_json(), Value::Null));
+        }
+        k
+    }
+
+    /// The exact field of a choice of fields at the start.
+    fn initial(self, chosen: &mut InitialChoice, errors: &mut Vec<Violation>) -> ExactField {
+        match chosen {
+            InitialChoice::Field(field) => self.field(field, errors),
+            InitialChoice::TruncatedGaussian { center, sigma } => {
+                let center = vector_in_space(center, &format!("{}/center", self.pointer), errors);
+                ExactField::TruncatedGaussian { center, sigma: *sigma }
+            }
+        }
+    }
+}
+
+/// Plans the problem on a shape; the spec gets what was left open.
+pub(super) fn plan(
+    spec: &mut SurfacePde,
     shape: &Shape,
     metric: Metric,
-    resolved: &mut Value,
-    violations: &mut Vec<Violation>,
+    errors: &mut Vec<Violation>,
 ) -> Option<ProblemChoice> {
-    let problem = &written.problem;
-    let mut field_of = |name: &str, violations: &mut Vec<Violation>| {
-        let pointer = format!("/problem/{name}");
-        field(
-            &problem[name],
-            &pointer,
-            shape,
-            written.count.unwrap_or(DEFAULT_COUNT),
-            &mut resolved["problem"][name],
-            violations,
-        )
-    };
-    let end_time = problem["end_time"].as_f64().unwrap_or(1.0);
-    let time_step = problem["time_step"].as_f64();
-    let explicit = |tolerance: &Value| match (tolerance.as_f64(), time_step) {
+    let count = spec.count.unwrap_or(DEFAULT_COUNT);
+    let site = |pointer| Site { pointer, shape, count };
+    let solver = solver(&spec.solver);
+    let name = spec.problem.name();
+    match &mut spec.problem {
+        ProblemSpec::LaplaceBeltrami { field } => {
+            let field = field.get_or_insert_with(|| default_field(shape));
+            Some(ProblemChoice::LaplaceBeltrami { field: site("/problem/field").field(field, errors) })
+        }
+        ProblemSpec::Poisson { field, condition } => {
+            let field = field.get_or_insert_with(|| default_field(shape));
+            let field = site("/problem/field").field(field, errors);
+            check_poisson(shape, *condition, name, errors);
+            Some(ProblemChoice::Poisson { field, is_dirichlet: *condition == ConditionWord::Dirichlet, solver })
+        }
+        ProblemSpec::Diffusion { initial, end_time, time_step, integrator, .. } => {
+            let initial = initial.get_or_insert_with(|| match shape {
+                Shape::Bump(_) => {
+                    InitialChoice::TruncatedGaussian { center: [0.0, 0.0, 0.0].into(), sigma: 0.2 }
+                }
+                shape => InitialChoice::Field(default_field(shape)),
+            });
+            let start = Start::Field(site("/problem/initial").initial(initial, errors));
+            let integrator = match integrator {
+                EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
+                EvolutionChoice::Bdf2 => EvolutionIntegrator::Bdf2(solver),
+            };
+            let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
+            Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
+        }
+        ProblemSpec::Curvature => Some(ProblemChoice::Curvature { of_heights: metric == Metric::OfHeights }),
+        ProblemSpec::ReactionDiffusion {
+            model, diffusivity, second_diffusivity, noise, manufactured, end_time, time_step, tolerance
+        } => {
+            let exact = manufactured.as_mut().map(|field| site("/problem/manufactured").field(field, errors));
+            if let (Shape::Points(_), Some(_)) = (shape, exact) {
+                let detail = "forcing takes the exact operator, which is not known on points from outside";
+                let at = "/problem/manufactured";
+                errors.push(Violation::new(at, "conflict", detail, manufactured.to_json(), Value::Null));
+            }
+            let model = match *model {
+                ModelChoice::GrayScott { feed, kill } => Model::GrayScott { feed, kill },
+                ModelChoice::Brusselator { a, b } => Model::Brusselator { a, b },
+            };
+            let diffusivity = [*diffusivity, *second_diffusivity];
+            let start = Start::Reaction { model, diffusivity, noise: *noise, manufactured: exact };
+            let integrator = explicit(*tolerance, *time_step);
+            let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
+            Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
+        }
+    }
+}
+
+/// What a Poisson equation does not go together with.
+fn check_poisson(shape: &Shape, condition: ConditionWord, name: &str, errors: &mut Vec<Violation>) {
+    if let Shape::Bump(_) = shape {
+        let detail = "the areas of a bump's points differ: a solution without mean is not defined by their sum";
+        errors.push(Violation::new("/problem", "conflict", detail, name, json!(["diffusion"])));
+    }
+    if let (Shape::Points(_), ConditionWord::Dirichlet) = (shape, condition) {
+        let detail = "points hold the exact solution, which is not known on points from outside";
+        let at = "/problem/condition";
+        errors.push(Violation::new(at, "conflict", detail, condition.to_json(), json!(["zero_mean"])));
+    }
+}
+
+/// An explicit integrator: steps are controlled where a tolerance is given, or where no time step is.
+fn explicit(tolerance: Option<f64>, time_step: Option<f64>) -> EvolutionIntegrator {
+    match (tolerance, time_step) {
         (Some(tolerance), _) => EvolutionIntegrator::Controlled { tolerance },
         (None, None) => EvolutionIntegrator::Controlled { tolerance: DEFAULT_TOLERANCE },
         (None, Some(_)) => EvolutionIntegrator::FixedSteps,
-    };
-    let time_step = time_step.unwrap_or(end_time / DEFAULT_STEPS);
-    let choice = match problem["type"].as_str() {
-        Some("poisson") => {
-            let field = field_of("field", violations)?;
-            if let Shape::Bump(_) = shape {
-                let detail = "the areas of a bump's points differ: a solution without mean is not defined by their sum";
-                let got = &problem["type"];
-                violations.push(Violation::new("/problem", "conflict", detail, got, json!(["diffusion"])));
-            }
-            let is_dirichlet = problem["condition"] == "dirichlet";
-            if let (Shape::Points(_), true) = (shape, is_dirichlet) {
-                let detail = "points hold the exact solution, which is not known on points from outside";
-                let (got, allowed) = (&problem["condition"], json!(["zero_mean"]));
-                violations.push(Violation::new("/problem/condition", "conflict", detail, got, allowed));
-            }
-            ProblemChoice::Poisson { field, is_dirichlet, solver: solver(&written.solver) }
-        }
-        Some("diffusion") => {
-            let name = "initial";
-            let start = if problem[name].is_null() && matches!(shape, Shape::Bump(_)) {
-                let chosen = json!({"type": "truncated_gaussian", "center": [0.0, 0.0, 0.0], "sigma": 0.2});
-                field(
-                    &chosen,
-                    "/problem/initial",
-                    shape,
-                    written.count.unwrap_or(DEFAULT_COUNT),
-                    &mut resolved["problem"][name],
-                    violations,
-                )?
-            } else {
-                field_of(name, violations)?
-            };
-            let integrator = match problem["integrator"]["type"].as_str() {
-                Some("bdf2") => EvolutionIntegrator::Bdf2(solver(&written.solver)),
-                _ => explicit(&problem["integrator"]["tolerance"]),
-            };
-            ProblemChoice::Evolution { start: Start::Field(start), end_time, time_step, integrator }
-        }
-        Some("curvature") => ProblemChoice::Curvature { of_heights: metric == Metric::OfHeights },
-        Some("reaction_diffusion") => {
-            let manufactured =
-                if problem["manufactured"].is_null() { None } else { Some(field_of("manufactured", violations)?) };
-            if let (Shape::Points(_), Some(_)) = (shape, manufactured) {
-                let detail = "forcing takes the exact operator, which is not known on points from outside";
-                let got = &problem["manufactured"];
-                violations.push(Violation::new("/problem/manufactured", "conflict", detail, got, Value::Null));
-            }
-            let number = |of: &Value, name: &str| of[name].as_f64().unwrap_or(1.0);
-            let model = &problem["model"];
-            let model = match model["type"].as_str() {
-                Some("gray_scott") => Model::GrayScott { feed: number(model, "feed"), kill: number(model, "kill") },
-                _ => Model::Brusselator { a: number(model, "a"), b: number(model, "b") },
-            };
-            let diffusivity = [number(problem, "diffusivity"), number(problem, "second_diffusivity")];
-            let start = Start::Reaction { model, diffusivity, noise: number(problem, "noise"), manufactured };
-            let integrator = explicit(&problem["tolerance"]);
-            ProblemChoice::Evolution { start, end_time, time_step, integrator }
-        }
-        _ => ProblemChoice::LaplaceBeltrami { field: field_of("field", violations)? },
-    };
-    Some(choice)
+    }
 }
 
-fn solver(written: &Value) -> Solver {
-    let stopping = Stopping {
-        tolerance: written["tolerance"].as_f64().unwrap_or(1e-10),
-        most_iterations: written["max_iterations"].as_u64().unwrap_or(5000),
-    };
-    match written["type"].as_str() {
-        Some("gmres") => Solver::Gmres { restart: written["restart"].as_u64().unwrap_or(60) as usize, stopping },
-        Some("sparse_lu") => Solver::SparseLu,
-        _ => Solver::BiCgStab(stopping),
+impl From<&StoppingSpec> for Stopping {
+    fn from(spec: &StoppingSpec) -> Self {
+        Self { tolerance: spec.tolerance, most_iterations: spec.max_iterations }
+    }
+}
+
+fn solver(choice: &SolverChoice) -> Solver {
+    match choice {
+        SolverChoice::Bicgstab { stopping } => Solver::BiCgStab(stopping.into()),
+        SolverChoice::Gmres { restart, stopping } => Solver::Gmres { restart: *restart, stopping: stopping.into() },
+        SolverChoice::SparseLu => Solver::SparseLu,
     }
 }
 
@@ -387,7 +404,7 @@ impl ProblemChoice {
                 let (initial, reaction, exact) = begin(start, shape, cloud, seed);
                 if initial.iter().all(|value| *value == 0.0) {
                     let detail = format!("the field is zero at all of the {} points", cloud.rows);
-                    return Err(vec![Violation::new("/problem/initial", "data", detail, &Value::Null, Value::Null)]);
+                    return Err(vec![Violation::new("/problem/initial", "data", detail, Value::Null, Value::Null)]);
                 }
                 let parts = EvolutionParts { initial, reaction, time_step, integrator: *integrator, exact };
                 Box::new(Evolution::new(parts, cloud))

@@ -1,13 +1,13 @@
 //! Surfaces as points with exact normals and curvatures, by how they are spread.
 
-use super::parameters::Written;
+use super::spec::{SamplingWord, SurfacePde};
 use crate::geometry::random::CounterRandom;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
 use crate::geometry::{Surface, Vector, fibonacci};
 use crate::parallel::Interrupt;
 use crate::point_clouds::{Bump, bump, relaxation};
-use crate::scene::Violation;
 use crate::schemes::surface_equation::SurfaceCloud;
+use crate::spec::{Parameter, Violation, Word};
 use serde_json::{Value, json};
 use std::f64::consts::{PI, TAU};
 
@@ -57,7 +57,7 @@ impl Extent {
         }
     }
 
-    /// In the place of points that nobody has read yet.
+    /// Stands for points that are not read yet.
     pub fn unknown(dimension: usize) -> Self {
         let measure = if dimension == 2 { TAU } else { 4.0 * PI };
         Self { dimension, measure, reach: 1.0, cap: 2.0 * BELOW_CAP - 1.0, is_known: false }
@@ -182,40 +182,35 @@ impl Shape {
     }
 }
 
-/// How points are spread. Those from outside are what they are.
-pub(super) fn sampling(
-    written: &Written,
-    shape: &Shape,
-    resolved: &mut Value,
-    violations: &mut Vec<Violation>,
-) -> Sampling {
+/// How points are spread; the spec gets what was left open. Points from outside are what they are.
+pub(super) fn sampling(spec: &mut SurfacePde, shape: &Shape, errors: &mut Vec<Violation>) -> Sampling {
     if let Shape::Points(_) = shape {
-        for (name, given) in [("count", json!(written.count)), ("sampling", json!(written.sampling))] {
+        for (name, given) in [("count", spec.count.to_json()), ("sampling", spec.sampling.to_json())] {
             if !given.is_null() {
-                let detail = "points from outside are as many as they are, where they are";
-                violations.push(Violation::new(format!("/{name}"), "conflict", detail, &given, Value::Null));
+                let detail = "number and places of points from outside are those of the file";
+                errors.push(Violation::new(format!("/{name}"), "conflict", detail, given, Value::Null));
             }
         }
         return Sampling::Given;
     }
-    let has_lattice = matches!(shape, Shape::Circle { .. } | Shape::Bump(_));
-    let allowed: &[&str] = match shape {
-        Shape::Circle { .. } => &["regular", "random", "random_raw"],
-        Shape::Bump(_) => &["regular"],
-        _ => &["fibonacci", "random", "random_raw"],
+    let (allowed, detail): (&[SamplingWord], &str) = match shape {
+        Shape::Circle { .. } => {
+            (&[SamplingWord::Regular, SamplingWord::Random, SamplingWord::RandomRaw], "not on this surface")
+        }
+        Shape::Bump(_) => (&[SamplingWord::Regular], "not on this surface"),
+        _ => (&[SamplingWord::Fibonacci, SamplingWord::Random, SamplingWord::RandomRaw], "this surface has no lattice"),
     };
-    let name = written.sampling.as_deref().unwrap_or(allowed[0]);
-    if !allowed.contains(&name) {
-        let detail = if has_lattice { "not on this surface" } else { "this surface has no lattice" };
-        violations.push(Violation::new("/sampling", "conflict", detail, &json!(name), json!(allowed)));
+    let chosen = *spec.sampling.get_or_insert(allowed[0]);
+    if !allowed.contains(&chosen) {
+        let names: Vec<&str> = allowed.iter().map(|word| word.word()).collect();
+        errors.push(Violation::new("/sampling", "conflict", detail, chosen.word(), json!(names)));
     }
-    resolved["count"] = json!(written.count.unwrap_or(DEFAULT_COUNT));
-    resolved["sampling"] = json!(name);
-    match name {
-        "regular" => Sampling::Regular,
-        "random" => Sampling::Random { is_relaxed: true },
-        "random_raw" => Sampling::Random { is_relaxed: false },
-        _ => Sampling::Fibonacci,
+    spec.count.get_or_insert(DEFAULT_COUNT);
+    match chosen {
+        SamplingWord::Regular => Sampling::Regular,
+        SamplingWord::Random => Sampling::Random { is_relaxed: true },
+        SamplingWord::RandomRaw => Sampling::Random { is_relaxed: false },
+        SamplingWord::Fibonacci => Sampling::Fibonacci,
     }
 }
 

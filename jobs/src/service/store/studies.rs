@@ -6,6 +6,7 @@ use super::transitions::apply;
 use super::{Change, ChangeError, Store, StoreError, remove_directory, rows};
 use crate::spec::records::{Progress, Usage};
 use crate::spec::states::{Reason, State, Trigger};
+use crate::spec::study::Study;
 use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 use serde_json::{Map, Value};
 use std::collections::{BTreeMap, HashSet};
@@ -62,6 +63,13 @@ pub struct NewStudy {
     pub estimate: Value,
     /// One a point.
     pub jobs: Vec<NewJob>,
+}
+
+impl From<Study<NewJob>> for NewStudy {
+    fn from(study: Study<NewJob>) -> Self {
+        let Study { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs, .. } = study;
+        Self { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs }
+    }
 }
 
 /// A point of a study with its latest job: what tables and reports need, and no more, of ten thousand.

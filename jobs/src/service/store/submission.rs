@@ -33,15 +33,15 @@ impl NewJob {
     #[must_use]
     pub fn of(body: &JobBody) -> Self {
         Self {
-            name: body.name.clone(),
-            labels: json!(body.labels).to_string(),
+            name: body.resolved.name.clone(),
+            labels: json!(body.resolved.labels).to_string(),
             kind: body.kind.clone(),
             spec: body.spec.to_string(),
-            resolved: body.resolved.to_string(),
+            resolved: body.resolved.to_json().to_string(),
             estimate: body.forecast.to_json().to_string(),
             memory_bytes: body.forecast.memory_bytes,
             disk_bytes: body.forecast.disk_bytes,
-            priority: body.priority,
+            priority: body.resolved.priority,
             origin: body.origin.clone(),
             uploads: body.uploads.clone(),
             study: None,

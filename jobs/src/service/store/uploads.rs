@@ -210,7 +210,7 @@ impl Store {
         };
         Ok(Some(RestartSource {
             origin: crate::spec::body::Origin::Upload(row.id),
-            resolved: row.found["body"].clone(),
+            scene: row.found["body"]["scene"].clone(),
             isa: row.found["isa"].as_str().unwrap_or_default().to_owned(),
             step: row.found["step"].as_u64().unwrap_or(0),
         }))

@@ -61,7 +61,7 @@ impl Supervisor {
 
     fn watch_memory(&mut self, k: usize) -> Result<(), StoreError> {
         let running = &mut self.running[k];
-        let limit = running.wishes.limits.memory_bytes;
+        let limit = running.options.limits.memory_bytes;
         if process::resident_bytes(running.worker.pid()).is_some_and(|bytes| bytes > limit) {
             // Written down first: a crash of the service must not turn a limit into bad luck.
             self.store.condemn(&running.job, running.epoch, Reason::LimitMemory)?;
@@ -83,12 +83,12 @@ impl Supervisor {
     fn watch_time_and_disk(&mut self, k: usize) -> Result<(), StoreError> {
         let running = &mut self.running[k];
         let wall = running.usage_before.wall_s - running.leg_wall_s + running.began.elapsed().as_secs_f64();
-        if running.wishes.limits.wall_s.is_some_and(|limit| wall >= limit) {
+        if running.options.limits.wall_s.is_some_and(|limit| wall >= limit) {
             return self.pause(k, Reason::LimitWalltime);
         }
         if running.disk_checked.elapsed() >= DISK_INTERVAL {
             running.disk_checked = Instant::now();
-            if let Some(limit) = running.wishes.limits.disk_bytes {
+            if let Some(limit) = running.options.limits.disk_bytes {
                 let used = process::directory_bytes(&self.store.job_directory(&running.job));
                 if used as f64 > limit {
                     return self.pause(k, Reason::LimitDisk);

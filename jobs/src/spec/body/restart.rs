@@ -1,8 +1,8 @@
 //! `restart`: a scene taken from a checkpoint, with overrides of restart-safe fields.
 
 use super::Sources;
-use meniscus::scene::{Violation, check};
-use serde_json::{Value, json};
+use meniscus::spec::{Json, Object, Parameter, Violation, escape};
+use serde_json::json;
 
 /// Where the checkpoint of a restart lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,95 +28,110 @@ impl Origin {
 pub struct RestartSource {
     /// Where it lies.
     pub origin: Origin,
-    /// The resolved body of the job that wrote it.
-    pub resolved: Value,
+    /// The resolved scene of the job that wrote it.
+    pub scene: Json,
     /// Instruction set it was written on.
     pub isa: String,
     /// Its step.
     pub step: u64,
 }
 
+meniscus::group! {
+    /// A scene taken from a checkpoint.
+    pub struct RestartSpec {
+        /// id of a checkpoint
+        checkpoint: Option<String>;
+        /// id of an upload made with ?as=checkpoint that is ready
+        upload: Option<String>;
+        /// new values of fields that a restart may change, by JSON pointers into the scene
+        overrides: Option<Overrides>;
+        /// whether a checkpoint of another instruction set may be used; results are then not bit-identical
+        allow_other_isa: Option<bool>;
+    }
+}
+
+/// New values by JSON pointers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overrides(pub Object);
+
+impl Parameter for Overrides {
+    type Domain = ();
+
+    fn any() {}
+
+    fn parse(given: &Json, (): (), place: &str, errors: &mut Vec<Violation>) -> Option<Self> {
+        let map = given.as_object().cloned().map(Self);
+        if map.is_none() {
+            let detail = "overrides are an object from JSON pointers to values";
+            errors.push(Violation::new(place, "type", detail, given.clone(), Self::allowed(())));
+        }
+        map
+    }
+
+    fn allowed((): ()) -> Json {
+        json!({"/end_time": 12.0})
+    }
+
+    fn schema((): ()) -> Object {
+        Object::from_iter([("type".to_owned(), json!("object"))])
+    }
+
+    fn to_json(&self) -> Json {
+        Json::Object(self.0.clone())
+    }
+}
+
 /// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields.
-pub(super) fn parse(
-    restart: &Value,
+pub(super) fn scene(
+    spec: &RestartSpec,
     sources: &dyn Sources,
     errors: &mut Vec<Violation>,
-) -> Option<(RestartSource, Value)> {
-    const KNOWN: [&str; 4] = ["checkpoint", "upload", "overrides", "allow_other_isa"];
-    let Value::Object(map) = restart else {
-        errors.push(Violation::new("/restart", "type", "a restart is an object", restart, json!(KNOWN)));
-        return None;
-    };
-    for (name, value) in map {
-        if !KNOWN.contains(&name.as_str()) {
-            let at = format!("/restart/{}", check::escaped(name));
-            let mut violation = Violation::new(at, "unknown_field", "there is no such field", value, json!(KNOWN));
-            violation.did_you_mean = check::closest(name, &KNOWN);
-            errors.push(violation);
-        }
-    }
-    let id = |name: &str| map.get(name).filter(|value| !value.is_null());
-    let source = match (id("checkpoint"), id("upload")) {
-        (Some(checkpoint), None) => checkpoint.as_str().and_then(|id| sources.checkpoint(id)).ok_or_else(|| {
-            let allowed = json!("the id of a checkpoint, ckpt_…");
-            Violation::new("/restart/checkpoint", "not_found", "there is no such checkpoint", checkpoint, allowed)
-        }),
-        (None, Some(upload)) => upload.as_str().and_then(|id| sources.uploaded_checkpoint(id)).ok_or_else(|| {
-            let detail = "there is no such upload, or it is no checkpoint that passed its check";
-            let allowed = json!("the id of an upload made with ?as=checkpoint that is ready, upl_…");
-            Violation::new("/restart/upload", "not_found", detail, upload, allowed)
-        }),
-        (None, None) => {
-            let detail = "a restart names a checkpoint or an upload";
-            Err(Violation::new(
-                "/restart/checkpoint",
-                "required",
-                detail,
-                &Value::Null,
-                json!("the id of a checkpoint, ckpt_…"),
-            ))
-        }
-        (Some(_), Some(upload)) => {
-            let detail = "a restart begins with a checkpoint or with an upload; give one of them";
-            Err(Violation::new("/restart/upload", "conflict", detail, upload, Value::Null))
-        }
-    };
-    let source = source.map_err(|violation| errors.push(violation)).ok()?;
-    let allow = map.get("allow_other_isa").unwrap_or(&Value::Null);
-    if !(allow.is_null() || allow.is_boolean()) {
-        errors.push(Violation::new("/restart/allow_other_isa", "type", "true or false", allow, json!([true, false])));
-    }
-    if source.isa != crate::system::build::isa() && allow != &Value::Bool(true) {
+) -> Option<(RestartSource, Json)> {
+    let source = source(spec, sources).map_err(|error| errors.push(error)).ok()?;
+    let own = crate::system::build::isa();
+    if source.isa != own && spec.allow_other_isa != Some(true) {
         let detail = format!(
-            "the checkpoint was written on {}, this service computes on {}; results would not be bit-identical",
-            source.isa,
-            crate::system::build::isa()
+            "the checkpoint was written on {}, this service computes on {own}; results would not be bit-identical",
+            source.isa
         );
-        errors.push(Violation::new("/restart/allow_other_isa", "required", detail, allow, json!([true])));
+        let got = spec.allow_other_isa.to_json();
+        errors.push(Violation::new("/restart/allow_other_isa", "required", detail, got, json!([true])));
     }
-    let mut scene = source.resolved["scene"].clone();
-    let kind = scene["kind"].as_str().and_then(meniscus::scenes::find)?;
-    let safe = meniscus::scene::json_schema::restart_safe(kind);
-    match map.get("overrides") {
-        None | Some(Value::Null) => {}
-        Some(Value::Object(overrides)) => {
-            for (pointer, value) in overrides {
-                let at = format!("/restart/overrides/{}", check::escaped(pointer));
-                if !safe.contains(pointer) {
-                    let detail = "a restart may not change this field";
-                    let mut violation = Violation::new(at, "not_restart_safe", detail, value, json!(safe));
-                    let names: Vec<&str> = safe.iter().map(String::as_str).collect();
-                    violation.did_you_mean = check::closest(pointer, &names);
-                    errors.push(violation);
-                } else if let Some(slot) = scene.pointer_mut(pointer) {
-                    *slot = value.clone();
-                }
-            }
-        }
-        Some(value) => {
-            let detail = "overrides are an object from JSON pointers to values";
-            errors.push(Violation::new("/restart/overrides", "type", detail, value, json!(safe)));
+    let mut scene = source.scene.clone();
+    let kind = meniscus::scenes::kind_of(&scene)?;
+    let safe = kind.restart_safe();
+    for (pointer, value) in spec.overrides.iter().flat_map(|overrides| &overrides.0) {
+        if !safe.contains(pointer) {
+            let at = format!("/restart/overrides/{}", escape(pointer));
+            let names: Vec<&str> = safe.iter().map(String::as_str).collect();
+            let detail = "a restart may not change this field";
+            errors.push(Violation::unknown(at, "not_restart_safe", detail, value.clone(), Some(pointer), &names));
+        } else if let Some(slot) = scene.pointer_mut(pointer) {
+            *slot = value.clone();
         }
     }
     Some((source, scene))
+}
+
+fn source(spec: &RestartSpec, sources: &dyn Sources) -> Result<RestartSource, Violation> {
+    let by_checkpoint = "the id of a checkpoint, ckpt_…";
+    match (&spec.checkpoint, &spec.upload) {
+        (Some(id), None) => sources.checkpoint(id).ok_or_else(|| {
+            let detail = "there is no such checkpoint";
+            Violation::new("/restart/checkpoint", "not_found", detail, id.as_str(), by_checkpoint)
+        }),
+        (None, Some(id)) => sources.uploaded_checkpoint(id).ok_or_else(|| {
+            let detail = "there is no such upload, or it is no checkpoint that passed its check";
+            let allowed = "the id of an upload made with ?as=checkpoint that is ready, upl_…";
+            Violation::new("/restart/upload", "not_found", detail, id.as_str(), allowed)
+        }),
+        (None, None) => {
+            let detail = "a restart names a checkpoint or an upload";
+            Err(Violation::new("/restart/checkpoint", "required", detail, Json::Null, by_checkpoint))
+        }
+        (Some(_), Some(id)) => {
+            let detail = "a restart begins with a checkpoint or with an upload; give one of them";
+            Err(Violation::new("/restart/upload", "conflict", detail, id.as_str(), Json::Null))
+        }
+    }
 }

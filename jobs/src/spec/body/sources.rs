@@ -2,7 +2,8 @@
 
 use super::RestartSource;
 use crate::spec::uploads::Purpose;
-use meniscus::scene::{CloudReference, CloudSource, Violation};
+use meniscus::scene::{CloudReference, CloudSource};
+use meniscus::spec::Violation;
 use serde_json::{Value, json};
 
 /// Knows checkpoints and uploads.
@@ -45,7 +46,7 @@ pub(super) fn size_of(
         CloudSource::File(_) if local_files => Ok(None),
         CloudSource::File(file) => {
             let detail = "a local file is valid for `meniscus run` alone; POST /v1/uploads takes files";
-            Err(Violation::new(cloud.pointer, "not_here", detail, &json!(file), json!({"upload": "upl_…"})))
+            Err(Violation::new(cloud.pointer, "not_here", detail, file.as_str(), json!({"upload": "upl_…"})))
         }
         CloudSource::Upload(upload) => {
             // Points with a level are good as places to ask about, too; places have no level.
@@ -58,7 +59,7 @@ pub(super) fn size_of(
             let names: Vec<String> = wanted.iter().map(|purpose| format!("?as={}", purpose.word())).collect();
             let detail =
                 format!("there is no upload of this id that is ready and was made with {}", names.join(" or "));
-            let missing = || Violation::new(cloud.pointer, "not_found", detail, &json!(upload), Value::Null);
+            let missing = || Violation::new(cloud.pointer, "not_found", detail, upload.as_str(), Value::Null);
             found.map(|(_, points)| Some(points)).ok_or_else(missing)
         }
     }

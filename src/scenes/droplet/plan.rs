@@ -1,8 +1,10 @@
-//! From parameters to two fluids in a box.
+//! From the spec of a `droplet` scene to two fluids in a box.
 
-use super::cases::{Case, case};
-use super::flow::Flow;
-use super::parameters::{Corners, Force, Stop, Written, WrittenFluid};
+use super::cases::Case;
+use super::flow::FlowPlan;
+use super::spec::{
+    Corners, Droplet, FluidSpec, ForceChoice, GeometryChoice, IntegratorWord, Shifting, StopWhen, TensionWord,
+};
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
@@ -11,249 +13,262 @@ use crate::parallel::Interrupt;
 use crate::polynomials::multi_index::term_count;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
-use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
-use crate::scenes::{pcp_parameters, shapes, work_estimate};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
+use crate::scenes::shapes::Shape;
+use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, longest_step};
 use crate::schemes::weakly_compressible_sph::{
     BodyForce, DensityMethod, Discretization, Drop, Fluid, Geometry, Integrator, SphParts, SphSystem, TensionForce,
     WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Simulation};
+use crate::spec::{Coordinates, Parameter, Violation};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 struct DropletScene<const D: usize> {
-    resolved: Value,
-    shape: Value,
+    spec: Droplet,
+    shape: Shape,
     low: Vector<D>,
     high: Vector<D>,
     sides: [usize; D],
     parts: SphParts<D>,
     time_step: f64,
     steps: u64,
-    end_time: f64,
     chosen: BTreeMap<&'static str, String>,
     clouds: Vec<CloudReference>,
 }
 
-/// Neighbours per coefficient, where the level is overwritten at every evaluation.
+/// Neighbors per coefficient, where the level is overwritten at every evaluation.
 const RATIO: f64 = 2.0;
-/// Particles of a run at most.
+/// Number of particles of a run at most.
 const MOST_PARTICLES: f64 = 1e9;
-/// Units of a measurement by the particle near the interface, for the enclosed shape; the sums over all particles are 1.
+/// Units of a measurement for each particle near the interface, for the enclosed shape; the sums over all particles are 1.
 const QUADRATURE: f64 = 10.0;
 
-pub(super) fn understand(parameters: &Value) -> Understood {
-    let written: Written = serde_json::from_value(parameters.clone())
-        .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
-    let implied = written.shape.as_ref().and_then(shapes::implied_dimension);
-    match written.dimension.or(implied).unwrap_or(2) {
-        3 => scene::<3>(&written, parameters.clone()),
-        _ => scene::<2>(&written, parameters.clone()),
+impl SceneSpec for Droplet {
+    fn plan(self) -> Planned {
+        let implied = self.shape.as_ref().and_then(Shape::dimension);
+        match self.dimension.or(implied).unwrap_or(2) {
+            3 => plan::<3>(self),
+            _ => plan::<2>(self),
+        }
     }
 }
 
-fn corner<const D: usize>(name: &str, numbers: &[f64], violations: &mut Vec<Violation>) -> Vector<D> {
+fn corner<const D: usize>(name: &str, numbers: &Coordinates, errors: &mut Vec<Violation>) -> Vector<D> {
     if numbers.len() != D {
         let (at, detail) = (format!("/domain/{name}"), format!("the scene has {D} dimensions"));
-        let allowed = json!(format!("{D} numbers"));
-        violations.push(Violation::new(at, "conflict", detail, &json!(numbers), allowed));
+        errors.push(Violation::new(at, "conflict", detail, numbers.to_json(), format!("{D} numbers")));
     }
     Vector::<D>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(0.0))
 }
 
-fn fluid(written: &WrittenFluid) -> Fluid {
-    let WrittenFluid { density, viscosity, sound_speed, polytropic } = *written;
-    Fluid { density, viscosity, sound_speed, polytropic }
+impl From<&FluidSpec> for Fluid {
+    fn from(spec: &FluidSpec) -> Self {
+        let FluidSpec { density, viscosity, sound_speed, polytropic } = *spec;
+        Self { density, viscosity, sound_speed, polytropic }
+    }
 }
 
-fn body_force<const D: usize>(force: &Force, violations: &mut Vec<Violation>) -> Option<BodyForce<D>> {
+fn body_force<const D: usize>(force: &ForceChoice, errors: &mut Vec<Violation>) -> Option<BodyForce<D>> {
     match force {
-        Force::None => None,
-        Force::Pulse { coefficient, duration, a, b, c } => {
+        ForceChoice::None => None,
+        ForceChoice::Pulse { coefficient, duration, a, b, c } => {
             let lengths = Vector::<D>::from_fn(|d, _| [*a, *b, *c][d]);
             Some(BodyForce::Pulse { coefficient: *coefficient, duration: *duration, lengths })
         }
-        Force::Constant { acceleration } => {
+        ForceChoice::Constant { acceleration } => {
             if acceleration.len() != D {
-                let detail = format!("the scene has {D} dimensions");
-                let allowed = json!(format!("{D} numbers"));
-                let at = "/body_force/acceleration";
-                violations.push(Violation::new(at, "conflict", detail, &json!(acceleration), allowed));
+                let (at, detail) = ("/body_force/acceleration", format!("the scene has {D} dimensions"));
+                errors.push(Violation::new(at, "conflict", detail, acceleration.to_json(), format!("{D} numbers")));
             }
             Some(BodyForce::Constant(Vector::<D>::from_fn(|d, _| acceleration.get(d).copied().unwrap_or(0.0))))
         }
     }
 }
 
-/// The geometry, and its parameters with what was left open.
+/// Where normals and curvatures come from; the spec gets what was left open.
 fn geometry(
-    written: &Value,
+    spec: &mut Droplet,
     case: &Case,
     dimension: usize,
-    spacing: f64,
     smoothing_h: f64,
-) -> Result<(Geometry, Value), Vec<Violation>> {
-    if written["type"] != "pcp" {
-        return Ok((Geometry::ColorField, written.clone()));
+) -> Result<Geometry, Violation> {
+    let GeometryChoice::Pcp { band_h, method } = &mut spec.geometry else { return Ok(Geometry::ColorField) };
+    if method.neighborhood.is_none() && method.cutoff_h.is_none() {
+        method.neighborhood = Some(Neighborhood::Radius { cutoff_h: case.fits.1 });
     }
-    let mut open = written.clone();
-    if open["neighborhood"].is_null() && open["cutoff_h"].is_null() {
-        open["neighborhood"] = json!({"type": "radius", "cutoff_h": case.fits.1});
+    let context = PcpContext { pointer: "/geometry", dimension, default_ratio: RATIO };
+    let (planned, full) = method.clone().plan(context)?;
+    if let Some(error) = full.refuse_material("/geometry", "particles mix: fits are made in space") {
+        return Err(error);
     }
-    let (method, mut full) = pcp_parameters::understand(&open, "/geometry", dimension, RATIO)?;
-    if let Some(mut found) = pcp_parameters::refuse_material(&method, "particles mix: fits are made in space") {
-        found.pointer = "/geometry/neighborhood/type".to_owned();
-        return Err(vec![found]);
-    }
-    let band_h = written["band_h"].as_f64().unwrap_or(4.0 * smoothing_h + 1.0);
-    full["band_h"] = json!(band_h);
-    if band_h < 4.0 * smoothing_h {
+    *method = full;
+    let least_band_h = 4.0 * smoothing_h;
+    let band_h = *band_h.get_or_insert(least_band_h + 1.0);
+    if band_h < least_band_h {
         let detail = "the smoothed tension reaches 2 ε to both sides";
-        let allowed = json!(format!("a number ≥ {}", 4.0 * smoothing_h));
-        return Err(vec![Violation::new("/geometry/band_h", "range", detail, &json!(band_h), allowed)]);
+        let allowed = format!("a number ≥ {least_band_h}");
+        return Err(Violation::new("/geometry/band_h", "range", detail, band_h, allowed));
     }
-    Ok((Geometry::Pcp { method, half_band: 0.5 * band_h * spacing }, full))
+    Ok(Geometry::Pcp { method: planned, half_band: 0.5 * band_h * spec.spacing })
 }
 
-fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
-    let mut violations = Vec::new();
-    let h = written.spacing;
-    let case = case(&written.case, D, h);
-    let corners = written.domain.clone().unwrap_or(Corners { low: case.low.clone(), high: case.high.clone() });
-    let low = corner::<D>("low", &corners.low, &mut violations);
-    let high = corner::<D>("high", &corners.high, &mut violations);
+/// The box, with how many particles lie along each side.
+struct Sides<const D: usize> {
+    low: Vector<D>,
+    high: Vector<D>,
+    counts: [usize; D],
+}
+
+fn sides<const D: usize>(spec: &Droplet, corners: &Corners, errors: &mut Vec<Violation>) -> Sides<D> {
+    let low = corner::<D>("low", &corners.low, errors);
+    let high = corner::<D>("high", &corners.high, errors);
     let lengths = high - low;
     if lengths.iter().any(|length| *length <= 0.0) {
         let detail = "the upper corner must lie above the lower one along every axis";
-        violations.push(Violation::new("/domain/high", "range", detail, &json!(corners.high), Value::Null));
+        errors.push(Violation::new("/domain/high", "range", detail, corners.high.to_json(), Value::Null));
     }
-    let counts = lengths.map(|length| (length / h).round());
-    if violations.is_empty() && !(1.0..=MOST_PARTICLES).contains(&counts.product()) {
+    let counts = lengths.map(|length| (length / spec.spacing).round());
+    if errors.is_empty() && !(1.0..=MOST_PARTICLES).contains(&counts.product()) {
         let least = (lengths.product() / MOST_PARTICLES).powf(1.0 / D as f64);
-        let allowed = json!(format!("a number ≥ {least:.3e} and below every side"));
-        violations.push(Violation::new("/spacing", "range", "too many particles, or none", &json!(h), allowed));
+        let allowed = format!("a number ≥ {least:.3e} and below every side");
+        errors.push(Violation::new("/spacing", "range", "too many particles, or none", spec.spacing, allowed));
     }
-    let sides: [usize; D] = std::array::from_fn(|d| counts[d].clamp(0.0, MOST_PARTICLES) as usize);
-    let shape = written.shape.clone().or(case.shape.clone()).unwrap_or_else(|| {
-        let detail = "a custom drop needs a shape";
-        violations.push(Violation::new("/shape", "required", detail, &Value::Null, json!({"type": "circle"})));
-        Value::Null
-    });
-    let of_points = cloud::named(&shape, "/shape", &mut violations);
-    if of_points.is_none() && !shape.is_null() {
-        match shapes::surface::<D>(&shape, "/shape") {
-            Ok(surface) => violations.extend(check_size(surface.as_ref(), &lengths, &shape)),
-            Err(found) => violations.extend(found),
-        }
-    }
-    let flow = Flow::understand(written, &case, h, &mut violations);
-    let smoothing_h = flow.smoothing_h;
-    let geometry = match geometry(&written.geometry, &case, D, h, smoothing_h) {
-        Ok((geometry, full)) => {
-            resolved["geometry"] = full;
-            Some(geometry)
-        }
-        Err(found) => {
-            violations.extend(found);
-            None
-        }
+    Sides { low, high, counts: std::array::from_fn(|d| counts[d].clamp(0.0, MOST_PARTICLES) as usize) }
+}
+
+/// The shape of the drop and the points that it names; the spec gets the shape.
+fn drop_shape<const D: usize>(
+    spec: &mut Droplet,
+    case: &Case,
+    lengths: &Vector<D>,
+    errors: &mut Vec<Violation>,
+) -> Option<(Shape, Option<CloudReference>)> {
+    let Some(shape) = spec.shape.take().or_else(|| case.shape.clone()) else {
+        let allowed = json!({"type": "circle"});
+        errors.push(Violation::new("/shape", "required", "a custom drop needs a shape", Value::Null, allowed));
+        return None;
     };
-    let force_json = written.body_force.clone().unwrap_or_else(|| case.body_force.clone());
-    let force: Force = serde_json::from_value(force_json.clone()).unwrap_or_else(|error| {
-        violations.push(Violation::new("/body_force", "type", error.to_string(), &force_json, Value::Null));
-        Force::None
-    });
-    let shifting = written.shifting.as_deref().unwrap_or(flow.shifting(&case));
-    let given_step = written.time_step.or(if written.steps.is_none() { case.time_step } else { None });
-    if let (Some(step), Some(_)) = (written.time_step, written.steps) {
-        let detail = "steps are given instead of a time step; give one of them";
-        violations.push(Violation::new("/time_step", "conflict", detail, &json!(step), Value::Null));
-    }
-    let parts = SphParts {
-        spacing: h,
-        smoothing_length: smoothing_h * h,
-        kernel: flow.kernel,
-        inside: fluid(&written.fluids.inside),
-        outside: fluid(&written.fluids.outside),
-        tension: written.surface_tension.unwrap_or(case.tension),
-        tension_force: if written.tension_force == "csf" { TensionForce::Csf } else { TensionForce::Balanced },
-        geometry: geometry.unwrap_or(Geometry::ColorField),
-        discretization: flow.discretization,
-        density: flow.density,
-        is_shifted: shifting == "pst",
-        body_force: body_force(&force, &mut violations),
-        integrator: match written.integrator.as_str() {
-            "predictor_corrector" => Integrator::PredictorCorrector,
-            _ => Integrator::KickDriftKick,
+    let points = shape.points_reference("/shape", errors);
+    match &shape {
+        Shape::Points { .. } => {}
+        known => match known.surface::<D>("/shape") {
+            Ok(surface) => errors.extend(check_size(surface.as_ref(), lengths, &shape)),
+            Err(found) => errors.extend(found),
         },
-        is_adaptive: given_step.is_none() && written.steps.is_none(),
-        rest_below: written.stop_when.map(|Stop::AtRest { velocity }| velocity),
-    };
-    let (limit, bound) = longest_step(&parts, REFERENCE_SPEED);
-    let time_step = match (given_step, written.steps) {
-        (Some(step), _) => step,
-        (None, Some(steps)) => written.end_time / steps as f64,
-        // A whole number of steps to a unit of time, whatever the end: a later end repeats the same steps.
-        (None, None) => 1.0 / (1.0 / limit).ceil(),
-    };
-    let steps = (written.end_time / time_step - 1e-9).ceil();
-    if !(time_step.is_normal() && (1.0..=1e9).contains(&steps)) {
-        let detail = "the run would have too many steps or none";
-        let allowed = json!(format!("a number from {:e} to {:e}", written.end_time * 1e-9, written.end_time));
-        violations.push(Violation::new("/time_step", "range", detail, &json!(time_step), allowed));
     }
-    let domain = domain_of(&low, &lengths);
-    if violations.is_empty()
-        && let Err(error) = Pencils::<D>::new(&domain, parts.reach())
+    spec.shape = Some(shape.clone());
+    Some((shape, points))
+}
+
+/// 1. Box. 2. Shape. 3. Flow, geometry and forces. 4. Time step. 5. What they mean together.
+fn plan<const D: usize>(mut spec: Droplet) -> Planned {
+    let mut errors = Vec::new();
+    let case = Case::new(spec.case, D, spec.spacing);
+    let corners = spec.domain.get_or_insert_with(|| case.domain.clone()).clone();
+    let Sides { low, high, counts } = sides::<D>(&spec, &corners, &mut errors);
+    let lengths = high - low;
+    let shape = drop_shape(&mut spec, &case, &lengths, &mut errors);
+    let flow = FlowPlan::new(&mut spec, &case, &mut errors);
+    let geometry = geometry(&mut spec, &case, D, flow.smoothing_h).map_err(|error| errors.push(error)).ok();
+    let given_step = spec.time_step.or(if spec.steps.is_none() { case.time_step } else { None });
+    let parts = sph_parts(&mut spec, &case, flow, geometry, given_step, &mut errors);
+    let (time_step, steps, bound) = time_step(&spec, &parts, given_step, &mut errors);
+    if errors.is_empty()
+        && let Err(error) = Pencils::<D>::new(&domain_of(&low, &lengths), parts.reach())
     {
-        violations.push(Violation::new("/domain", "range", error.to_string(), &resolved["domain"], json!(error.least)));
+        let got = corners.to_json();
+        errors.push(Violation::new("/domain", "range", error.to_string(), got, error.least));
     }
-    if !violations.is_empty() {
-        return Err(violations);
-    }
+    let Some((shape, points)) = shape.filter(|_| errors.is_empty()) else {
+        return Err(errors);
+    };
     let mut chosen = BTreeMap::new();
     if parts.is_adaptive {
         let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {REFERENCE_SPEED}");
         chosen.insert("time_step", why);
     }
-    for (name, value) in [
-        ("dimension", json!(D)),
-        ("shape", shape.clone()),
-        ("domain", json!({"low": corners.low, "high": corners.high})),
-        ("surface_tension", json!(parts.tension)),
-        ("discretization", flow.full),
-        ("density_method", flow.full_density),
-        ("shifting", json!(shifting)),
-        ("body_force", force_json),
-    ] {
-        resolved[name] = value;
+    spec.dimension = Some(D);
+    if spec.steps.is_none() {
+        spec.time_step = given_step;
     }
-    if written.steps.is_none() {
-        resolved["time_step"] = json!(given_step);
-    }
-    Ok(Box::new(DropletScene {
-        resolved,
-        shape,
-        low,
-        high,
-        sides,
-        parts,
-        time_step,
-        steps: steps as u64,
-        end_time: written.end_time,
-        chosen,
-        clouds: of_points.into_iter().collect(),
-    }))
+    let clouds = points.into_iter().collect();
+    Ok(Box::new(DropletScene { spec, shape, low, high, sides: counts, parts, time_step, steps, chosen, clouds }))
 }
 
-/// A violation where the drop does not fit into the box.
-fn check_size<const D: usize>(surface: &dyn Surface<D>, lengths: &Vector<D>, shape: &Value) -> Option<Violation> {
+/// What the scheme is made of; the spec gets what was left open.
+fn sph_parts<const D: usize>(
+    spec: &mut Droplet,
+    case: &Case,
+    flow: FlowPlan,
+    geometry: Option<Geometry>,
+    given_step: Option<f64>,
+    errors: &mut Vec<Violation>,
+) -> SphParts<D> {
+    let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
+    let body_force = body_force(force, errors);
+    SphParts {
+        spacing: spec.spacing,
+        smoothing_length: flow.smoothing_h * spec.spacing,
+        kernel: flow.kernel,
+        inside: Fluid::from(&spec.fluids.inside),
+        outside: Fluid::from(&spec.fluids.outside),
+        tension: *spec.surface_tension.get_or_insert(case.tension),
+        tension_force: match spec.tension_force {
+            TensionWord::Balanced => TensionForce::Balanced,
+            TensionWord::Csf => TensionForce::Csf,
+        },
+        geometry: geometry.unwrap_or(Geometry::ColorField),
+        discretization: flow.discretization,
+        density: flow.density,
+        is_shifted: *spec.shifting.get_or_insert(flow.default_shifting) == Shifting::Pst,
+        body_force,
+        integrator: match spec.integrator {
+            IntegratorWord::KickDriftKick => Integrator::KickDriftKick,
+            IntegratorWord::PredictorCorrector => Integrator::PredictorCorrector,
+        },
+        is_adaptive: given_step.is_none() && spec.steps.is_none(),
+        rest_below: spec.stop_when.as_ref().map(|StopWhen::AtRest { velocity }| *velocity),
+    }
+}
+
+/// The time step, the number of steps, and what binds the step.
+fn time_step<const D: usize>(
+    spec: &Droplet,
+    parts: &SphParts<D>,
+    given_step: Option<f64>,
+    errors: &mut Vec<Violation>,
+) -> (f64, u64, &'static str) {
+    if let (Some(step), Some(_)) = (spec.time_step, spec.steps) {
+        let detail = "steps are given instead of a time step; give one of them";
+        errors.push(Violation::new("/time_step", "conflict", detail, step, Value::Null));
+    }
+    let (limit, bound) = longest_step(parts, REFERENCE_SPEED);
+    let time_step = match (given_step, spec.steps) {
+        (Some(step), _) => step,
+        (None, Some(steps)) => spec.end_time / steps as f64,
+        // A whole number of steps to a unit of time, whatever the end: a later end repeats the same steps.
+        (None, None) => 1.0 / (1.0 / limit).ceil(),
+    };
+    let steps = (spec.end_time / time_step - 1e-9).ceil();
+    if !(time_step.is_normal() && (1.0..=1e9).contains(&steps)) {
+        let detail = "the run would have too many steps or none";
+        let allowed = format!("a number from {:e} to {:e}", spec.end_time * 1e-9, spec.end_time);
+        errors.push(Violation::new("/time_step", "range", detail, time_step, allowed));
+    }
+    (time_step, steps as u64, bound)
+}
+
+/// An error where the drop does not fit into the box.
+fn check_size<const D: usize>(surface: &dyn Surface<D>, lengths: &Vector<D>, shape: &Shape) -> Option<Violation> {
     let (low, high) = surface.bounding_box();
     let fits = (high - low).iter().zip(lengths.iter()).all(|(size, length)| size < length);
     let detail = "the drop is as large as the box";
-    (!fits).then(|| Violation::new("/shape", "conflict", detail, shape, json!(lengths.as_slice())))
+    (!fits).then(|| Violation::new("/shape", "conflict", detail, shape.to_json(), json!(lengths.as_slice())))
 }
 
 fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Domain<D> {
@@ -278,7 +293,7 @@ impl<const D: usize> DropletScene<D> {
         self.sides.iter().map(|side| *side as u64).product()
     }
 
-    /// Centres of the cells of the box.
+    /// Centers of the cells of the box.
     fn positions(&self) -> Vec<Vector<D>> {
         let lengths = self.lengths();
         (0..self.count() as usize)
@@ -330,7 +345,10 @@ impl<const D: usize> DropletScene<D> {
         let points: Vec<Vector<D>> = points.iter().map(|x| domain.wrap(*x)).collect();
         let method = match &self.parts.geometry {
             Geometry::Pcp { method, .. } => method.clone(),
-            Geometry::ColorField => pcp_parameters::defaults(D, RATIO)?,
+            Geometry::ColorField => {
+                let context = PcpContext { pointer: "/geometry", dimension: D, default_ratio: RATIO };
+                PcpSpec::default().plan(context)?.0
+            }
         };
         let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.parts.spacing)));
         let never = Interrupt::default();
@@ -338,7 +356,7 @@ impl<const D: usize> DropletScene<D> {
             surface.detect(&points, &level, &never).and_then(|()| surface.fit_samples(&points, &level, None, &never));
         if fitted.is_err() || surface.is_lost() {
             let detail = "phi of the points has no zero between them".to_owned();
-            return Err(Violation::new("/shape", "data", detail, &Value::Null, json!("PointData/phi of both signs")));
+            return Err(Violation::new("/shape", "data", detail, Value::Null, json!("PointData/phi of both signs")));
         }
         let distance = |x: &Vector<D>| {
             let foot = surface.query(x, f64::INFINITY)?;
@@ -349,8 +367,20 @@ impl<const D: usize> DropletScene<D> {
 }
 
 impl<const D: usize> Scene for DropletScene<D> {
+    fn kind(&self) -> &'static str {
+        super::KIND.kind
+    }
+
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn spacing(&self) -> Option<f64> {
+        Some(self.spec.spacing)
+    }
+
     fn resolved(&self) -> Value {
-        self.resolved.clone()
+        scene::resolved(super::KIND.kind, &self.spec)
     }
 
     fn field_names(&self) -> Vec<&'static str> {
@@ -452,7 +482,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let domain = domain_of(&self.low, &lengths);
         let positions = self.positions();
         let (level, measure) = if self.clouds.is_empty() {
-            let surface = shapes::surface::<D>(&self.shape, "/shape")?;
+            let surface = self.shape.surface::<D>("/shape")?;
             (self.levels(surface.as_ref(), &positions), surface.measure())
         } else {
             (self.levels_of_points(&context, &positions).map_err(|found| vec![found])?, f64::NAN)
@@ -460,11 +490,11 @@ impl<const D: usize> Scene for DropletScene<D> {
         let cell = lengths.product() / self.count() as f64;
         let drop = Drop { positions, level, measure };
         let system = SphSystem::new(self.parts.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
-            vec![Violation::new("/domain", "range", error.to_string(), &self.resolved["domain"], json!(error.least))]
+            vec![Violation::new("/domain", "range", error.to_string(), self.spec.domain.to_json(), error.least)]
         })?;
         let (plan, clock) = (context.plan, context.cpu_clock);
         let chosen = self.chosen.clone();
-        Ok(Box::new(WeaklyCompressibleSph::new(system, self.time_step, self.end_time, plan, clock, chosen)))
+        Ok(Box::new(WeaklyCompressibleSph::new(system, self.time_step, self.spec.end_time, plan, clock, chosen)))
     }
 }
 
@@ -472,7 +502,7 @@ impl<const D: usize> DropletScene<D> {
     /// Particles within a band of this width about the drop, about: that of a ball of its measure, which is taken for a fifth of the
     /// box where it is not known.
     fn near(&self, width: f64) -> f64 {
-        let surface = shapes::surface::<D>(&self.shape, "/shape");
+        let surface = self.shape.surface::<D>("/shape");
         let measure = surface.map_or_else(|_| self.lengths().product() / 5.0, |surface| surface.measure());
         let area = if D == 2 {
             2.0 * (std::f64::consts::PI * measure).sqrt()

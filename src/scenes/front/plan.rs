@@ -1,24 +1,25 @@
-//! From parameters to a front and what moves it.
+//! From the spec of a `front` scene to a front and what moves it.
 
-use super::parameters::{Law, Written};
+use super::spec::{Front, Law};
 use super::wavefront::{self, WavefrontScene};
 use crate::geometry::Vector;
 use crate::geometry::flows::Stretch;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
-use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
 use crate::scenes::curvature_stability::longest_step;
 use crate::scenes::flow_work::{error_units, path_units, stretch};
-use crate::scenes::flows::flow;
-use crate::scenes::gbpm_parameters::{self, Chosen, Motion};
+use crate::scenes::gbpm_spec::{GbpmContext, GbpmPlan, GbpmSpec, Motion, TopologyWord};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
-use crate::scenes::{shapes, work_estimate};
+use crate::scenes::shapes::Shape;
+use crate::scenes::work_estimate;
 use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::grid_based_particle::{
     self as gbpm, ExactFrontMotion, FrontParts, FrontSystem, Grid, GridBasedParticles,
 };
 use crate::simulation::{OutputPlan, Simulation};
+use crate::spec::Violation;
 use crate::time::{FixedStep, PathIntegrator};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -48,141 +49,198 @@ const MOST_STEPS: u64 = 1_000_000_000;
 /// What a front is given by, of whatever kind of scene.
 pub(in crate::scenes) struct FrontChoice {
     pub law: Law,
-    pub shape: Value,
+    pub shape: Shape,
     pub spacing: f64,
     pub end_time: f64,
     pub time_step: Option<f64>,
     pub steps: Option<u64>,
     pub integrator: PathIntegrator,
+    pub method: GbpmSpec,
+    /// None where the scene has no choice: segments merge.
+    pub topology: Option<TopologyWord>,
     /// Where the parameters of the method are.
     pub pointer: &'static str,
 }
 
+/// What was left open in a [`FrontChoice`].
+pub(in crate::scenes) struct Completed {
+    pub dimension: usize,
+    pub time_step: f64,
+    pub method: GbpmSpec,
+}
+
+/// The kind of a scene and its resolved parameters.
+type Resolved = (&'static str, Value);
+
 struct FrontScene<const D: usize, const M: usize> {
-    resolved: Value,
+    resolved: Resolved,
     choice: FrontChoice,
-    chosen: Chosen,
+    chosen: GbpmPlan,
     fixed: FixedStep,
 }
 
-pub(super) fn understand(parameters: &Value) -> Understood {
-    let written: Written = serde_json::from_value(parameters.clone())
-        .map_err(|error| vec![Violation::new("", "type", error.to_string(), parameters, Value::Null)])?;
-    let choice = FrontChoice {
-        law: written.law,
-        shape: written.shape,
-        spacing: written.spacing,
-        end_time: written.end_time,
-        time_step: written.time_step,
-        steps: None,
-        integrator: written.integrator.path(),
-        pointer: "",
-    };
-    understand_choice(choice, written.dimension, parameters.clone())
+impl SceneSpec for Front {
+    fn plan(self) -> Planned {
+        let choice = FrontChoice {
+            law: self.law.clone(),
+            shape: self.shape.clone(),
+            spacing: self.spacing,
+            end_time: self.end_time,
+            time_step: self.time_step,
+            steps: None,
+            integrator: self.integrator.path_integrator(),
+            method: self.method.clone(),
+            topology: Some(self.topology),
+            pointer: "",
+        };
+        plan_front(choice, self.dimension, |completed| {
+            let full = Front {
+                dimension: Some(completed.dimension),
+                time_step: Some(completed.time_step),
+                method: completed.method,
+                ..self
+            };
+            (super::KIND.kind, scene::resolved(super::KIND.kind, &full))
+        })
+    }
 }
 
-/// A front from its choices; `resolved` has the parameters of the method at the pointer.
-pub(in crate::scenes) fn understand_choice(
+/// A front from its choices; `complete` writes what was left open into the spec that they came from.
+pub(in crate::scenes) fn plan_front(
     choice: FrontChoice,
     dimension: Option<usize>,
-    resolved: Value,
-) -> Understood {
-    match dimension.or_else(|| shapes::implied_dimension(&choice.shape)).unwrap_or(2) {
-        3 => scene::<3, 2>(choice, resolved),
-        _ => scene::<2, 1>(choice, resolved),
+    complete: impl FnOnce(Completed) -> Resolved,
+) -> Planned {
+    match dimension.or_else(|| choice.shape.dimension()).unwrap_or(2) {
+        3 => plan::<3, 2>(choice, complete),
+        _ => plan::<2, 1>(choice, complete),
     }
 }
 
-fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Value) -> Understood {
-    let mut violations = Vec::new();
-    if choice.shape["type"] == "points" {
+/// 1. Shape. 2. Law. 3. Method. 4. Grid. 5. Time step.
+fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOnce(Completed) -> Resolved) -> Planned {
+    let mut errors = Vec::new();
+    if let Shape::Points { .. } = choice.shape {
         let detail = "a front starts from a shape that is known exactly";
         let allowed = json!(["circle", "sphere", "ellipse", "box", "union", "…"]);
-        return Err(vec![Violation::new("/shape/type", "conflict", detail, &json!("points"), allowed)]);
+        return Err(vec![Violation::new("/shape/type", "conflict", detail, "points", allowed)]);
     }
-    let surface = shapes::surface::<D>(&choice.shape, "/shape");
-    let top = match (&surface, &choice.law) {
-        (Ok(surface), Law::Flow { flow: of }) => {
-            let (low, high) = surface.bounding_box();
-            flow::<D>(of).map_or_else(
-                |found| {
-                    violations.push(at_law(found, choice.pointer));
-                    0.0
-                },
-                |flow| flow.top_speed(&low, &high),
-            )
-        }
-        (_, Law::Normal { speed } | Law::GeometricalOptics { speed }) => speed.abs(),
-        _ => 0.0,
-    };
+    let surface = choice.shape.surface::<D>("/shape");
     match &surface {
-        Ok(surface) => violations.extend(check_extent(surface.as_ref(), 4.0 * choice.spacing, choice.spacing)),
-        Err(found) => violations.extend(found.iter().cloned()),
+        Ok(surface) => errors.extend(check_extent(surface.as_ref(), 4.0 * choice.spacing, choice.spacing)),
+        Err(found) => errors.extend(found.iter().cloned()),
     }
+    let flow = match &choice.law {
+        Law::Flow { flow } => flow.flow::<D>().map_err(|found| errors.push(at_law(found, choice.pointer))).ok(),
+        _ => None,
+    };
     let wavefront = match &choice.law {
-        Law::GeometricalOptics { speed } => Some(wavefront::of_shape(&choice.shape, *speed)),
-        _ => None,
-    };
-    violations.extend(wavefront.iter().filter_map(|front| front.as_ref().err().cloned()));
-    let turn = match &choice.law {
-        Law::Flow { flow: of } => flow::<D>(of).ok().and_then(|flow| flow.return_time()),
-        _ => None,
-    };
-    let motion = match &choice.law {
-        Law::Flow { .. } => Motion::Flow,
-        Law::MeanCurvature => Motion::Curvature,
-        Law::Normal { .. } | Law::GeometricalOptics { .. } => Motion::Speed,
-    };
-    let is_by_curvature = motion == Motion::Curvature;
-    if is_by_curvature && let PathIntegrator::Dopri5 { .. } = choice.integrator {
-        let detail = "error control is for prescribed flows";
-        let allowed = json!(["rk4", "tvd_rk2"]);
-        violations.push(Violation::new("/integrator/type", "conflict", detail, &json!("dopri5"), allowed));
-    }
-    let method_json = resolved.pointer(choice.pointer).cloned().unwrap_or_default();
-    let written: gbpm_parameters::Written = serde_json::from_value(method_json.clone())
-        .map_err(|error| vec![Violation::new(choice.pointer, "type", error.to_string(), &method_json, Value::Null)])?;
-    let understood = gbpm_parameters::understand(&written, &method_json, choice.pointer, D, motion);
-    let given = [written.cfl.is_some(), choice.time_step.is_some(), choice.steps.is_some()];
-    if given.iter().filter(|is_given| **is_given).count() > 1 {
-        let detail = "a step is given in more than one way; give one of cfl, time_step and steps";
-        let at = if written.cfl.is_some() { format!("{}/cfl", choice.pointer) } else { "/time_step".to_owned() };
-        let got = if written.cfl.is_some() { json!(written.cfl) } else { json!(choice.time_step) };
-        violations.push(Violation::new(at, "conflict", detail, &got, Value::Null));
-    }
-    if is_by_curvature && written.cfl.is_some() {
-        let detail = "motion by curvature has no speed to measure a step by; give time_step";
-        violations.push(Violation::new("/cfl", "conflict", detail, &json!(written.cfl), Value::Null));
-    }
-    let finest = Grid { spacing: choice.spacing }.spacing_at(written.levels() - 1);
-    let is_inside = match (&surface, &wavefront) {
-        (_, Some(Ok(front))) => {
-            let is_short = front.length() < MOST_CURVE * choice.spacing;
-            is_short && is_within_grid(front.bounding_box(choice.end_time), choice.spacing, written.levels())
+        Law::GeometricalOptics { speed } => {
+            wavefront::from_shape(&choice.shape, *speed).map_err(|found| errors.push(found)).ok()
         }
-        (Ok(surface), None) => is_within_grid(surface.bounding_box(), choice.spacing, written.levels()),
+        _ => None,
+    };
+    let motion = motion(&choice.law);
+    let topology = choice.topology.unwrap_or(TopologyWord::Merge);
+    let context = GbpmContext { pointer: choice.pointer, dimension: D, motion, topology };
+    let planned = choice.method.clone().plan(context);
+    check_steps(&choice, motion, &mut errors);
+    let levels = choice.method.levels();
+    let is_inside = match (&surface, &choice.law, &wavefront) {
+        (_, Law::GeometricalOptics { .. }, Some(front)) => {
+            let is_short = front.length() < MOST_CURVE * choice.spacing;
+            is_short && is_within_grid(front.bounding_box(choice.end_time), choice.spacing, levels)
+        }
+        (Ok(surface), law, _) if !matches!(law, Law::GeometricalOptics { .. }) => {
+            is_within_grid(surface.bounding_box(), choice.spacing, levels)
+        }
         _ => true,
     };
     if !is_inside {
         let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
-        violations.push(Violation::new("/spacing", "range", detail, &json!(choice.spacing), json!("a larger number")));
+        errors.push(Violation::new("/spacing", "range", detail, choice.spacing, json!("a larger number")));
     }
-    let factor = longest_step(choice.integrator, D, written.degree_for(D, motion), written.weight_for(D, motion));
+    let top = match (&surface, &flow) {
+        (Ok(surface), Some(flow)) => {
+            let (low, high) = surface.bounding_box();
+            flow.top_speed(&low, &high)
+        }
+        _ => 0.0,
+    };
+    let turn = flow.as_ref().and_then(|flow| flow.return_time());
+    let fixed = fixed_step(&choice, D, motion, top, turn, &mut errors);
+    let (chosen, method) = match planned {
+        Ok(planned) if errors.is_empty() => planned,
+        Ok(_) => return Err(errors),
+        Err(found) => {
+            errors.extend(found);
+            return Err(errors);
+        }
+    };
+    let resolved = complete(Completed { dimension: D, time_step: fixed.time_step, method });
+    Ok(match wavefront {
+        Some(front) => Box::new(WavefrontScene { resolved, choice, chosen, fixed, front }),
+        None => Box::new(FrontScene::<D, M> { resolved, choice, chosen, fixed }),
+    })
+}
+
+fn motion(law: &Law) -> Motion {
+    match law {
+        Law::Flow { .. } => Motion::Flow,
+        Law::MeanCurvature => Motion::Curvature,
+        Law::Normal { .. } | Law::GeometricalOptics { .. } => Motion::Speed,
+    }
+}
+
+/// Ways to give a step that do not go together, or not with the motion.
+fn check_steps(choice: &FrontChoice, motion: Motion, errors: &mut Vec<Violation>) {
+    let cfl = choice.method.cfl;
+    let is_by_curvature = motion == Motion::Curvature;
+    if is_by_curvature && let PathIntegrator::Dopri5 { .. } = choice.integrator {
+        let detail = "error control is for prescribed flows";
+        errors.push(Violation::new("/integrator/type", "conflict", detail, "dopri5", json!(["rk4", "tvd_rk2"])));
+    }
+    let given = [cfl.is_some(), choice.time_step.is_some(), choice.steps.is_some()];
+    if given.iter().filter(|is_given| **is_given).count() > 1 {
+        let detail = "a step is given in more than one way; give one of cfl, time_step and steps";
+        let at = if cfl.is_some() { format!("{}/cfl", choice.pointer) } else { "/time_step".to_owned() };
+        errors.push(Violation::new(at, "conflict", detail, json!(cfl.or(choice.time_step)), Value::Null));
+    }
+    if is_by_curvature && let Some(cfl) = cfl {
+        let detail = "motion by curvature has no speed to measure a step by; give time_step";
+        errors.push(Violation::new("/cfl", "conflict", detail, cfl, Value::Null));
+    }
+}
+
+/// The step: as given, else the longest that the law allows.
+fn fixed_step(
+    choice: &FrontChoice,
+    dimension: usize,
+    motion: Motion,
+    top: f64,
+    turn: Option<f64>,
+    errors: &mut Vec<Violation>,
+) -> FixedStep {
+    let method = &choice.method;
+    let finest = Grid { spacing: choice.spacing }.spacing_at(method.levels() - 1);
+    let (degree, weight) = (method.degree_for(dimension, motion), method.weight_for(dimension, motion));
+    let factor = longest_step(choice.integrator, dimension, degree, weight);
     let longest = factor * finest * finest;
-    if is_by_curvature && let Some(step) = choice.time_step.filter(|step| *step > longest) {
+    if motion == Motion::Curvature
+        && let Some(step) = choice.time_step.filter(|step| *step > longest)
+    {
         let detail =
             format!("motion by curvature is unstable with steps longer than {factor:.3} h² (of the finest level)");
-        let allowed = json!(format!("a number ≤ {longest:e}"));
-        violations.push(Violation::new("/time_step", "range", detail, &json!(step), allowed));
+        errors.push(Violation::new("/time_step", "range", detail, step, format!("a number ≤ {longest:e}")));
     }
     let limit = match &choice.law {
         Law::MeanCurvature => CURVATURE_STEP.min(factor) * finest * finest,
         Law::Flow { .. } => {
-            let by_speed = written.cfl.unwrap_or(FLOW_CFL) * finest / top;
+            let by_speed = method.cfl.unwrap_or(FLOW_CFL) * finest / top;
             turn.map_or(by_speed, |turn| by_speed.min(turn / STEPS_A_TURN))
         }
-        Law::Normal { .. } => written.cfl.unwrap_or(SPEED_CFL) * finest / top,
-        Law::GeometricalOptics { .. } => written.cfl.unwrap_or(RAY_CFL) * finest / top,
+        Law::Normal { speed } => method.cfl.unwrap_or(SPEED_CFL) * finest / speed.abs(),
+        Law::GeometricalOptics { speed } => method.cfl.unwrap_or(RAY_CFL) * finest / speed.abs(),
     };
     let fixed = match (choice.time_step, choice.steps) {
         (Some(step), _) => FixedStep::from_time_step(choice.end_time, step),
@@ -190,37 +248,15 @@ fn scene<const D: usize, const M: usize>(choice: FrontChoice, mut resolved: Valu
         (None, None) => landing_on_turns(FixedStep::from_limit(choice.end_time, limit), choice.end_time, turn),
     };
     if !fixed.time_step.is_normal() || fixed.steps == 0 || fixed.steps > MOST_STEPS {
-        let allowed = json!(format!("a number from {} to {}", choice.end_time * 1e-9, choice.end_time));
+        let allowed = format!("a number from {} to {}", choice.end_time * 1e-9, choice.end_time);
         let detail = "the run would have too many steps or none";
-        violations.push(Violation::new("/time_step", "range", detail, &json!(fixed.time_step), allowed));
+        errors.push(Violation::new("/time_step", "range", detail, json!(fixed.time_step), allowed));
     }
-    let (chosen, full) = match understood {
-        Ok(understood) if violations.is_empty() => understood,
-        Ok(_) => return Err(violations),
-        Err(found) => {
-            violations.extend(found);
-            return Err(violations);
-        }
-    };
-    if let Some(place) = resolved.pointer_mut(choice.pointer) {
-        *place = full;
-        if let Some(map) = place.as_object_mut() {
-            map.shift_remove("cfl");
-        }
-    }
-    resolved["dimension"] = json!(D);
-    resolved["time_step"] = json!(fixed.time_step);
-    if let Some(map) = resolved.as_object_mut() {
-        map.shift_remove("steps");
-    }
-    Ok(match wavefront {
-        Some(Ok(front)) => Box::new(WavefrontScene { resolved, choice, chosen, fixed, front }),
-        _ => Box::new(FrontScene::<D, M> { resolved, choice, chosen, fixed }),
-    })
+    fixed
 }
 
 /// What a report says of the method; `in_bends` is how many particles the quadratics of sharp bends have, where these have their own.
-pub(super) fn labels(chosen: &Chosen, fixed: FixedStep, in_bends: Option<usize>) -> BTreeMap<&'static str, String> {
+pub(super) fn labels(chosen: &GbpmPlan, fixed: FixedStep, in_bends: Option<usize>) -> BTreeMap<&'static str, String> {
     let method = &chosen.method;
     let mut reconstruction = format!(
         "degree {}, {} particles, weight {}, that of normals {}, normals to {}",
@@ -268,10 +304,10 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
         Ok(match &self.choice.law {
             Law::Normal { speed } => gbpm::Law::Normal { speed: *speed },
             Law::MeanCurvature => gbpm::Law::MeanCurvature,
-            Law::Flow { flow: of } => gbpm::Law::Flow(flow::<D>(of).map_err(|found| vec![found])?),
+            Law::Flow { flow } => gbpm::Law::Flow(flow.flow::<D>().map_err(|found| vec![found])?),
             Law::GeometricalOptics { .. } => {
                 let detail = "a wave front is a curve, not a surface of this dimension";
-                return Err(vec![Violation::new("/law/type", "conflict", detail, &Value::Null, Value::Null)]);
+                return Err(vec![Violation::new("/law/type", "conflict", detail, Value::Null, Value::Null)]);
             }
         })
     }
@@ -287,7 +323,7 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             segments: self.chosen.segments,
             interrupt,
         };
-        let surfaces = shapes::parts::<D>(&self.choice.shape, "/shape")?;
+        let surfaces = self.choice.shape.parts::<D>("/shape")?;
         Ok(FrontSystem::about(&surfaces, parts))
     }
 
@@ -295,14 +331,14 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
     fn stretch(&self) -> Stretch {
         let none = Stretch::NONE;
         match &self.choice.law {
-            Law::Flow { flow: of } => match (shapes::surface::<D>(&self.choice.shape, "/shape"), flow::<D>(of)) {
+            Law::Flow { flow } => match (self.choice.shape.surface::<D>("/shape"), flow.flow::<D>()) {
                 (Ok(surface), Ok(flow)) => flow
                     .typical_stretch()
                     .unwrap_or_else(|| stretch(surface.as_ref(), flow.as_ref(), self.choice.end_time)),
                 _ => none,
             },
             Law::Normal { speed } if *speed > 0.0 => {
-                let parts = shapes::parts::<D>(&self.choice.shape, "/shape").unwrap_or_default();
+                let parts = self.choice.shape.parts::<D>("/shape").unwrap_or_default();
                 let growth =
                     |(low, high): (Vector<D>, Vector<D>)| 1.0 + 2.0 * speed * self.choice.end_time / (high - low).max();
                 let most = parts.iter().map(|part| growth(part.bounding_box())).fold(1.0, f64::max).powi(D as i32 - 1);
@@ -315,17 +351,17 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
     fn exact(&self) -> Result<ExactFrontMotion<D>, Vec<Violation>> {
         let shape = &self.choice.shape;
         Ok(match &self.choice.law {
-            Law::Flow { flow: of } => {
-                let flow = flow::<D>(of).map_err(|found| vec![found])?;
-                ExactFrontMotion::Flow(ExactMotion::new(Some(shapes::surface::<D>(shape, "/shape")?), flow))
+            Law::Flow { flow } => {
+                let flow = flow.flow::<D>().map_err(|found| vec![found])?;
+                ExactFrontMotion::Flow(ExactMotion::new(Some(shape.surface::<D>("/shape")?), flow))
             }
             Law::Normal { speed } => ExactFrontMotion::Offset {
-                surfaces: shapes::parts::<D>(shape, "/shape")?,
+                surfaces: shape.parts::<D>("/shape")?,
                 speed: *speed,
                 topology: self.chosen.topology,
             },
             Law::MeanCurvature => {
-                shapes::ball::<D>(shape).map_or(ExactFrontMotion::Unknown, ExactFrontMotion::Shrinking)
+                shape.as_ball::<D>().map_or(ExactFrontMotion::Unknown, ExactFrontMotion::Shrinking)
             }
             Law::GeometricalOptics { .. } => ExactFrontMotion::Unknown,
         })
@@ -333,8 +369,20 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
 }
 
 impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
+    fn kind(&self) -> &'static str {
+        self.resolved.0
+    }
+
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn spacing(&self) -> Option<f64> {
+        Some(self.choice.spacing)
+    }
+
     fn resolved(&self) -> Value {
-        self.resolved.clone()
+        self.resolved.1.clone()
     }
 
     fn field_names(&self) -> Vec<&'static str> {
@@ -351,7 +399,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
         // On the coarsest level; where there are not many, as it is refined.
         let reach = self.chosen.method.tube_radius * self.choice.spacing;
-        let about = shapes::surface::<D>(&self.choice.shape, "/shape")
+        let about = self.choice.shape.surface::<D>("/shape")
             .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.choice.spacing));
         // Corners without foot-points matter where there are few.
         let counted = if about < COUNTED { self.system(Interrupt::default()).ok() } else { None };
@@ -380,8 +428,8 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
         let number = particles as f64 * self.stretch().mean * steps as f64;
-        let exact = match (&self.choice.law, shapes::surface::<D>(&self.choice.shape, "/shape")) {
-            (Law::Flow { flow: of }, Ok(surface)) => flow::<D>(of).map_or(0.0, |flow| {
+        let exact = match (&self.choice.law, self.choice.shape.surface::<D>("/shape")) {
+            (Law::Flow { flow }, Ok(surface)) => flow.flow::<D>().map_or(0.0, |flow| {
                 let finest = Grid { spacing: self.choice.spacing }.spacing_at(self.chosen.method.levels() - 1);
                 let beside = if D == 3 { PATHS_IN_SPACE * particles as f64 } else { 0.0 };
                 error_units(Some(surface.as_ref()), flow.as_ref(), finest, particles as f64, end_time)
@@ -405,10 +453,10 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         let system = self.system(context.interrupt)?;
         if system.particle_count() == 0 {
             let detail = "no grid point of this spacing has a foot-point on the shape";
-            return Err(vec![Violation::new("/spacing", "range", detail, &json!(self.choice.spacing), Value::Null)]);
+            return Err(vec![Violation::new("/spacing", "range", detail, self.choice.spacing, Value::Null)]);
         }
         let said = labels(&self.chosen, self.fixed, self.law()?.particles_in_bends());
-        let ball = shapes::ball::<D>(&self.choice.shape);
+        let ball = self.choice.shape.as_ball::<D>();
         Ok(Box::new(GridBasedParticles::new(system, self.exact()?, ball, self.fixed, context.cpu_clock, said)))
     }
 }

@@ -1,0 +1,252 @@
+//! The parameters of a `droplet` scene.
+
+use super::cases::Case;
+use crate::scenes::pcp_spec::{Neighborhood, PcpSpec};
+use crate::scenes::shapes::Shape;
+use crate::spec::{Coordinates, Given, Interval, NOT_NEGATIVE, POSITIVE, Preset, whole};
+
+crate::words! {
+    /// What starts.
+    pub enum CaseName {
+        /// an ellipse at rest
+        Oscillating = "oscillating",
+        /// a circle that a force tears apart
+        Dividing = "dividing",
+        /// a circle at rest
+        Static = "static",
+        /// any shape
+        Custom = "custom",
+    }
+}
+
+crate::group! {
+    /// The corners of the box.
+    pub struct Corners {
+        /// lower corner
+        low: Coordinates;
+        /// upper corner
+        high: Coordinates;
+    }
+}
+
+crate::group! {
+    /// A fluid.
+    pub struct FluidSpec: Default {
+        /// density ρ₀ at rest
+        density: f64 = 1.0, in POSITIVE;
+        /// dynamic viscosity η
+        viscosity: f64 = 0.5, in NOT_NEGATIVE;
+        /// speed of sound c, at least ten times the largest speed to come
+        sound_speed: f64 = 100.0, in POSITIVE;
+        /// exponent γ of the equation of state
+        polytropic: f64 = 7.0, in Interval::at_least(1.0).and_at_most(20.0);
+    }
+}
+
+crate::group! {
+    /// The two fluids.
+    pub struct Fluids: Default {
+        /// the drop
+        inside: FluidSpec = FluidSpec::default();
+        /// the fluid around the drop
+        outside: FluidSpec = FluidSpec::default();
+    }
+}
+
+crate::words! {
+    /// The force of surface tension.
+    pub enum TensionWord {
+        /// −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet
+        Balanced = "balanced",
+        /// κ₀ = 0 (the paper)
+        Csf = "csf",
+    }
+}
+
+crate::choice! {
+    /// Where normals and curvatures come from.
+    pub enum GeometryChoice {
+        /// closest points of a level set that particles carry
+        Pcp = "pcp" {
+            /// width of the band in h; 4 ε/h + 1 when not given
+            band_h: Option<f64>, in POSITIVE;
+            /// parameters of the fits and queries
+            method: PcpSpec => flatten;
+        }
+        /// the smoothed color of the phases (PCP paper, eqs. B.5 to B.10)
+        Colorfield = "colorfield",
+    }
+}
+
+crate::words! {
+    /// The smoothing kernel W.
+    pub enum KernelWord {
+        /// Wendland C²
+        WendlandC2 = "wendland_c2",
+        /// Wendland C⁴
+        WendlandC4 = "wendland_c4",
+        /// cubic spline
+        CubicSpline = "cubic_spline",
+        /// quintic spline
+        QuinticSpline = "quintic_spline",
+    }
+}
+
+/// Smoothing lengths ε in h.
+const SMOOTHING: Interval = Interval::at_least(1.0).and_at_most(8.0);
+
+crate::choice! {
+    /// How the flow is discretized.
+    pub enum DiscretizationChoice {
+        /// smoothed particle hydrodynamics
+        Sph = "sph" {
+            /// the kernel W
+            kernel: KernelWord = KernelWord::WendlandC2;
+            /// smoothing length ε in h; by case when not given
+            smoothing_h: Option<f64>, in SMOOTHING;
+        }
+        /// DC-PSE: fits of polynomials about every particle for pressure gradient and viscosity, densities by continuity
+        Dcpse = "dcpse" {
+            /// 2 or 4: polynomials of degree 3 or 5
+            order: u64 = 2, in whole(2, 4);
+            /// radius of the fits in h; 3.5, of order 4 5.5, when not given; 3 is the paper's, with which particles crowd here
+            cutoff_h: Option<f64>, in Interval::at_least(2.0).and_at_most(8.0);
+            /// smoothing length ε in h; by case when not given
+            smoothing_h: Option<f64>, in SMOOTHING;
+        }
+    }
+}
+
+crate::choice! {
+    /// Where densities come from.
+    pub enum DensityChoice {
+        /// summation, with pressures in the volume form (PCP paper, eqs. B.1, B.2)
+        Summation = "summation",
+        /// continuity with diffusion, and pressures in the mass form (PCP paper, eqs. B.12 to B.14)
+        Continuity = "continuity" {
+            /// coefficient ξ̂ of the diffusion
+            diffusion: f64 = 0.05, in NOT_NEGATIVE;
+        }
+    }
+}
+
+crate::words! {
+    /// Particle shifting.
+    pub enum Shifting {
+        /// none
+        None = "none",
+        /// the particle-shifting technique (PCP paper, eqs. B.15, B.16)
+        Pst = "pst",
+    }
+}
+
+crate::choice! {
+    /// A force from outside.
+    pub enum ForceChoice {
+        /// none
+        None = "none",
+        /// along x on the inner fluid: F sin(πt/T) sin(πx/A) cos(πy/2B) (cos(πz/2C)) until T (PCP paper, eqs. 29, 30)
+        Pulse = "pulse" {
+            /// strength F
+            coefficient: f64;
+            /// duration T
+            duration: f64, in POSITIVE;
+            /// half the wave length along x
+            a as "A": f64 = 0.5, in POSITIVE;
+            /// a quarter of the wave length along y
+            b as "B": f64 = 0.5, in POSITIVE;
+            /// a quarter of the wave length along z
+            c as "C": f64 = 0.5, in POSITIVE;
+        }
+        /// the same acceleration everywhere
+        Constant = "constant" {
+            /// acceleration
+            acceleration: Coordinates;
+        }
+    }
+}
+
+crate::words! {
+    /// The integrator.
+    pub enum IntegratorWord {
+        /// one evaluation a step
+        KickDriftKick = "kick_drift_kick",
+        /// two evaluations a step (the paper's)
+        PredictorCorrector = "predictor_corrector",
+    }
+}
+
+crate::choice! {
+    /// An end before the end time.
+    pub enum StopWhen {
+        /// every speed has stayed below a bound for 50 steps
+        AtRest = "at_rest" {
+            /// the bound
+            velocity: f64, in POSITIVE;
+        }
+    }
+}
+
+crate::group! {
+    /// Two fluids with surface tension.
+    pub struct Droplet {
+        /// what starts: an ellipse at rest, a circle that a force tears apart, a circle at rest, or any shape
+        case: CaseName = CaseName::Oscillating;
+        /// 2 or 3; when not given, that of the shape, else 2
+        dimension: Option<usize>, in whole(2, 3);
+        /// the drop at the start; by case when not given
+        shape: Option<Shape>;
+        /// the box, periodic along every axis; by case when not given
+        domain: Option<Corners>;
+        /// distance h of neighboring particles; every side has round(L/h) of them
+        spacing: f64 = 0.031_25, in POSITIVE;
+        /// scene time at the end
+        end_time: f64 = 1.0, in POSITIVE => restart_safe;
+        /// time step Δt, kept whatever the speeds; when neither it nor steps is given, the longest stable one, cut into parts
+        /// where speeds ask for it
+        time_step: Option<f64>, in POSITIVE => restart_safe;
+        /// number of equal steps, instead of time_step
+        steps: Option<u64>, in whole(1, 1_000_000_000);
+        /// the fluids inside and outside
+        fluids: Fluids = Fluids::default();
+        /// surface tension τ; by case when not given; with 0 no interface is computed
+        surface_tension: Option<f64>, in NOT_NEGATIVE;
+        /// balanced: −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet; csf: κ₀ = 0 (the paper)
+        tension_force: TensionWord = TensionWord::Balanced;
+        /// where normals and curvatures come from
+        geometry: GeometryChoice = GeometryChoice::Pcp { band_h: None, method: PcpSpec::default() };
+        /// how the flow is discretized
+        discretization: DiscretizationChoice =
+            DiscretizationChoice::Sph { kernel: KernelWord::WendlandC2, smoothing_h: None };
+        /// where densities come from; by case when not given
+        density_method: Option<DensityChoice>;
+        /// particle shifting; by case when not given
+        shifting: Option<Shifting>;
+        /// a force from outside; by case when not given
+        body_force: Option<ForceChoice>;
+        /// kick_drift_kick: one evaluation a step; predictor_corrector: two (the paper's)
+        integrator: IntegratorWord = IntegratorWord::KickDriftKick;
+        /// an end before the end time
+        stop_when: Option<StopWhen>;
+    }
+}
+
+/// What sections 4.3 and 4.4 of the PCP paper state.
+pub(super) fn paper(given: Given) -> Preset {
+    let case = given.read(Droplet::case()).unwrap_or(CaseName::Oscillating);
+    let implied = given.read(Droplet::shape()).flatten().and_then(|shape| shape.dimension());
+    let dimension = given.read(Droplet::dimension()).flatten().or(implied).unwrap_or(2);
+    let spacing = given.read(Droplet::spacing()).filter(|h| *h > 0.0).unwrap_or(1.0 / 32.0);
+    let (degree, cutoff_h) = Case::new(case, dimension, spacing).fits;
+    let has_neighborhood = given.has_inside(Droplet::geometry(), PcpSpec::neighborhood())
+        || given.has_inside(Droplet::geometry(), PcpSpec::cutoff_h());
+    let neighborhood = (!has_neighborhood).then_some(Neighborhood::Radius { cutoff_h });
+    let method = PcpSpec::paper(degree, neighborhood, 1e-12, 1000);
+    let has_step = given.has(Droplet::steps()) || given.has(Droplet::time_step());
+    Preset::default()
+        .set(Droplet::tension_force(), TensionWord::Csf)
+        .set(Droplet::integrator(), IntegratorWord::PredictorCorrector)
+        .set(Droplet::geometry(), GeometryChoice::Pcp { band_h: None, method })
+        // 2e-4 at 1/32, 1e-4 at 1/64, 5e-5 at 1/128.
+        .set_if(!has_step && case != CaseName::Dividing, Droplet::time_step(), Some(2e-4 * 32.0 * spacing))
+}

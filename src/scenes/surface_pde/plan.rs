@@ -1,0 +1,550 @@
+//! From the spec of a `surface_pde` scene to points, a method and a problem. Points from outside are unknown until a run is
+//! built (`points`).
+
+use super::points;
+use super::problems::{self, ProblemChoice};
+use super::spec::{
+    EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, SurfaceChoice, SurfacePde,
+};
+use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
+use crate::geometry::random::CounterRandom;
+use crate::geometry::surfaces::{Ellipsoid, Torus};
+use crate::geometry::{Surface, Vector};
+use crate::operators::Support;
+use crate::operators::charts::tangent::Metric;
+use crate::point_clouds::{Bump, normals};
+use crate::scene::cloud::{CloudReference, CloudSizes};
+use crate::scene::work::PhaseWork;
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scenes::work_estimate;
+use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
+use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method, SurfaceCloud, SurfaceEquation};
+use crate::simulation::{OutputPlan, Simulation};
+use crate::spec::{Choice, Parameter, Violation};
+use crate::time::FixedStep;
+use serde_json::{Value, json};
+
+/// Where normals come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Normals {
+    Exact,
+    Estimated,
+    Perturbed {
+        sigma: f64,
+    },
+    /// With points from outside; estimated where they have none and nothing depends on it.
+    Given {
+        must_be_there: bool,
+    },
+}
+
+/// The method of the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Scheme {
+    Dcpse(Method),
+    Embedding { order: usize, spacing: f64 },
+}
+
+pub(super) struct SurfaceScene {
+    /// The spec as given, with the choice of normals: the method is planned again once points from outside are read.
+    pub given: SurfacePde,
+    /// The spec with everything filled in.
+    spec: SurfacePde,
+    shape: Shape,
+    count: u64,
+    sampling: Sampling,
+    pub normals: Normals,
+    scheme: Scheme,
+    problem: ProblemChoice,
+    pub fixed: FixedStep,
+    points: Option<CloudReference>,
+}
+
+/// Distances of points.
+const LENGTHS: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+
+/// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbours as there are functions, about; larger
+/// ones have larger errors (measured on plane waves). Points as drawn at random want more: with less, operators have growing modes.
+fn support(order: u64, is_curve: bool, is_copies: bool, sampling: Sampling) -> Option<(usize, f64)> {
+    let degree = match order {
+        2 | 4 | 6 => order as usize + 1,
+        _ => return None,
+    };
+    let is_raw = sampling == Sampling::Random { is_relaxed: false };
+    let cutoff = match (is_copies, is_curve, order) {
+        (true, true, _) => 4.1,
+        (true, false, _) => 2.9,
+        // On a curve neighbours lie in a row.
+        (false, true, 2) => 3.4,
+        (false, true, 4) => 5.4,
+        (false, true, _) => 7.4,
+        (false, false, _) if is_raw => 3.0 + 0.25 * order as f64,
+        (false, false, 2) => 2.4,
+        (false, false, 4) => 3.3,
+        (false, false, _) => 4.2,
+    };
+    Some((degree, cutoff))
+}
+
+impl SceneSpec for SurfacePde {
+    fn plan(self) -> Planned {
+        plan(self)
+    }
+}
+
+/// 1. Surface and points. 2. Normals. 3. Method and problem. 4. What they mean together. 5. Steps.
+fn plan(mut spec: SurfacePde) -> Planned {
+    let mut errors = Vec::new();
+    let points = match &spec.surface {
+        SurfaceChoice::Points { source } => source.reference("/surface", &mut errors),
+        _ => None,
+    };
+    let shape = shape(&spec, &mut errors);
+    let dimension = shape.dimension();
+    if let Some(given) = spec.dimension.filter(|given| *given != dimension) {
+        let detail = format!("this surface lies in {dimension} dimensions");
+        errors.push(Violation::new("/dimension", "conflict", detail, given, dimension));
+    }
+    spec.dimension = Some(dimension);
+    let normals = normals(&mut spec, &shape, &mut errors);
+    let given = spec.clone();
+    let count = spec.count.unwrap_or(DEFAULT_COUNT);
+    let sampling = surfaces::sampling(&mut spec, &shape, &mut errors);
+    let spacing = shape.spacing(count);
+    if !matches!(shape, Shape::Points(_)) && !LENGTHS.contains(&spacing) {
+        let detail = "the distance of points is too small or too large for its square to be a number";
+        let allowed = json!({"least": LENGTHS.start(), "most": LENGTHS.end()});
+        errors.push(Violation::new("/surface", "range", detail, json!(spacing), allowed));
+    }
+    let (scheme, problem) = choices(&mut spec, (&shape, sampling, count), &mut errors);
+    check_together(&given, &shape, scheme.as_ref(), problem.as_ref(), &mut errors);
+    let (Some(scheme), Some(problem)) = (scheme, problem.filter(|_| errors.is_empty())) else {
+        return Err(errors);
+    };
+    let fixed = match &problem {
+        ProblemChoice::LaplaceBeltrami { .. } => FixedStep { time_step: 1.0, steps: spec.repeat },
+        ProblemChoice::Poisson { .. } | ProblemChoice::Curvature { .. } => FixedStep { time_step: 1.0, steps: 1 },
+        ProblemChoice::Evolution { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
+    };
+    fill_in_steps(&mut spec.problem, &problem, fixed);
+    Ok(Box::new(SurfaceScene { given, spec, shape, count, sampling, normals, scheme, problem, fixed, points }))
+}
+
+/// What method, problem, solver and repetition do not go together with.
+fn check_together(
+    given: &SurfacePde,
+    shape: &Shape,
+    scheme: Option<&Scheme>,
+    problem: Option<&ProblemChoice>,
+    errors: &mut Vec<Violation>,
+) {
+    if let (Some(Scheme::Embedding { .. }), Some(problem)) = (scheme, problem) {
+        if shape.in_space().is_none() {
+            let detail = "the embedding method is for spheres, ellipsoids and tori";
+            errors.push(Violation::new("/method", "conflict", detail, "closest_point", json!(["surface_dcpse"])));
+        }
+        if !matches!(problem, ProblemChoice::LaplaceBeltrami { .. }) {
+            let detail = "the embedding method is for the operator applied to a field";
+            let allowed = json!(["laplace_beltrami"]);
+            errors.push(Violation::new("/problem", "conflict", detail, given.problem.name(), allowed));
+        }
+    }
+    let default = SolverChoice::default();
+    if problem.is_some_and(|problem| problem.solver().is_none()) && given.solver != default {
+        let detail = "this problem has no system of equations to solve: `poisson` and `bdf2` have";
+        errors.push(Violation::new("/solver", "conflict", detail, given.solver.to_json(), default.to_json()));
+    }
+    let is_applied = matches!(problem, Some(ProblemChoice::LaplaceBeltrami { .. }) | None);
+    if given.repeat > 1 && !is_applied {
+        let detail = "only `laplace_beltrami` is applied more than once";
+        errors.push(Violation::new("/repeat", "conflict", detail, given.repeat, 1));
+    }
+}
+
+/// Writes the planned steps into the spec of an evolution. A time step alone asks for steps of that length, so a tolerance that
+/// controls steps must be written out.
+fn fill_in_steps(spec: &mut ProblemSpec, planned: &ProblemChoice, fixed: FixedStep) {
+    let ProblemChoice::Evolution { integrator, .. } = planned else { return };
+    let controlled = match integrator {
+        EvolutionIntegrator::Controlled { tolerance } => Some(*tolerance),
+        _ => None,
+    };
+    match spec {
+        ProblemSpec::Diffusion { time_step, integrator, .. } => {
+            *time_step = Some(fixed.time_step);
+            if let EvolutionChoice::Dopri5 { tolerance } = integrator {
+                *tolerance = controlled;
+            }
+        }
+        ProblemSpec::ReactionDiffusion { time_step, tolerance, .. } => {
+            *time_step = Some(fixed.time_step);
+            *tolerance = controlled;
+        }
+        ProblemSpec::LaplaceBeltrami { .. } | ProblemSpec::Poisson { .. } | ProblemSpec::Curvature => {}
+    }
+}
+
+/// Method and problem for a shape and a number of points; again for points from outside, once they are read. The spec gets what
+/// was left open.
+pub(super) fn choices(
+    spec: &mut SurfacePde,
+    (shape, sampling, count): (&Shape, Sampling, u64),
+    errors: &mut Vec<Violation>,
+) -> (Option<Scheme>, Option<ProblemChoice>) {
+    let metric = match &spec.normals {
+        Some(NormalsChoice::Exact) => Metric::OfNormals,
+        Some(NormalsChoice::Perturbed { metric, .. } | NormalsChoice::Given { metric })
+            if *metric == MetricWord::Normals =>
+        {
+            Metric::OfNormals
+        }
+        _ => Metric::OfHeights,
+    };
+    let scheme = scheme(spec, Points { shape, sampling, count, metric }, errors);
+    (scheme, problems::plan(spec, shape, metric, errors))
+}
+
+/// Where normals come from; the spec gets the choice. The exact normals of points from outside are not known, and those of
+/// other surfaces are not given.
+fn normals(spec: &mut SurfacePde, shape: &Shape, errors: &mut Vec<Violation>) -> Normals {
+    let (default, allowed, detail) = match shape {
+        Shape::Points(_) => (
+            NormalsChoice::Given { metric: MetricWord::Heights },
+            ["given", "estimated"].as_slice(),
+            "the exact normals of points from outside are not known; `given` takes theirs",
+        ),
+        _ => (
+            NormalsChoice::Exact,
+            ["exact", "estimated", "perturbed"].as_slice(),
+            "the normals of this surface are known; only points from outside come with given ones",
+        ),
+    };
+    let chosen = spec.normals.get_or_insert(default);
+    if !allowed.contains(&chosen.name()) {
+        errors.push(Violation::new("/normals", "conflict", detail, chosen.name(), json!(allowed)));
+    }
+    match *chosen {
+        NormalsChoice::Exact => Normals::Exact,
+        NormalsChoice::Estimated => Normals::Estimated,
+        NormalsChoice::Perturbed { sigma, .. } => Normals::Perturbed { sigma },
+        NormalsChoice::Given { metric } => Normals::Given { must_be_there: metric == MetricWord::Normals },
+    }
+}
+
+fn shape(spec: &SurfacePde, errors: &mut Vec<Violation>) -> Shape {
+    let center = Vector::<3>::zeros();
+    match &spec.surface {
+        SurfaceChoice::Circle { radius } => Shape::Circle { radius: *radius },
+        SurfaceChoice::Sphere { radius } => {
+            Shape::Ellipsoid(Ellipsoid { center, semi_axes: Vector::<3>::repeat(*radius) })
+        }
+        SurfaceChoice::Ellipsoid { semi_axes } => {
+            let semi_axes = problems::vector_in_space(semi_axes, "/surface/semi_axes", errors);
+            Shape::Ellipsoid(Ellipsoid { center, semi_axes })
+        }
+        SurfaceChoice::Torus { major_radius, minor_radius } => {
+            if minor_radius >= major_radius {
+                let detail = "the tube must be thinner than its circle";
+                let (at, allowed) = ("/surface/minor_radius", json!({"below": major_radius}));
+                errors.push(Violation::new(at, "range", detail, *minor_radius, allowed));
+            }
+            Shape::Torus(Torus { center, major_radius: *major_radius, minor_radius: *minor_radius })
+        }
+        SurfaceChoice::Bump { height } => Shape::Bump(Bump { height: *height }),
+        SurfaceChoice::Points { .. } => Shape::Points(Extent::unknown(spec.dimension.unwrap_or(3))),
+    }
+}
+
+/// The points that operators are made on.
+#[derive(Clone, Copy)]
+struct Points<'a> {
+    shape: &'a Shape,
+    sampling: Sampling,
+    count: u64,
+    metric: Metric,
+}
+
+fn wrong_order(order: u64, allowed: Value) -> Violation {
+    Violation::new("/method/order", "range", "there is no method of this order", order, allowed)
+}
+
+fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) -> Option<Scheme> {
+    match &mut spec.method {
+        MethodSpec::ClosestPoint { order, spacing } => {
+            if *order != 2 && *order != 4 {
+                errors.push(wrong_order(*order, json!([2, 4])));
+            }
+            // The default of points from outside is not a wish for normals.
+            let default = NormalsChoice::Given { metric: MetricWord::Heights };
+            let is_wish = |normals: &&NormalsChoice| **normals != NormalsChoice::Exact && **normals != default;
+            if let Some(given) = spec.normals.as_ref().filter(is_wish) {
+                let detail = "the embedding method has exact closest points and asks for no normals";
+                errors.push(Violation::new("/normals", "conflict", detail, given.name(), json!(["exact"])));
+            }
+            let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
+            Some(Scheme::Embedding { order: *order as usize, spacing: grid })
+        }
+        MethodSpec::SurfaceDcpse { order, form: FormWord::Copies, cutoff_dn, layers, normal_spacing } => {
+            let (degree, default_cutoff) = points.support(*order, true, errors)?;
+            let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
+            let (default_layers, default_spacing) = points.copies();
+            let layers = *layers.get_or_insert(default_layers);
+            let apart = *normal_spacing.get_or_insert(default_spacing);
+            if points.metric == Metric::OfHeights || matches!(points.shape, Shape::Bump(_) | Shape::Points(_)) {
+                let detail = "copies along normals want exact normals and a closed surface";
+                errors.push(Violation::new("/method/form", "conflict", detail, "copies", json!(["intrinsic"])));
+            }
+            let support = Support { degree, radius: cutoff_dn * apart };
+            Some(Scheme::Dcpse(Method { support, form: Form::Copies { layers, spacing: apart } }))
+        }
+        MethodSpec::SurfaceDcpse { order, form: FormWord::Intrinsic, cutoff_dn, layers, normal_spacing } => {
+            let (degree, default_cutoff) = points.support(*order, false, errors)?;
+            let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
+            for (name, given) in [("layers", layers.to_json()), ("normal_spacing", normal_spacing.to_json())] {
+                if !given.is_null() {
+                    let (at, detail) = (format!("/method/{name}"), "there are no copies in the intrinsic form");
+                    errors.push(Violation::new(at, "conflict", detail, given, Value::Null));
+                }
+            }
+            points.check_fit(degree, cutoff_dn, errors);
+            let support = Support { degree, radius: cutoff_dn * points.shape.spacing(points.count) };
+            Some(Scheme::Dcpse(Method { support, form: Form::Intrinsic { metric: points.metric } }))
+        }
+    }
+}
+
+impl Points<'_> {
+    fn support(self, order: u64, is_copies: bool, errors: &mut Vec<Violation>) -> Option<(usize, f64)> {
+        let found = support(order, self.shape.is_curve(), is_copies, self.sampling);
+        if found.is_none() {
+            errors.push(wrong_order(order, json!([2, 4, 6])));
+        }
+        found
+    }
+
+    /// Layers of copies and their distance, where they are not given.
+    fn copies(self) -> (u32, f64) {
+        let layers = if self.shape.is_curve() { 4 } else { 2 };
+        match self.shape {
+            Shape::Circle { radius } => (layers, 3.0 * radius / (self.count as f64 - 1.0)),
+            shape => (layers, shape.spacing(self.count)),
+        }
+    }
+
+    /// Whether there are points and neighbors enough for fits of a degree.
+    fn check_fit(self, degree: usize, cutoff_dn: f64, errors: &mut Vec<Violation>) {
+        let is_curve = self.shape.is_curve();
+        let terms = if is_curve { degree as f64 } else { ((degree + 1) * (degree + 2) / 2 - 1) as f64 };
+        // Only points whose normals differ by less than 60° count: a quarter of a sphere, less where it is flat.
+        let least_count = (8.0 * terms).ceil();
+        if (self.count as f64) < least_count {
+            let detail = format!("a fit of {terms} functions wants {least_count} points at least on a closed surface");
+            let at = if let Shape::Points(_) = self.shape { "/surface" } else { "/count" };
+            errors.push(Violation::new(at, "range", detail, self.count, json!({"least": least_count})));
+        }
+        let least_cutoff = if is_curve { 0.6 * terms } else { (1.2 * terms / std::f64::consts::PI).sqrt() };
+        if cutoff_dn < least_cutoff {
+            let detail = format!("a support must hold the neighbors that a fit of {terms} functions needs");
+            let allowed = json!({"least": least_cutoff});
+            errors.push(Violation::new("/method/cutoff_dn", "range", detail, cutoff_dn, allowed));
+        }
+    }
+}
+
+impl SurfaceScene {
+    /// Entries of a row, about.
+    fn entries(&self, method: &Method) -> f64 {
+        let cutoff = method.support.radius / self.shape.spacing(self.count);
+        let is_curve = self.shape.is_curve();
+        1.0 + if is_curve { 2.0 * cutoff } else { std::f64::consts::PI * cutoff * cutoff }
+    }
+
+    /// Nodes of a fit, about.
+    fn nodes(&self, method: &Method) -> f64 {
+        let surface = self.entries(method);
+        match method.form {
+            Form::Intrinsic { .. } => surface,
+            Form::Copies { layers, .. } => surface * (1.0 + 1.6 * f64::from(layers)),
+        }
+    }
+
+    /// Steps of a controlled integrator to one of the scene, when stability binds them: 2 δn² by the diffusivity.
+    fn inner_steps(&self, count: u64) -> f64 {
+        let spacing = self.shape.spacing(count);
+        (self.fixed.time_step * self.problem.diffusivity() / (2.0 * spacing * spacing)).max(1.0)
+    }
+
+    /// Functions of a fit.
+    fn terms(&self, method: &Method) -> f64 {
+        let n = method.support.degree as f64;
+        let is_curve = self.shape.is_curve();
+        let coordinates = if is_curve { 1 } else { 2 } + usize::from(matches!(method.form, Form::Copies { .. }));
+        match coordinates {
+            1 => n,
+            2 => (n + 1.0) * (n + 2.0) / 2.0 - 1.0,
+            _ => (n + 1.0) * (n + 2.0) * (n + 3.0) / 6.0 - 1.0,
+        }
+    }
+
+    /// The cloud with the normals that operators are made with.
+    fn cloud<const D: usize>(
+        &self,
+        mut cloud: SurfaceCloud<D>,
+        radius: f64,
+    ) -> Result<SurfaceCloud<D>, Vec<Violation>> {
+        match self.normals {
+            Normals::Exact | Normals::Given { .. } => {}
+            Normals::Perturbed { sigma } => {
+                let random = CounterRandom::new(self.spec.seed ^ 0x6e6f_726d);
+                for (i, normal) in cloud.normals[..cloud.rows].iter_mut().enumerate() {
+                    let off = Vector::<D>::from_fn(|d, _| sigma * random.symmetric(&[i as i64, d as i64]));
+                    *normal = (*normal + off).normalize();
+                }
+            }
+            Normals::Estimated => {
+                let found = normals::estimate::<D>(&cloud.points, radius);
+                let found = found.map_err(|failed| {
+                    let refused =
+                        Violation::new("/normals", "data", failed.to_string(), "estimated", Value::Null);
+                    vec![refused]
+                })?;
+                cloud.normals = found;
+            }
+        }
+        Ok(cloud)
+    }
+}
+
+impl Scene for SurfaceScene {
+    fn kind(&self) -> &'static str {
+        super::KIND.kind
+    }
+
+    fn dimension(&self) -> usize {
+        self.shape.dimension()
+    }
+
+    fn spacing(&self) -> Option<f64> {
+        self.points.is_none().then(|| self.shape.spacing(self.count))
+    }
+
+    fn resolved(&self) -> Value {
+        scene::resolved(super::KIND.kind, &self.spec)
+    }
+
+    fn field_names(&self) -> Vec<&'static str> {
+        let mut names = self.problem.field_names(&self.shape);
+        names.extend(["normal", "particle_id"]);
+        if self.points.is_none() {
+            names.push("curvature");
+        }
+        names
+    }
+
+    fn clouds(&self) -> Vec<CloudReference> {
+        self.points.iter().cloned().collect()
+    }
+
+    fn estimate(&self, sizes: &CloudSizes) -> Estimate {
+        let particles = sizes.get("/surface").copied().unwrap_or_else(|| self.shape.points(self.count));
+        let points = particles as f64;
+        let memory = match &self.scheme {
+            // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
+            Scheme::Dcpse(method) => {
+                let entries = self.entries(method);
+                points * (250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, points))
+            }
+            Scheme::Embedding { order, spacing } => {
+                let area = points * self.shape.spacing(self.count).powi(2);
+                let bounds = self.shape.in_space().map(Surface::bounding_box);
+                points * 250.0 + bounds.map_or(0.0, |bounds| EmbeddingParts::memory(*order, *spacing, area, bounds))
+            }
+        };
+        Estimate {
+            particles,
+            steps: self.fixed.steps,
+            time_step: self.fixed.time_step,
+            end_time: self.fixed.clock(self.fixed.steps).time,
+            memory_bytes: memory as u64,
+        }
+    }
+
+    fn family(&self) -> String {
+        let dimension = self.shape.dimension();
+        let problem = self.problem.name();
+        match &self.scheme {
+            Scheme::Dcpse(Method { support, form: Form::Intrinsic { .. } }) => {
+                format!("surface_pde/{dimension}/intrinsic/{}/{problem}", support.degree)
+            }
+            Scheme::Dcpse(Method { support, .. }) => {
+                format!("surface_pde/{dimension}/copies/{}/{problem}", support.degree)
+            }
+            Scheme::Embedding { order, .. } => format!("surface_pde/{dimension}/embedding/{order}"),
+        }
+    }
+
+    fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
+        let Estimate { particles, steps, end_time, .. } = *estimate;
+        let points = particles as f64;
+        let mut work = match &self.scheme {
+            Scheme::Dcpse(method) => {
+                let (nodes, terms) = (self.nodes(method), self.terms(method));
+                let fit = nodes * (20.0 + 0.25 * terms * terms) + 0.02 * terms.powi(3);
+                let application = points * self.entries(method);
+                let mut work = vec![PhaseWork::at_moments("operators/construction", points * fit)];
+                work.extend(self.problem.work(application, points, steps as f64, self.inner_steps(particles)));
+                work
+            }
+            Scheme::Embedding { order, spacing } => {
+                let band = 2.0 * EmbeddingParts::half_band(*order) * (self.shape.spacing(self.count) / spacing).powi(2);
+                let stencil = (*order as f64 + 2.0).powi(3);
+                vec![
+                    PhaseWork::at_moments("operators/construction", points * band * (200.0 + stencil)),
+                    PhaseWork::every_step("operators/application", points * band * stencil * steps as f64),
+                ]
+            }
+        };
+        work.extend(work_estimate::around(points, steps, end_time, plan));
+        work
+    }
+
+    fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
+        if let Shape::Points(_) = self.shape {
+            return if self.shape.is_curve() {
+                points::build::<2, 1>(self, context)
+            } else {
+                points::build::<3, 2>(self, context)
+            };
+        }
+        let BuildContext { interrupt, cpu_clock, .. } = context;
+        match (&self.scheme, &self.shape) {
+            (Scheme::Dcpse(method), Shape::Circle { radius }) => {
+                let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.spec.seed);
+                let cloud = self.cloud(cloud, method.support.radius)?;
+                let problem = self.problem.build(&self.shape, &cloud, self.spec.seed, self.fixed.time_step)?;
+                Ok(Box::new(SurfaceEquation::<2, 1>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
+            }
+            (Scheme::Dcpse(method), shape) => {
+                let reach = method.support.radius;
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, reach, &interrupt);
+                let cloud = self.cloud(cloud, reach)?;
+                let problem = self.problem.build(shape, &cloud, self.spec.seed, self.fixed.time_step)?;
+                Ok(Box::new(SurfaceEquation::<3, 2>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
+            }
+            (Scheme::Embedding { order, spacing }, shape) => {
+                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, 0.0, &interrupt);
+                let Some((field, values, operated)) = self.problem.known(shape, &cloud) else { return Err(Vec::new()) };
+                let surface: Box<dyn Surface<3>> = match shape {
+                    Shape::Torus(torus) => Box::new(torus.clone()),
+                    Shape::Ellipsoid(ellipsoid) => Box::new(ellipsoid.clone()),
+                    Shape::Circle { .. } | Shape::Bump(_) | Shape::Points(_) => return Err(Vec::new()),
+                };
+                let parts = EmbeddingParts { order: *order, spacing: *spacing, repeats: self.fixed.steps };
+                let SurfaceCloud { points, normals, curvatures, .. } = cloud;
+                let data = SurfaceData { points, normals, curvatures, field: values, reference: operated };
+                let field = Box::new(move |x: &Vector<3>| field.value(x));
+                Ok(Box::new(EmbeddingClosestPoint::new(surface, field, data, parts, interrupt, cpu_clock)))
+            }
+        }
+    }
+}

@@ -1,0 +1,350 @@
+//! The parameters of a `surface_pde` scene.
+
+use crate::scene::cloud::PointsSource;
+use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Sign, whole};
+
+crate::choice! {
+    /// A surface about the origin.
+    pub enum SurfaceChoice {
+        /// a circle in the plane
+        Circle = "circle" {
+            /// radius R
+            radius: f64 = 1.0, in POSITIVE;
+        }
+        /// a sphere
+        Sphere = "sphere" {
+            /// radius R
+            radius: f64 = 1.0, in POSITIVE;
+        }
+        /// an ellipsoid; its Fibonacci points are those of the unit sphere, stretched
+        Ellipsoid = "ellipsoid" {
+            /// semi-axes along x, y and z
+            semi_axes: Coordinates = [1.0, 0.8, 0.75].into(), in Sign::Positive;
+        }
+        /// a torus about z
+        Torus = "torus" {
+            /// radius of the core circle
+            major_radius: f64 = 1.0, in POSITIVE;
+            /// radius of the tube, less than the major one
+            minor_radius: f64 = 0.4, in POSITIVE;
+        }
+        /// the square [−2, 2]² with a bump α ζ(|x − p|/r) of r = 0.25 at p = (−0.5, 0), edges without flux
+        Bump = "bump" {
+            /// height α
+            height: f64 = 1.0, in Interval::at_least(0.0).and_at_most(10.0);
+        }
+        /// points of a file (HDF5, PLY, OBJ, XYZ), with normals where it has some; nothing is known of it exactly
+        Points = "points" {
+            /// where the points come from
+            source: PointsSource => flatten;
+        }
+    }
+}
+
+crate::words! {
+    /// How points are spread.
+    pub enum SamplingWord {
+        /// equal areas, turned by the golden angle
+        Fibonacci = "fibonacci",
+        /// at equal angles, or on a lattice
+        Regular = "regular",
+        /// at random, relaxed
+        Random = "random",
+        /// at random, as drawn
+        RandomRaw = "random_raw",
+    }
+}
+
+crate::words! {
+    /// An axis of coordinates.
+    pub enum AxisWord {
+        /// x
+        X = "x",
+        /// y
+        Y = "y",
+        /// z
+        Z = "z",
+    }
+}
+
+crate::choice! {
+    /// A field on a surface.
+    pub enum FieldChoice {
+        /// real orthonormal Y_lm, on a sphere: m > 0 ∝ cos mφ, m < 0 ∝ sin |m|φ
+        SphericalHarmonic = "spherical_harmonic" {
+            /// degree
+            l: u32 = 4, in whole(1, 64);
+            /// order, a whole number from −l to l
+            m: f64 = 0.0, in Interval::at_least(-64.0).and_at_most(64.0);
+            /// the axis that angles are measured about
+            axis: AxisWord = AxisWord::Z;
+        }
+        /// sin(k·x), on any surface
+        PlaneWave = "plane_wave" {
+            /// wave vector; when not given, (2, −1, 3) by the extent of the surface
+            k: Option<Coordinates>;
+        }
+        /// sin mθ + cos mθ, on a circle
+        SinPlusCos = "sin_plus_cos" {
+            /// wave number, half the number of points at most
+            m: u64 = 1, in whole(1, 100_000_000);
+        }
+    }
+}
+
+crate::choice! {
+    /// A field at the start.
+    pub enum InitialChoice {
+        ..Field(FieldChoice)
+        /// ζ(|x − c|/σ)/σ² with ζ(d) = exp(−1/(1 − d²)) below d = 0.975 (Surface DC-PSE paper, section 4.4)
+        TruncatedGaussian = "truncated_gaussian" {
+            /// center c
+            center: Coordinates = [0.0, 0.0, 0.0].into();
+            /// width σ
+            sigma: f64 = 0.2, in POSITIVE;
+        }
+    }
+}
+
+crate::words! {
+    /// What makes the solution of a Poisson equation unique.
+    pub enum ConditionWord {
+        /// points next to the plane x = 0 (on a circle the one at (R, 0)) hold their value
+        Dirichlet = "dirichlet",
+        /// the solution has no mean
+        ZeroMean = "zero_mean",
+    }
+}
+
+crate::words! {
+    /// What holds at the edges of a surface.
+    pub enum EdgesWord {
+        /// no flux
+        Neumann = "neumann",
+    }
+}
+
+crate::choice! {
+    /// The integrator of time.
+    pub enum EvolutionChoice {
+        /// the pair of Dormand and Prince, explicit
+        Dopri5 = "dopri5" {
+            /// root mean square of the error of a step by 1 + |u|; 1e-7 when neither it nor Δt is given, steps of Δt when only
+            /// Δt is
+            tolerance: Option<f64>, in STEP_TOLERANCE;
+        }
+        /// the second backward differentiation formula, implicit; `solver` solves it
+        Bdf2 = "bdf2",
+    }
+}
+
+crate::choice! {
+    /// A reaction of two substances u and v.
+    pub enum ModelChoice {
+        /// −u v² + F (1 − u), u v² − (F + k) v
+        GrayScott = "gray_scott" {
+            /// feed rate F
+            feed: f64 = 0.04, in POSITIVE;
+            /// kill rate k
+            kill: f64 = 0.06, in POSITIVE;
+        }
+        /// a − (b + 1) u + u² v, b u − u² v
+        Brusselator = "brusselator" {
+            /// supply a
+            a: f64 = 3.0, in POSITIVE;
+            /// rate b
+            b: f64 = 9.0, in POSITIVE;
+        }
+    }
+}
+
+/// Tolerances of a step.
+const STEP_TOLERANCE: Interval = Interval::at_least(1e-14).and_at_most(1.0);
+
+crate::choice! {
+    /// What is computed.
+    pub enum ProblemSpec {
+        /// Δₛ of a field: `value` against `reference`
+        LaplaceBeltrami = "laplace_beltrami" {
+            /// the field; `spherical_harmonic` on spheres, `sin_plus_cos` on circles, else `plane_wave` when not given
+            field: Option<FieldChoice>;
+        }
+        /// Δₛ u = Δₛ of a field: `value` is u, `reference` the field; on points Δₛ u = the field less its mean
+        Poisson = "poisson" {
+            /// the field; `spherical_harmonic` on spheres, `sin_plus_cos` on circles, else `plane_wave` when not given
+            field: Option<FieldChoice>;
+            /// points next to the plane x = 0 (on a circle the one at (R, 0)) hold their value, or u has no mean
+            condition: ConditionWord = ConditionWord::ZeroMean;
+        }
+        /// ∂u/∂t = Δₛ u
+        Diffusion = "diffusion" {
+            /// u at the start; `truncated_gaussian` on bumps, else an eigenfunction, when not given
+            initial: Option<InitialChoice>;
+            /// end time T
+            end_time: f64 = 1.0, in POSITIVE;
+            /// time step Δt; when not given, a hundredth of T, which `dopri5` divides as its tolerance asks
+            time_step: Option<f64>, in POSITIVE;
+            /// integrator of time
+            integrator: EvolutionChoice = EvolutionChoice::Dopri5 { tolerance: None };
+            /// condition at the edges of a bump
+            edges: EdgesWord = EdgesWord::Neumann;
+        }
+        /// mean and Gauss curvature, from normals or from points alone
+        Curvature = "curvature",
+        /// two substances that react and diffuse
+        ReactionDiffusion = "reaction_diffusion" {
+            /// the reaction
+            model: ModelChoice = ModelChoice::Brusselator { a: 3.0, b: 9.0 };
+            /// diffusivity of the first substance
+            diffusivity: f64 = 0.005, in POSITIVE;
+            /// diffusivity of the second substance
+            second_diffusivity: f64 = 0.05, in POSITIVE;
+            /// amplitude of the random disturbance at the start
+            noise: f64 = 0.1, in NOT_NEGATIVE;
+            /// a field f for which forcing makes u = u₀ (1 + f cos t/4), v = v₀ (1 − f cos t/4) exact
+            manufactured: Option<FieldChoice>;
+            /// end time T
+            end_time: f64 = 10.0, in POSITIVE;
+            /// time step Δt; when not given, a hundredth of T, which is divided as the tolerance asks
+            time_step: Option<f64>, in POSITIVE;
+            /// root mean square of the error of a step by 1 + |u|; 1e-7 when neither it nor Δt is given, steps of Δt when only
+            /// Δt is
+            tolerance: Option<f64>, in STEP_TOLERANCE;
+        }
+    }
+}
+
+crate::words! {
+    /// The form of Surface DC-PSE operators.
+    pub enum FormWord {
+        /// on tangent planes
+        Intrinsic = "intrinsic",
+        /// in space, with copies of the points along normals: the paper's
+        Copies = "copies",
+    }
+}
+
+crate::choice! {
+    /// The method.
+    pub enum MethodSpec {
+        /// Surface DC-PSE: fits of polynomials about every point
+        SurfaceDcpse = "surface_dcpse" {
+            /// 2, 4 or 6: polynomials of degree 3, 5 or 7
+            order: u64 = 2, in whole(2, 6);
+            /// `intrinsic`: on tangent planes; `copies`: in space, with copies of the points along normals, the paper's
+            form: FormWord = FormWord::Intrinsic;
+            /// cutoff radius r_c in δn; 2.4, 3.3, 4.2 (of `random_raw` 3.5, 4, 4.5; copies 2.9, on circles 4.1) when not given
+            cutoff_dn: Option<f64>, in Interval::above(1.0).and_at_most(20.0);
+            /// copies of a point to either side; 2, on circles 4, when not given
+            layers: Option<u32>, in whole(1, 16);
+            /// distance δn of the copies; √(area/N), on circles 3 R/(N − 1), when not given
+            normal_spacing: Option<f64>, in POSITIVE;
+        }
+        /// the embedding closest-point method on a grid about the surface, for `laplace_beltrami`
+        ClosestPoint = "closest_point" {
+            /// 2 or 4
+            order: u64 = 2, in whole(2, 4);
+            /// spacing of the grid; √(area/N) when not given
+            spacing: Option<f64>, in POSITIVE;
+        }
+    }
+}
+
+crate::words! {
+    /// Where the metric of a fit comes from.
+    pub enum MetricWord {
+        /// heights are fitted
+        Heights = "heights",
+        /// normals are taken as exact
+        Normals = "normals",
+    }
+}
+
+crate::choice! {
+    /// The normals that operators are made with.
+    pub enum NormalsChoice {
+        /// those of the surface
+        Exact = "exact",
+        /// those that came with points, estimated where none did
+        Given = "given" {
+            /// `heights` are fitted, or normals are taken as exact (then they must have come)
+            metric: MetricWord = MetricWord::Heights;
+        }
+        /// from the points alone, the metric by fitted heights
+        Estimated = "estimated",
+        /// exact ones turned at random
+        Perturbed = "perturbed" {
+            /// largest change of a component
+            sigma: f64 = 0.01, in NOT_NEGATIVE;
+            /// `heights` are fitted, or normals are taken as if they were exact
+            metric: MetricWord = MetricWord::Heights;
+        }
+    }
+}
+
+/// Tolerances of a solver.
+const RESIDUAL: Interval = Interval::at_least(1e-14).and_at_most(0.1);
+
+crate::group! {
+    /// When an iterative solver stops.
+    pub struct StoppingSpec: Default {
+        /// bound of ‖b − A x‖ by ‖b‖
+        tolerance: f64 = 1e-10, in RESIDUAL;
+        /// number of iterations at most
+        max_iterations: u64 = 5000, in whole(1, 100_000_000);
+    }
+}
+
+crate::choice! {
+    /// How systems of equations are solved.
+    pub enum SolverChoice {
+        /// BiCGSTAB with ILU(0)
+        Bicgstab = "bicgstab" {
+            /// when it stops
+            stopping: StoppingSpec => flatten;
+        }
+        /// restarted GMRES with ILU(0)
+        Gmres = "gmres" {
+            /// vectors of the basis before a restart
+            restart: usize = 60, in whole(2, 1000);
+            /// when it stops
+            stopping: StoppingSpec => flatten;
+        }
+        /// sparse LU decomposition
+        SparseLu = "sparse_lu",
+    }
+}
+
+impl Default for SolverChoice {
+    fn default() -> Self {
+        Self::Bicgstab { stopping: StoppingSpec::default() }
+    }
+}
+
+crate::group! {
+    /// Operators and equations on a surface that is known by points.
+    pub struct SurfacePde {
+        /// the surface, about the origin
+        surface: SurfaceChoice = SurfaceChoice::Sphere { radius: 1.0 };
+        /// dimension of the space: 2 for circles, of points when it is given, else 3
+        dimension: Option<usize>, in whole(2, 3);
+        /// number of points; of a bump about; 4000 when not given
+        count: Option<u64>, in whole(20, 100_000_000);
+        /// how points are spread: `regular` on circles and bumps, else `fibonacci`, when not given; `random` is relaxed
+        sampling: Option<SamplingWord>;
+        /// what is computed
+        problem: ProblemSpec = ProblemSpec::LaplaceBeltrami { field: None };
+        /// the method
+        method: MethodSpec = MethodSpec::SurfaceDcpse {
+            order: 2, form: FormWord::Intrinsic, cutoff_dn: None, layers: None, normal_spacing: None,
+        };
+        /// the normals that operators are made with; `given` for points, else `exact`, when not given
+        normals: Option<NormalsChoice>;
+        /// how systems of equations are solved: those of `poisson` and of `bdf2`
+        solver: SolverChoice = SolverChoice::default();
+        /// seed of random points and normals
+        seed: u64 = 1;
+        /// applications of the operator in a row, one a step; of `laplace_beltrami`
+        repeat: u64 = 1, in whole(1, 1_000_000) => restart_safe;
+    }
+}
