@@ -1,21 +1,20 @@
 //! The command line.
 
 use crate::access::Scope;
-use crate::application;
 use crate::config::{Choices, Config};
 use crate::foreground;
+use crate::serve;
 use crate::telemetry;
 use base64::Engine;
 use clap::{Parser, Subcommand};
-use meniscus_jobs::inspection::{look, sandbox};
 use meniscus_jobs::service::backup;
 use meniscus_jobs::service::fsck;
 use meniscus_jobs::spec::calibration;
-use meniscus_jobs::spec::uploads::Purpose;
+use meniscus_jobs::spec::uploads::{Purpose, inspection, jail};
 use meniscus_jobs::system::digest;
 use meniscus_jobs::system::process;
 use meniscus_jobs::verify;
-use meniscus_jobs::worker;
+use meniscus_jobs::worker::process;
 use std::fmt::Display;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -134,7 +133,7 @@ pub fn main() -> ExitCode {
     match Arguments::parse().command {
         Command::Serve { config, choices } => {
             telemetry::start();
-            let choices = match config.map(|path| Choices::of_file(&path)).transpose() {
+            let choices = match config.map(|path| Choices::from_file(&path)).transpose() {
                 Ok(file) => choices.or(file.unwrap_or_default()),
                 Err(error) => return fail(&error),
             };
@@ -150,7 +149,7 @@ pub fn main() -> ExitCode {
                 Ok(runtime) => runtime,
                 Err(error) => return fail(&error),
             };
-            let served = runtime.block_on(application::serve(config));
+            let served = runtime.block_on(serve::serve(config));
             // Handlers that still wait on a disk do not hold up the end.
             runtime.shutdown_background();
             served.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
@@ -175,7 +174,7 @@ pub fn main() -> ExitCode {
         Command::Token { name, scopes } => make_token(&name, &scopes),
         Command::Inspect { purpose, file } => inspect(&purpose, &file),
         Command::Calibrate { scratch, threads } => calibrate(&scratch, threads),
-        Command::Worker { attempt } => worker::process::run(&attempt).map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS),
+        Command::Worker { attempt } => worker_process::run(&attempt).map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS),
     }
 }
 
@@ -210,13 +209,13 @@ fn make_token(name: &str, scopes: &str) -> ExitCode {
 
 fn inspect(purpose: &str, file: &Path) -> ExitCode {
     let Some(purpose) = Purpose::from_word(purpose) else { return fail(&"there is no such purpose") };
-    let seen = sandbox::enter().and_then(|()| look::run(purpose, file, &mut std::io::stdout().lock()));
+    let seen = jail::enter().and_then(|()| inspection::run(purpose, file, &mut std::io::stdout().lock()));
     seen.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
 }
 
 fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
     process::be_nice();
-    if let Err(error) = worker::process::end_with_input() {
+    if let Err(error) = worker_process::end_with_input() {
         return fail(&error);
     }
     let found = match calibration::measure_here(scratch, threads) {

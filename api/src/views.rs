@@ -1,5 +1,25 @@
 //! What clients see: the only wire types.
 
+/// Declares the view of a list.
+macro_rules! list {
+    ($(#[$doc:meta])* $name:ident of $item:ident, next: $next:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Serialize, ToSchema)]
+        pub struct $name {
+            /// The entries.
+            pub items: Vec<$item>,
+            #[doc = $next]
+            pub next: Option<String>,
+        }
+
+        impl From<(Vec<$item>, Option<String>)> for $name {
+            fn from((items, next): (Vec<$item>, Option<String>)) -> Self {
+                Self { items, next }
+            }
+        }
+    };
+}
+
 mod collections;
 
 pub use collections::{DryRunView, EstimateView, StudyList, StudyView, UploadList, UploadView};
@@ -128,13 +148,9 @@ pub struct DeterministicView {
     pub isa: String,
 }
 
-/// A page of jobs.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct JobList {
-    /// The jobs.
-    pub items: Vec<JobView>,
-    /// Cursor of the next page.
-    pub next: Option<String>,
+list! {
+    /// A page of jobs.
+    JobList of JobView, next: "Cursor of the next page."
 }
 
 /// An event.
@@ -181,13 +197,9 @@ pub struct FileView {
     pub step: Option<u64>,
 }
 
-/// All published files of a job.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct FileList {
-    /// The files in the order of their paths.
-    pub items: Vec<FileView>,
-    /// Always null: the list is whole.
-    pub next: Option<String>,
+list! {
+    /// All published files of a job.
+    FileList of FileView, next: "Always null: the list is whole."
 }
 
 /// A verified checkpoint.
@@ -215,13 +227,9 @@ pub struct CheckpointView {
     pub links: BTreeMap<&'static str, String>,
 }
 
-/// All checkpoints of a job, newest first.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct CheckpointList {
-    /// The checkpoints.
-    pub items: Vec<CheckpointView>,
-    /// Always null: the list is whole.
-    pub next: Option<String>,
+list! {
+    /// All checkpoints of a job, newest first.
+    CheckpointList of CheckpointView, next: "Always null: the list is whole."
 }
 
 /// What the service is.
@@ -273,13 +281,9 @@ pub struct SceneKindView {
     pub example: Value,
 }
 
-/// All kinds of scenes.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct SceneKindList {
-    /// The kinds.
-    pub items: Vec<SceneKindView>,
-    /// Always null: the list is whole.
-    pub next: Option<String>,
+list! {
+    /// All kinds of scenes.
+    SceneKindList of SceneKindView, next: "Always null: the list is whole."
 }
 
 /// Whether the service lives or is ready.

@@ -43,13 +43,9 @@ pub struct StudyView {
     pub links: BTreeMap<&'static str, String>,
 }
 
-/// A page of studies.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct StudyList {
-    /// The studies.
-    pub items: Vec<StudyView>,
-    /// Cursor of the next page.
-    pub next: Option<String>,
+list! {
+    /// A page of studies.
+    StudyList of StudyView, next: "Cursor of the next page."
 }
 
 /// What a study would be.
@@ -88,13 +84,9 @@ pub struct UploadView {
     pub links: BTreeMap<&'static str, String>,
 }
 
-/// A page of uploads.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct UploadList {
-    /// The uploads.
-    pub items: Vec<UploadView>,
-    /// Cursor of the next page.
-    pub next: Option<String>,
+list! {
+    /// A page of uploads.
+    UploadList of UploadView, next: "Cursor of the next page."
 }
 
 /// What a job would take.

@@ -1,4 +1,4 @@
-//! Checkpoints and uploads as the store knows them.
+//! Checkpoints and uploads that bodies name, looked up in the store.
 
 use crate::error::ApiError;
 use meniscus_jobs::service::store::{Store, StoreError};
@@ -8,19 +8,24 @@ use meniscus_jobs::spec::uploads::Purpose;
 use serde_json::Value;
 use std::cell::RefCell;
 
-/// Looks things up; remembers when the store failed, since that is not the same as "not there".
-pub(crate) struct StoreSources<'a> {
+/// Looks up ids in the store. A failure of the store is remembered, since it does not mean that the id is unknown.
+pub struct StoreSources<'a> {
     store: &'a Store,
     failure: RefCell<Option<StoreError>>,
 }
 
 impl<'a> StoreSources<'a> {
-    pub(crate) fn new(store: &'a Store) -> Self {
+    /// Sources in this store.
+    #[must_use]
+    pub fn new(store: &'a Store) -> Self {
         Self { store, failure: RefCell::new(None) }
     }
 
-    /// A job's body as it will be run, with what it will take.
-    pub(crate) fn understand(
+    /// Checks the body of a job, fills in its defaults, and estimates its time.
+    ///
+    /// # Errors
+    /// All that is wrong with the body, or a failing store.
+    pub fn understand(
         &self,
         spec: &Value,
         allowance: Allowance,
@@ -33,8 +38,11 @@ impl<'a> StoreSources<'a> {
         Ok(body)
     }
 
-    /// Whether the store failed while it was asked.
-    pub(crate) fn check(&self) -> Result<(), ApiError> {
+    /// Reports a failure of the store since the last check.
+    ///
+    /// # Errors
+    /// The failure.
+    pub fn check(&self) -> Result<(), ApiError> {
         self.failure.take().map_or(Ok(()), |error| Err(error.into()))
     }
 
