@@ -110,7 +110,7 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
     };
     let keep = resolved["checkpoint"]["keep"].as_u64().unwrap_or(2) as usize;
     let mut sink = Screen::new(out.clone(), keep);
-    let verdict = worker::run_attempt(&order, &out, &Control::default(), &mut sink);
+    let verdict = attempt::run_attempt(&order, &out, &Control::default(), &mut sink);
     sink.bar.finish_and_clear();
     let mut output = io::stdout().lock();
     match verdict {

@@ -45,7 +45,7 @@ pub async fn log(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let row = resource::find::<JobRow>(&state, id.clone()).await?;
-    let read = move |store: &Store| Ok::<_, ApiError>(of_attempts(store, &row, worker::LOG_NAME).concat());
+    let read = move |store: &Store| Ok::<_, ApiError>(of_attempts(store, &row, attempt::LOG_NAME).concat());
     let text = state.with_store(read).await?;
     let text = match query.tail {
         None => text,

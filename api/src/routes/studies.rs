@@ -17,8 +17,9 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use meniscus_jobs::service::store::{Change, NewJob, Store, StoreError, StudyRow};
+use meniscus_jobs::service::{study_report, study_table};
 use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
-use meniscus_jobs::spec::study::{self, report, table};
+use meniscus_jobs::spec::study;
 use serde::Deserialize;
 
 /// Largest body of a study in bytes: room for a list of ten thousand points.
@@ -163,7 +164,7 @@ pub async fn table(
     let row = resource::find::<StudyRow>(&state, id).await?;
     let compose = move |store: &Store| {
         let points = store.points(&row, query.after, limit)?;
-        Ok::<_, ApiError>(table::compose(&row.axes, &points))
+        Ok::<_, ApiError>(study_table::compose(&row.axes, &points))
     };
     let table = state.with_store(compose).await?;
     if accept::prefers(&headers, "json", "text/csv") {
@@ -196,9 +197,9 @@ pub async fn report(
     let compose = move |store: &Store| {
         let points = store.points(&row, None, ALL_POINTS)?;
         if !is_picture {
-            return Ok(Json(report::compose(&row, &points)).into_response());
+            return Ok(Json(study_report::compose(&row, &points)).into_response());
         }
-        let picture = report::draw(&row, &points, query.error.as_deref()).map_err(ApiError::Internal)?;
+        let picture = study_report::draw(&row, &points, query.error.as_deref()).map_err(ApiError::Internal)?;
         let picture = picture.ok_or(ApiError::NotFound("error of a finished point with this name"))?;
         Ok(([(header::CONTENT_TYPE, "image/svg+xml")], picture).into_response())
     };
