@@ -293,6 +293,14 @@ pub struct StatusView {
     pub status: &'static str,
 }
 
+/// The address of an object, and those of its parts.
+fn links(base: String, parts: &[&'static str]) -> BTreeMap<&'static str, String> {
+    let below = parts.iter().map(|part| (*part, format!("{base}/{part}")));
+    let mut links: BTreeMap<_, _> = below.collect();
+    links.insert("self", base);
+    links
+}
+
 /// What a stored estimate says of a run that has not reported progress yet.
 #[derive(Default, Deserialize)]
 #[serde(default)]
@@ -304,11 +312,8 @@ struct StoredEstimate {
 
 impl From<JobRow> for JobView {
     fn from(job: JobRow) -> Self {
-        let base = format!("/v1/jobs/{}", job.id);
-        let mut links = BTreeMap::from([("self", base.clone())]);
-        for name in ["cancel", "pause", "resume", "events", "log", "series", "report", "files", "checkpoints"] {
-            links.insert(name, format!("{base}/{name}"));
-        }
+        let parts = ["cancel", "pause", "resume", "events", "log", "series", "report", "files", "checkpoints"];
+        let links = links(format!("/v1/jobs/{}", job.id), &parts);
         let Progress {
             fraction,
             time,

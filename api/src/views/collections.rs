@@ -160,11 +160,8 @@ impl From<StudyRow> for StudyView {
         if deleted > 0 {
             counts.insert("deleted".to_owned(), deleted);
         }
-        let base = format!("/v1/studies/{}", row.id);
-        let mut links = BTreeMap::from([("self", base.clone())]);
-        for name in ["jobs", "events", "table", "report", "cancel", "pause", "resume", "retry"] {
-            links.insert(name, format!("{base}/{name}"));
-        }
+        let parts = ["jobs", "events", "table", "report", "cancel", "pause", "resume", "retry"];
+        let links = super::links(format!("/v1/studies/{}", row.id), &parts);
         Self {
             state: state_of(&row.counts),
             fraction: (ended + deleted) as f64 / row.points.max(1) as f64,
