@@ -1,4 +1,4 @@
-//! Measuring an unknown machine, once, in a process of its own.
+//! Measures an unknown machine once, in a separate process.
 
 use meniscus_jobs::service::store::Store;
 use meniscus_jobs::spec::calibration::PhaseMeasured;
@@ -6,20 +6,20 @@ use std::io;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-/// Starts the measurement where nothing is known of this machine with this build. It stands back for jobs, and ends
-/// with the service.
+/// Starts the measurement if the store has none of this machine and build. The process has a low priority and ends with
+/// the service.
 ///
 /// # Errors
-/// When it cannot be started.
+/// If the store fails or the thread cannot be started.
 pub fn start_where_needed(store: &Arc<Store>, threads: usize) -> io::Result<()> {
     if !store.calibration().map_err(io::Error::other)?.is_empty() {
         return Ok(());
     }
     let store = Arc::clone(store);
     std::thread::Builder::new().name("calibration".to_owned()).spawn(move || match measure(&store, threads) {
-        Ok(phases) => tracing::info!(phases, "this machine was measured"),
-        // Estimates then begin with the first job that finishes.
-        Err(error) => tracing::warn!(%error, "this machine could not be measured"),
+        Ok(phases) => tracing::info!(phases, "measured the speed of this machine"),
+        // Without a measurement, estimates of time begin with the first finished job.
+        Err(error) => tracing::warn!(%error, "the speed of this machine could not be measured"),
     })?;
     Ok(())
 }
@@ -32,7 +32,7 @@ fn measure(store: &Store, threads: usize) -> io::Result<usize> {
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()?;
-    // `wait_with_output` would close the input, which ends the process.
+    // The process ends when its input closes, and `wait_with_output` would close it.
     let input = child.stdin.take();
     let output = child.wait_with_output()?;
     drop(input);

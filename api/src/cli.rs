@@ -1,9 +1,9 @@
 //! The command line.
 
 use crate::access::Scope;
-use crate::application;
 use crate::config::{Choices, Config};
 use crate::foreground;
+use crate::serve;
 use crate::telemetry;
 use base64::Engine;
 use clap::{Parser, Subcommand};
@@ -32,7 +32,7 @@ struct Arguments {
 enum Command {
     /// Run the HTTP service.
     Serve {
-        /// Configuration (TOML) with the names of the flags; flags win.
+        /// Configuration file (TOML) with the names of the flags; flags override it.
         #[arg(long)]
         config: Option<PathBuf>,
         #[command(flatten)]
@@ -42,65 +42,65 @@ enum Command {
     Run {
         /// A job body or a scene, as JSON.
         scene: PathBuf,
-        /// Directory for the results, new or empty.
+        /// Directory for the results; must be new or empty.
         #[arg(long)]
         out: PathBuf,
-        /// Threads; all cores when not given.
+        /// Threads; all cores by default.
         #[arg(long)]
         threads: Option<usize>,
     },
-    /// Go on from a checkpoint to the end of its scene, in the foreground.
+    /// Continue from a checkpoint to the end of its scene, in the foreground.
     Resume {
         /// A checkpoint file.
         checkpoint: PathBuf,
-        /// Directory for the results, new or empty.
+        /// Directory for the results; must be new or empty.
         #[arg(long)]
         out: PathBuf,
-        /// Threads; all cores when not given.
+        /// Threads; all cores by default.
         #[arg(long)]
         threads: Option<usize>,
     },
-    /// Run what scenes must show and compare the figures; fails when one is missed.
+    /// Run the verification cases and compare them with their targets; fails if a target is missed.
     Verify {
-        /// Kinds of scenes, with commas between; all when not given.
+        /// Kinds of scenes, separated by commas; all by default.
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
-        /// Long rows too, and tables and pictures of the results.
+        /// Include long cases, and write tables and pictures of the results.
         #[arg(long)]
         full: bool,
-        /// Directory of the runs; those of the same build are not repeated.
+        /// Directory of the runs; runs of the same build are not repeated.
         #[arg(long, default_value = "verify-output")]
         runs: PathBuf,
-        /// Directory of the results of a full table.
+        /// Directory for tables and pictures, with --full.
         #[arg(long, default_value = "docs/results")]
         results: PathBuf,
     },
-    /// Make a consistent copy of a data directory, also of one in use.
+    /// Make a consistent copy of a data directory, even while a service uses it.
     Backup {
-        /// Directory for the copy, new or empty.
+        /// Directory for the copy; must be new or empty.
         target: PathBuf,
         /// Data directory.
         #[arg(long)]
         data: PathBuf,
     },
-    /// Look over a data directory that no service is using; fails when something is wrong.
+    /// Check a data directory that no service uses; fails if something is wrong.
     Fsck {
         /// Data directory.
         #[arg(long)]
         data: PathBuf,
     },
-    /// Make a token: shown once on standard output, its line for the token file behind it.
+    /// Make a token and print it once, followed by its line for the token file.
     Token {
-        /// A name for its bearer.
+        /// Name of the client.
         name: String,
-        /// What it allows: read, submit, control, with commas between.
+        /// Scopes of the token: read, submit, control, separated by commas.
         #[arg(long, default_value = "read,submit,control")]
         scopes: String,
     },
-    /// Look into a file from outside (started by the service, under limits).
+    /// Examine an uploaded file (started by the service, in a sandbox).
     #[command(hide = true)]
     Inspect {
-        /// What it is to be used as.
+        /// What the file is used as.
         #[arg(long = "as")]
         purpose: String,
         /// The file.
@@ -109,32 +109,32 @@ enum Command {
     /// Measure this machine (started by the service).
     #[command(hide = true)]
     Calibrate {
-        /// A directory to work in; it is emptied.
+        /// Scratch directory; its content is deleted.
         #[arg(long)]
         scratch: PathBuf,
         /// Threads.
         #[arg(long, default_value_t = 1)]
         threads: u64,
     },
-    /// Run one attempt at a job (started by the service).
+    /// Run one attempt of a job (started by the service).
     #[command(hide = true)]
     Worker {
-        /// The attempt's directory.
+        /// Directory of the attempt.
         #[arg(long)]
         attempt: PathBuf,
     },
 }
 
-/// Threads that wait for the disk at most: more would only take memory.
+/// Most threads that wait for the disk. More threads would only use memory.
 const BLOCKING_THREADS: usize = 16;
 
-/// Reads the arguments and does what they say.
+/// Parses the arguments and runs the command.
 #[must_use]
 pub fn main() -> ExitCode {
     match Arguments::parse().command {
         Command::Serve { config, choices } => {
             telemetry::start();
-            let choices = match config.map(|path| Choices::of_file(&path)).transpose() {
+            let choices = match config.map(|path| Choices::from_file(&path)).transpose() {
                 Ok(file) => choices.or(file.unwrap_or_default()),
                 Err(error) => return fail(&error),
             };
@@ -150,8 +150,8 @@ pub fn main() -> ExitCode {
                 Ok(runtime) => runtime,
                 Err(error) => return fail(&error),
             };
-            let served = runtime.block_on(application::serve(config));
-            // Handlers that still wait on a disk do not hold up the end.
+            let served = runtime.block_on(serve::serve(config));
+            // Handlers that still wait for a disk do not delay the end.
             runtime.shutdown_background();
             served.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
         }
@@ -171,7 +171,7 @@ pub fn main() -> ExitCode {
         Command::Backup { target, data } => {
             backup::back_up(&data, &target).map_or_else(|e| fail(&e), |()| ExitCode::SUCCESS)
         }
-        Command::Fsck { data } => look_over(&data).unwrap_or_else(|error| fail(&error)),
+        Command::Fsck { data } => check_data(&data).unwrap_or_else(|error| fail(&error)),
         Command::Token { name, scopes } => make_token(&name, &scopes),
         Command::Inspect { purpose, file } => inspect(&purpose, &file),
         Command::Calibrate { scratch, threads } => calibrate(&scratch, threads),
@@ -179,14 +179,14 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn look_over(data: &Path) -> Result<ExitCode, fsck::FsckError> {
+fn check_data(data: &Path) -> Result<ExitCode, fsck::FsckError> {
     let findings = fsck::check(data)?;
     let mut output = std::io::stdout().lock();
     for finding in &findings.wrong {
         writeln!(output, "{finding}")?;
     }
     let fsck::Findings { jobs, files, wrong } = findings;
-    writeln!(output, "{jobs} jobs and {files} files looked at, {} things wrong", wrong.len())?;
+    writeln!(output, "{jobs} jobs and {files} files checked, {} errors", wrong.len())?;
     Ok(if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -194,7 +194,7 @@ fn make_token(name: &str, scopes: &str) -> ExitCode {
     let is_name = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.@".contains(&b));
     if !is_name || Scope::parse_list(scopes).is_none() {
         return fail(
-            &"a name has letters, digits and -_.@ alone; scopes are read, submit, control with commas between",
+            &"a name may have letters, digits and -_.@ only; scopes are read, submit, control, separated by commas",
         );
     }
     let mut secret = [0_u8; 32];
@@ -209,7 +209,9 @@ fn make_token(name: &str, scopes: &str) -> ExitCode {
 }
 
 fn inspect(purpose: &str, file: &Path) -> ExitCode {
-    let Some(purpose) = Purpose::from_word(purpose) else { return fail(&"there is no such purpose") };
+    let Some(purpose) = Purpose::from_word(purpose) else {
+        return fail(&"unknown purpose; allowed are checkpoint, points, surface, queries");
+    };
     let seen = sandbox::enter().and_then(|()| look::run(purpose, file, &mut std::io::stdout().lock()));
     seen.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
 }
@@ -228,7 +230,7 @@ fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
 }
 
 fn fail(error: &dyn Display) -> ExitCode {
-    // With standard error closed there is nobody to tell.
+    // Standard error may be closed.
     let _ = writeln!(std::io::stderr(), "meniscus: {error}");
     ExitCode::FAILURE
 }

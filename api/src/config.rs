@@ -1,6 +1,7 @@
-//! What the operator chose: on the command line, else in a file (TOML) with the same names, else by default.
+//! Configuration of the service: flags of the command line, else a TOML file with the same names, else defaults.
 
 use crate::access::{AccessRules, TokenFileError};
+use crate::rate_limit::RateLimiter;
 use clap::Args;
 use meniscus_jobs::service::supervisor::{DISK_RESERVE_BYTES, Settings};
 use meniscus_jobs::spec::body::Allowance;
@@ -10,48 +11,48 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The choices of an operator.
+/// Settings as the operator gives them. None stands for the default.
 #[derive(Debug, Clone, Default, Args, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Choices {
-    /// Data directory; made when it is not there.
+    /// Data directory; created if it does not exist.
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// Address to listen on, 127.0.0.1:8080 by default; port 0 picks a free one. Anything but loopback needs tokens.
+    /// Address to listen on, 127.0.0.1:8080 by default; port 0 picks a free port. Addresses other than loopback need tokens.
     #[arg(long)]
     pub bind: Option<SocketAddr>,
-    /// Jobs at once; cores / threads when not given.
+    /// Jobs that run at the same time; cores / threads by default.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
     pub slots: Option<u64>,
-    /// Threads of a job, default and most; cores / slots, or 1, when not given.
+    /// Threads of a job, both default and maximum; cores / slots, or 1, by default.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
     pub threads: Option<u64>,
-    /// File of tokens, a line each: NAME SCOPES sha256:DIGEST (`meniscus token` makes them).
+    /// File with one token per line: NAME SCOPES sha256:DIGEST (`meniscus token NAME` prints such a line).
     #[arg(long)]
     pub token_file: Option<PathBuf>,
-    /// Names under which the service is reached, beside localhost and the address it listens on.
+    /// Additional host names under which the service answers, besides localhost and the address it listens on.
     #[arg(long)]
     #[serde(default)]
     pub allow_host: Vec<String>,
-    /// Days that ended jobs are kept; for ever when not given.
+    /// Days after which ended jobs are deleted; never by default.
     #[arg(long)]
     pub retention_days: Option<u32>,
-    /// Jobs, studies and uploads that one client may make in a minute; any number when not given.
+    /// Jobs, studies and uploads that each client may create per minute; unlimited by default.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub creations_per_minute: Option<u32>,
-    /// Jobs that may be unfinished at once; any number when not given.
+    /// Jobs that may be unfinished at the same time; unlimited by default.
     #[arg(long)]
     pub most_unfinished: Option<u64>,
-    /// Bytes of an upload at most, 2 GiB by default.
+    /// Largest upload in bytes, 2 GiB by default.
     #[arg(long)]
     pub upload_bytes: Option<u64>,
-    /// Free space that jobs leave untouched, 64 MiB by default.
+    /// Disk space in bytes that jobs leave free, 64 MiB by default.
     #[arg(long)]
     pub disk_reserve_bytes: Option<u64>,
-    /// Seconds without a sign of life after which a worker is ended, 30 by default.
+    /// Seconds without a heartbeat after which a worker is killed, 30 by default.
     #[arg(long)]
     pub lease_s: Option<u64>,
-    /// Do not measure this machine with a few short runs when nothing is known of it yet.
+    /// Do not measure an unknown machine with a few short runs at the start.
     #[arg(long)]
     #[serde(default)]
     pub no_calibration: bool,
@@ -64,63 +65,65 @@ pub struct Config {
     pub data: PathBuf,
     /// Address to listen on.
     pub bind: SocketAddr,
-    /// Jobs at once.
+    /// Jobs that run at the same time.
     pub slots: usize,
-    /// Threads per job, default and most.
+    /// Threads of a job, both default and maximum.
     pub threads: usize,
-    /// Who may do what.
+    /// Tokens and host names.
     pub access: AccessRules,
-    /// Days that ended jobs are kept.
+    /// Creations of each client per minute.
+    pub rate_limiter: RateLimiter,
+    /// Days after which ended jobs are deleted; None for never.
     pub retention_days: Option<u32>,
-    /// Jobs that may be unfinished at once.
+    /// Jobs that may be unfinished at the same time; None for any number.
     pub most_unfinished: Option<u64>,
-    /// Bytes of an upload.
+    /// Largest upload in bytes.
     pub upload_bytes: u64,
-    /// Free space that jobs leave untouched.
+    /// Disk space in bytes that jobs leave free.
     pub disk_reserve_bytes: u64,
-    /// Term of a worker's lease.
+    /// Time without a heartbeat after which a worker is killed.
     pub lease: Duration,
-    /// Whether an unknown machine is measured at the start.
+    /// Whether an unknown machine is measured at the start of the service.
     pub calibrate: bool,
 }
 
-/// Why a configuration is refused.
+/// Why a configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// Everybody could do everything.
+    /// Without tokens the service would be open to the network.
     #[error("{0} is not a loopback address: give --token-file (`meniscus token NAME` makes tokens), or bind 127.0.0.1")]
     Public(SocketAddr),
-    /// No place for anything.
-    #[error("the data directory is missing: --data DIR, or data in the configuration file")]
+    /// The data directory is missing.
+    #[error("the data directory is missing: give --data DIR, or `data` in the configuration file")]
     NoData,
-    /// The tokens cannot be used.
+    /// The token file cannot be used.
     #[error(transparent)]
     Tokens(#[from] TokenFileError),
-    /// The configuration file cannot be read.
+    /// The configuration file cannot be used.
     #[error("{path}: {cause}")]
     File {
-        /// Which.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// What is wrong with it.
         cause: String,
     },
 }
 
-/// Bytes of an upload when nothing is said.
+/// Default of the largest upload in bytes.
 const UPLOAD_BYTES: u64 = 2 << 30;
 
 impl Choices {
-    /// The choices of a file.
+    /// Reads settings from a TOML file.
     ///
     /// # Errors
     /// [`ConfigError`].
-    pub fn of_file(path: &std::path::Path) -> Result<Self, ConfigError> {
+    pub fn from_file(path: &std::path::Path) -> Result<Self, ConfigError> {
         let wrong = |cause: String| ConfigError::File { path: path.display().to_string(), cause };
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         toml::from_str(&text).map_err(|error| wrong(error.to_string()))
     }
 
-    /// These choices, and what they leave open from others.
+    /// These settings, completed by others where they are None.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -142,18 +145,13 @@ impl Choices {
 }
 
 impl Config {
-    /// Checks an operator's choices; what is left open follows from the cores: one thread a job, a job a core.
+    /// Checks settings and fills in defaults: one thread per job and one job per core.
     ///
     /// # Errors
     /// [`ConfigError`].
     pub fn new(choices: &Choices) -> Result<Self, ConfigError> {
         let bind = choices.bind.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], 8080)));
-        let access = AccessRules::new(
-            choices.token_file.as_deref(),
-            &choices.allow_host,
-            bind.ip(),
-            choices.creations_per_minute,
-        )?;
+        let access = AccessRules::new(choices.token_file.as_deref(), &choices.allow_host, bind.ip())?;
         if !bind.ip().is_loopback() && !access.has_tokens() {
             return Err(ConfigError::Public(bind));
         }
@@ -168,6 +166,7 @@ impl Config {
             slots,
             threads,
             access,
+            rate_limiter: RateLimiter::new(choices.creations_per_minute),
             retention_days: choices.retention_days,
             most_unfinished: choices.most_unfinished,
             upload_bytes: choices.upload_bytes.unwrap_or(UPLOAD_BYTES),
@@ -201,15 +200,15 @@ mod tests {
     use super::{Choices, Config, ConfigError};
 
     #[test]
-    fn flags_win_over_the_file_and_slips_in_the_file_are_named() {
+    fn flags_override_the_file_and_unknown_names_in_the_file_are_errors() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("config.toml");
         std::fs::write(&path, "data = \"/d\"\nslots = 3\nthreads = 2\nallow-host = [\"a.example\"]\n").unwrap();
         let flags = Choices { slots: Some(1), ..Choices::default() };
-        let config = Config::new(&flags.or(Choices::of_file(&path).unwrap())).unwrap();
+        let config = Config::new(&flags.or(Choices::from_file(&path).unwrap())).unwrap();
         assert_eq!((config.slots, config.threads), (1, 2));
         std::fs::write(&path, "slot = 3\n").unwrap();
-        assert!(Choices::of_file(&path).unwrap_err().to_string().contains("slot"));
+        assert!(Choices::from_file(&path).unwrap_err().to_string().contains("slot"));
     }
 
     #[test]
@@ -221,7 +220,7 @@ mod tests {
     #[test]
     fn the_sample_configuration_is_one() {
         let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/../deploy/config.example.toml");
-        assert!(Choices::of_file(std::path::Path::new(sample)).is_ok());
+        assert!(Choices::from_file(std::path::Path::new(sample)).is_ok());
         // Everything that is commented out is valid, too.
         let text = std::fs::read_to_string(sample).unwrap();
         let whole: String = text

@@ -1,8 +1,21 @@
-//! Errors as RFC 9457 problems: the only mapping from what went wrong to a status code.
+//! Errors of requests, and the only place that turns them into answers (RFC 9457 problems).
+//!
+//! Which error to use where:
+//! - [`ApiError::Unparsable`] if a body is no JSON, [`ApiError::BadRequest`] if a path or query is no text (400);
+//! - [`ApiError::Invalid`] if a request can be read but says something wrong: collect all that is wrong first (422);
+//! - [`ApiError::NotFound`] if an object that the path names does not exist (404). An id in a *body* that does not
+//!   exist is [`ApiError::Invalid`];
+//! - [`ApiError::Conflict`] if the object exists, but its state forbids the request (409);
+//! - [`ApiError::TooMany`], [`ApiError::QuotaReached`], [`ApiError::NoSpace`] if a limit forbids it now (429, 507);
+//! - [`ApiError::Internal`] for everything that is not the client's fault. `?` on errors of the store and of the system
+//!   leads there, except that a full disk becomes [`ApiError::DiskFull`].
+//!
+//! Status codes, titles and explanations stand in [`crate::problems`].
 
-use crate::access::{Budget, Scope};
+use crate::problems::{self, ProblemType};
+use crate::rate_limit::Budget;
 use axum::Json;
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use meniscus::scene::Violation;
 use meniscus_jobs::service::store::{ChangeError, StoreError};
@@ -14,34 +27,34 @@ use utoipa::ToSchema;
 /// An `application/problem+json` body.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct Problem {
-    /// A word for programs, as a relative URI.
+    /// Type of the problem as a relative URI. `GET` answers its explanation.
     pub r#type: String,
-    /// A title for people.
+    /// Title of the type.
     pub title: String,
-    /// The status code.
+    /// Status code of the answer.
     pub status: u16,
-    /// What is wrong here.
+    /// What is wrong with this request.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
-    /// Every single thing that is wrong with a body or a query.
+    /// Every single error of a body or a query.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub errors: Vec<ProblemItem>,
 }
 
-/// One thing wrong with a body.
-#[derive(Debug, Clone, Serialize, ToSchema)]
+/// One error of a body, a query parameter or a header.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ProblemItem {
-    /// JSON pointer to the place, or the name of a query parameter.
+    /// JSON pointer to the value, or the name of a query parameter or header.
     pub pointer: String,
-    /// A word for programs.
+    /// Code of the error for programs, such as `required`, `type`, `range` or `unknown`.
     pub code: String,
-    /// A sentence fragment for people.
+    /// What is wrong, for people.
     pub detail: String,
-    /// What stands there.
+    /// The value as received.
     pub got: Value,
-    /// What would be accepted.
+    /// What is accepted.
     pub allowed: Value,
-    /// A known name spelled alike.
+    /// A known name with a similar spelling.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub did_you_mean: Option<String>,
 }
@@ -53,170 +66,161 @@ impl From<Violation> for ProblemItem {
     }
 }
 
-/// Whatever a handler can fail with.
+/// Any error of a request.
 #[derive(Debug)]
 pub enum ApiError {
-    /// The body is not JSON as it must be.
+    /// The body is not JSON; the text says where and why.
     Unparsable(String),
-    /// The body or query says things that cannot be.
+    /// The body, the query or a header has wrong values.
     Invalid(Vec<ProblemItem>),
-    /// Nothing is there.
+    /// The object that the path names does not exist; the text is its noun.
     NotFound(&'static str),
-    /// The path or the query is not text as it must be.
+    /// The path or the query is not UTF-8.
     BadRequest,
-    /// The files of a job would not fit.
+    /// The files would not fit on the disk.
     NoSpace {
-        /// Bytes that it will write.
+        /// Bytes that will be written.
         needed: u64,
         /// Bytes that are free beyond the reserve.
-        room: u64,
+        free: u64,
     },
-    /// Nothing can be written any more.
+    /// The disk is full.
     DiskFull,
-    /// Too many of the same are under way.
+    /// As many requests of this kind as allowed are in progress.
     Busy,
-    /// The path exists, the method does not.
+    /// The path exists, but not with this method.
     MethodNotAllowed,
-    /// The state does not allow it.
+    /// The state of the object forbids the request; the text names the state and what to do.
     Conflict(String),
-    /// The body is larger than this many bytes.
+    /// The body has more than this many bytes.
     TooLarge(u64),
-    /// The body is of a kind that is not taken.
+    /// The body has a media type that is not accepted.
     UnsupportedMedia,
-    /// No token, or none that is known.
+    /// The request carries no token, or an unknown one.
     Unauthorized,
-    /// The token has not this scope.
-    Forbidden(Scope),
-    /// The service does not answer under this name.
+    /// The token lacks this scope.
+    Forbidden(&'static str),
+    /// The `Host` header names an unknown host.
     UnknownHost,
-    /// A page of another origin asks.
+    /// The `Origin` header names another host.
     ForeignOrigin,
-    /// The client has made as much as it may in this minute.
+    /// The client has no creation left in this minute.
     TooMany(Budget),
-    /// As many jobs are unfinished as may be.
+    /// Too many jobs are unfinished.
     QuotaReached {
-        /// So many are.
+        /// Unfinished jobs.
         unfinished: u64,
-        /// So many may be.
+        /// Most unfinished jobs that are allowed.
         most: u64,
     },
-    /// No byte of the range exists in a file of this size.
+    /// The requested range lies outside a file of this many bytes.
     RangeNotSatisfiable(u64),
-    /// Not yet, or not any more.
+    /// The service is starting or stopping.
     NotReady,
-    /// A defect or a failing disk; the log says more than the client learns.
+    /// A defect or a failing disk. The text goes to the log, never to the client.
     Internal(String),
 }
 
 impl ApiError {
-    fn problem(&self) -> (StatusCode, &'static str, &'static str, Option<String>) {
+    /// One wrong value that is neither missing nor misspelled.
+    #[must_use]
+    pub fn invalid(pointer: &str, code: &'static str, detail: &str, got: &Value, allowed: Value) -> Self {
+        Self::Invalid(vec![Violation::new(pointer, code, detail, got, allowed).into()])
+    }
+
+    fn problem_type(&self) -> &'static ProblemType {
         match self {
-            Self::Unparsable(detail) => {
-                (StatusCode::BAD_REQUEST, "unparsable", "the body is not valid JSON", Some(detail.clone()))
+            Self::Unparsable(_) => &problems::UNPARSABLE,
+            Self::Invalid(_) => &problems::INVALID,
+            Self::NotFound(_) => &problems::NOT_FOUND,
+            Self::BadRequest => &problems::BAD_REQUEST,
+            Self::NoSpace { .. } => &problems::NO_SPACE,
+            Self::DiskFull => &problems::DISK_FULL,
+            Self::Busy => &problems::BUSY,
+            Self::MethodNotAllowed => &problems::METHOD_NOT_ALLOWED,
+            Self::Conflict(_) => &problems::CONFLICT,
+            Self::TooLarge(_) => &problems::TOO_LARGE,
+            Self::UnsupportedMedia => &problems::UNSUPPORTED_MEDIA,
+            Self::Unauthorized => &problems::UNAUTHORIZED,
+            Self::Forbidden(_) => &problems::FORBIDDEN,
+            Self::UnknownHost => &problems::UNKNOWN_HOST,
+            Self::ForeignOrigin => &problems::FOREIGN_ORIGIN,
+            Self::TooMany(_) => &problems::TOO_MANY,
+            Self::QuotaReached { .. } => &problems::QUOTA,
+            Self::RangeNotSatisfiable(_) => &problems::RANGE,
+            Self::NotReady => &problems::NOT_READY,
+            Self::Internal(_) => &problems::INTERNAL,
+        }
+    }
+
+    /// What is wrong with this request, with numbers and names. None where the title says everything.
+    fn detail(&self) -> Option<String> {
+        Some(match self {
+            Self::Unparsable(detail) | Self::Conflict(detail) => detail.clone(),
+            Self::Invalid(items) if items.len() == 1 => "1 validation error".to_owned(),
+            Self::Invalid(items) => format!("{} validation errors", items.len()),
+            Self::NotFound(noun) => format!("No {noun} was found at this address."),
+            Self::NoSpace { needed, free } => format!(
+                "About {needed} bytes are needed, {free} are free. Fewer frames (/output/every_time), fewer checkpoints (/checkpoint/keep) or a larger spacing need less."
+            ),
+            Self::DiskFull => "Existing results can be read. Paused jobs continue when space is free.".to_owned(),
+            Self::TooLarge(limit) => format!("At most {limit} bytes are accepted."),
+            Self::UnsupportedMedia => "Send the bytes of the file: curl --data-binary @FILE.".to_owned(),
+            Self::Unauthorized => "Send the header Authorization: Bearer TOKEN.".to_owned(),
+            Self::Forbidden(scope) => format!("The scope {scope} is needed."),
+            Self::UnknownHost | Self::ForeignOrigin => {
+                "The operator allows host names with --allow-host NAME.".to_owned()
             }
-            Self::Invalid(items) => {
-                let detail = format!("{} thing{} wrong", items.len(), if items.len() == 1 { " is" } else { "s are" });
-                (StatusCode::UNPROCESSABLE_ENTITY, "invalid", "the request is not valid", Some(detail))
+            Self::TooMany(budget) => {
+                format!("{} creations per minute are allowed. Try again in {} s.", budget.quota, budget.next_s)
             }
-            Self::NotFound(what) => {
-                (StatusCode::NOT_FOUND, "not-found", "not found", Some(format!("there is no such {what}")))
+            Self::QuotaReached { unfinished, most } => {
+                format!("{unfinished} jobs are unfinished, {most} are allowed. Wait until jobs end, or cancel some.")
             }
-            Self::BadRequest => (StatusCode::BAD_REQUEST, "bad-request", "the path or the query cannot be read", None),
-            Self::NoSpace { needed, room } => {
-                let detail = format!(
-                    "the job will write about {needed} bytes, {room} are free: fewer frames (/output/every_time), fewer checkpoints (/checkpoint/keep) or a larger spacing need less"
-                );
-                (StatusCode::INSUFFICIENT_STORAGE, "no-space", "the files of this job would not fit", Some(detail))
+            Self::RangeNotSatisfiable(size) => format!("The file has {size} bytes."),
+            Self::BadRequest | Self::Busy | Self::MethodNotAllowed | Self::NotReady | Self::Internal(_) => return None,
+        })
+    }
+
+    /// Headers that clients need beside the body.
+    fn write_headers(&self, status: StatusCode, headers: &mut HeaderMap) {
+        let mut put = |name: HeaderName, text: String| {
+            if let Ok(value) = HeaderValue::from_str(&text) {
+                headers.insert(name, value);
             }
-            Self::DiskFull => (
-                StatusCode::INSUFFICIENT_STORAGE,
-                "disk-full",
-                "the disk is full",
-                Some("what is there can be read; jobs that rest for want of space go on by themselves".to_owned()),
-            ),
-            Self::Busy => (StatusCode::SERVICE_UNAVAILABLE, "busy", "too many of these are under way", None),
-            Self::MethodNotAllowed => {
-                (StatusCode::METHOD_NOT_ALLOWED, "method-not-allowed", "this resource does not do that", None)
+        };
+        put(header::CONTENT_TYPE, "application/problem+json".to_owned());
+        match self {
+            Self::Unauthorized => put(header::WWW_AUTHENTICATE, "Bearer realm=\"meniscus\"".to_owned()),
+            Self::Forbidden(scope) => {
+                let challenge = format!("Bearer realm=\"meniscus\", error=\"insufficient_scope\", scope=\"{scope}\"");
+                put(header::WWW_AUTHENTICATE, challenge);
             }
-            Self::Conflict(detail) => {
-                (StatusCode::CONFLICT, "conflict", "the state does not allow that", Some(detail.clone()))
+            Self::RangeNotSatisfiable(size) => put(header::CONTENT_RANGE, format!("bytes */{size}")),
+            _ => {}
+        }
+        match (self, status) {
+            (Self::TooMany(budget), _) => {
+                put(header::RETRY_AFTER, budget.next_s.to_string());
+                budget.write(headers);
             }
-            Self::TooLarge(limit) => (
-                StatusCode::PAYLOAD_TOO_LARGE,
-                "too-large",
-                "the body is too large",
-                Some(format!("at most {limit} bytes")),
-            ),
-            Self::UnsupportedMedia => (
-                StatusCode::UNSUPPORTED_MEDIA_TYPE,
-                "unsupported-media",
-                "the body is not taken in this form",
-                Some("send the bytes of the file themselves (curl --data-binary @FILE)".to_owned()),
-            ),
-            Self::Unauthorized => (
-                StatusCode::UNAUTHORIZED,
-                "unauthorized",
-                "a token is needed",
-                Some("Authorization: Bearer TOKEN".to_owned()),
-            ),
-            Self::Forbidden(scope) => (
-                StatusCode::FORBIDDEN,
-                "forbidden",
-                "the token does not allow that",
-                Some(format!("the scope {} is needed", scope.word())),
-            ),
-            Self::UnknownHost => (
-                StatusCode::MISDIRECTED_REQUEST,
-                "unknown-host",
-                "the service does not answer under this name",
-                Some("the operator adds names by --allow-host".to_owned()),
-            ),
-            Self::ForeignOrigin => (
-                StatusCode::FORBIDDEN,
-                "foreign-origin",
-                "pages of other origins are not answered",
-                Some("the operator adds names by --allow-host".to_owned()),
-            ),
-            Self::TooMany(budget) => (
-                StatusCode::TOO_MANY_REQUESTS,
-                "too-many",
-                "too much was made in this minute",
-                Some(format!("{} a minute are allowed", budget.quota)),
-            ),
-            Self::QuotaReached { unfinished, most } => (
-                StatusCode::TOO_MANY_REQUESTS,
-                "quota",
-                "too many jobs are unfinished",
-                Some(format!("{unfinished} are, {most} may be")),
-            ),
-            Self::RangeNotSatisfiable(size) => {
-                let detail = Some(format!("the file has {size} bytes"));
-                (StatusCode::RANGE_NOT_SATISFIABLE, "range", "no byte of that range exists", detail)
-            }
-            Self::NotReady => {
-                (StatusCode::SERVICE_UNAVAILABLE, "not-ready", "the service is starting or stopping", None)
-            }
-            Self::Internal(_) => (StatusCode::INTERNAL_SERVER_ERROR, "internal", "the service failed", None),
+            (_, StatusCode::TOO_MANY_REQUESTS) => put(header::RETRY_AFTER, "60".to_owned()),
+            (_, StatusCode::SERVICE_UNAVAILABLE) => put(header::RETRY_AFTER, "1".to_owned()),
+            _ => {}
         }
     }
 }
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
-        let (status, kind, title, detail) = self.problem();
         if let Self::Internal(cause) = &self {
-            // Logged once, here; the client gets no path, no SQL, no backtrace.
+            // Logged once, here. The client learns no path, no SQL and no backtrace.
             tracing::error!(cause, "request failed");
         }
-        let range = if let Self::RangeNotSatisfiable(size) = &self { Some(*size) } else { None };
-        let budget = if let Self::TooMany(budget) = &self { Some(*budget) } else { None };
-        let challenge = match &self {
-            Self::Unauthorized => Some("Bearer realm=\"meniscus\"".to_owned()),
-            Self::Forbidden(scope) => {
-                Some(format!("Bearer realm=\"meniscus\", error=\"insufficient_scope\", scope=\"{}\"", scope.word()))
-            }
-            _ => None,
-        };
+        let &ProblemType { kind, status, title, .. } = self.problem_type();
+        let mut headers = HeaderMap::new();
+        self.write_headers(status, &mut headers);
+        let detail = self.detail();
         let errors = if let Self::Invalid(items) = self { items } else { Vec::new() };
         let body = Problem {
             r#type: format!("/problems/{kind}"),
@@ -225,43 +229,22 @@ impl IntoResponse for ApiError {
             detail,
             errors,
         };
-        let mut response = (status, Json(body)).into_response();
-        let headers = response.headers_mut();
-        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
-        let wait = match (status, budget) {
-            (_, Some(budget)) => {
-                budget.write(headers);
-                Some(budget.next_s)
-            }
-            (StatusCode::TOO_MANY_REQUESTS, None) => Some(60),
-            (StatusCode::SERVICE_UNAVAILABLE, None) => Some(1),
-            _ => None,
-        };
-        if let Some(wait) = wait {
-            headers.insert(header::RETRY_AFTER, HeaderValue::from(wait));
-        }
-        if let Some(challenge) = challenge.and_then(|text| HeaderValue::from_str(&text).ok()) {
-            headers.insert(header::WWW_AUTHENTICATE, challenge);
-        }
-        if let Some(value) = range.and_then(|size| HeaderValue::from_str(&format!("bytes */{size}")).ok()) {
-            headers.insert(header::CONTENT_RANGE, value);
-        }
-        response
+        (status, headers, Json(body)).into_response()
     }
 }
-
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         match error {
-            StoreError::CheckpointGone => Self::Invalid(vec![ProblemItem {
-                pointer: "/restart/checkpoint".to_owned(),
-                code: "not_found".to_owned(),
-                detail: error.to_string(),
-                got: Value::Null,
-                allowed: "the id of a checkpoint, ckpt_…".into(),
-                did_you_mean: None,
-            }]),
-            StoreError::UploadGone => Self::Conflict("an upload was deleted while it was to be used".to_owned()),
+            StoreError::CheckpointGone => Self::invalid(
+                "/restart/checkpoint",
+                "not_found",
+                "the checkpoint was deleted",
+                &Value::Null,
+                "the id of a checkpoint, ckpt_…".into(),
+            ),
+            StoreError::UploadGone => {
+                Self::Conflict("An upload that the scene names was deleted. Upload the file again.".to_owned())
+            }
             error if process::is_out_of_space(&error) => Self::DiskFull,
             error => Self::Internal(error.to_string()),
         }

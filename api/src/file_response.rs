@@ -1,4 +1,4 @@
-//! A file as an answer: Range, If-Range, If-None-Match, strong tags from digests.
+//! Answers with the content of a file: Range, If-Range, If-None-Match, and strong entity tags from digests.
 
 use crate::error::ApiError;
 use axum::body::Body;
@@ -10,18 +10,18 @@ use std::path::Path;
 use tokio::io::{AsyncReadExt, AsyncSeekExt};
 use tokio_util::io::ReaderStream;
 
-/// What is known of a file beside its bytes.
+/// Facts of a file for the headers of its answer.
 #[derive(Debug, Clone)]
 pub struct FileFacts {
-    /// SHA-256 in hexadecimal: the strong tag. None where the bytes still grow.
+    /// SHA-256 in hexadecimal, which is the strong entity tag. None while the file still grows.
     pub sha256: Option<String>,
-    /// Media type.
+    /// Media type of the content.
     pub media_type: String,
-    /// File name for saving.
+    /// Name under which clients save the file.
     pub name: String,
 }
 
-/// The file, or the part that the request's headers ask for.
+/// Answers with a file, or with the part of it that the headers of the request ask for.
 ///
 /// # Errors
 /// [`ApiError`].
@@ -48,7 +48,7 @@ pub async fn file_response(path: &Path, facts: &FileFacts, headers: &HeaderMap) 
     answer(status, facts, part.map(|(first, last)| format!("bytes {first}-{last}/{size}")), length, body)
 }
 
-/// The same for bytes in memory.
+/// Answers with bytes in memory, or with the part of them that the headers of the request ask for.
 ///
 /// # Errors
 /// [`ApiError`].
@@ -80,7 +80,7 @@ fn part_of(facts: &FileFacts, headers: &HeaderMap, size: u64) -> Result<Part, Ap
             return Ok(Part::NotModified);
         }
     }
-    // A part of another version would be worse than the whole of this one.
+    // A part of a new version would not fit to what the client has of an old one.
     if text(header::IF_RANGE).is_some_and(|known| Some(known.trim()) != tag.as_deref()) {
         return Ok(Part::Whole);
     }
@@ -101,7 +101,7 @@ fn part_of(facts: &FileFacts, headers: &HeaderMap, size: u64) -> Result<Part, Ap
     }
 }
 
-/// `bytes=a-b`, `bytes=a-`, `bytes=-n`. Anything else, several ranges included, is ignored, as RFC 9110 allows.
+/// Parses `bytes=a-b`, `bytes=a-` and `bytes=-n`. Anything else, including several ranges, is ignored as RFC 9110 allows.
 fn parse_range(text: &str) -> Option<(Option<u64>, Option<u64>)> {
     let (first, last) = text.trim().strip_prefix("bytes=")?.split_once('-')?;
     let number = |text: &str| {

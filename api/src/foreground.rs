@@ -9,6 +9,7 @@ use meniscus_jobs::spec::strict_json;
 use meniscus_jobs::system::process;
 use meniscus_jobs::worker::attempt;
 use meniscus_jobs::worker::observers::Control;
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -18,19 +19,19 @@ use std::process::ExitCode;
 /// Why a run in the foreground did not begin.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The file cannot be used.
+    /// The file cannot be read or used.
     #[error("{path}: {cause}")]
     File {
-        /// Which.
+        /// Path of the file.
         path: String,
-        /// Why.
+        /// What is wrong with it.
         cause: String,
     },
     /// The body is not valid.
     #[error("{0}")]
     Invalid(String),
-    /// The target directory has something in it.
-    #[error("{0} is not empty")]
+    /// The directory for the results is not empty.
+    #[error("the directory {0} is not empty; give --out a new or empty directory")]
     NotEmpty(String),
     /// The system failed.
     #[error("{0}")]
@@ -50,7 +51,7 @@ pub fn run(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCode, 
     start(&resolve(&spec, threads)?, Vec::new(), out)
 }
 
-/// Goes on from a checkpoint to the end of its scene.
+/// Continues from a checkpoint to the end of its scene.
 ///
 /// # Errors
 /// [`RunError`].
@@ -60,7 +61,7 @@ pub fn resume(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCod
     let mut spec = meta.body;
     if let Some(map) = spec.as_object_mut() {
         map.shift_remove("restart");
-        // Limits belong to the machine that wrote it.
+        // The limits are those of the machine that wrote the checkpoint.
         map.shift_remove("limits");
     }
     let path = std::fs::canonicalize(file)?;
@@ -115,28 +116,54 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
     let mut output = io::stdout().lock();
     match verdict {
         Verdict::Succeeded => {
-            let report: Value = serde_json::from_slice(&std::fs::read(out.join("report.json"))?).unwrap_or_default();
-            for error in report["errors"].as_array().into_iter().flatten() {
-                let value = error["value"].as_f64().unwrap_or(f64::NAN);
-                let word = |name: &str| error[name].as_str().unwrap_or_default().to_owned();
-                writeln!(output, "{:<14} {:<9} {value:.3e}  at t = {}", word("quantity"), word("norm"), error["time"])?;
+            let report: ReportSummary =
+                serde_json::from_slice(&std::fs::read(out.join("report.json"))?).unwrap_or_default();
+            for ErrorSummary { quantity, norm, value, time } in report.errors {
+                let value = value.unwrap_or(f64::NAN);
+                writeln!(output, "{quantity:<14} {norm:<9} {value:.3e}  at t = {time}")?;
             }
-            let cost = |name: &str| report["cost"][name].as_f64().unwrap_or(0.0);
-            writeln!(
-                output,
-                "wall {:.2} s, cpu {:.2} s, {} steps",
-                cost("wall_s"),
-                cost("cpu_s"),
-                report["cost"]["steps"]
-            )?;
+            let CostSummary { wall_s, cpu_s, steps } = report.cost;
+            writeln!(output, "wall {wall_s:.2} s, cpu {cpu_s:.2} s, {steps} steps")?;
             writeln!(output, "results in {}", out.display())?;
             Ok(ExitCode::SUCCESS)
         }
-        other => {
-            writeln!(io::stderr(), "{other:?}")?;
-            Ok(ExitCode::FAILURE)
+        Verdict::Failed { reason, message } => stopped(&format!("the run failed ({}): {message}", reason.word())),
+        Verdict::Paused { reason } => {
+            let reason = reason.map(|reason| format!(" ({})", reason.word())).unwrap_or_default();
+            stopped(&format!("the run paused after a checkpoint{reason}; `meniscus resume` continues it"))
         }
+        Verdict::Canceled => stopped("the run was canceled"),
     }
+}
+
+/// Says on standard error why a run ended early.
+fn stopped(why: &str) -> Result<ExitCode, RunError> {
+    writeln!(io::stderr(), "meniscus: {why}")?;
+    Ok(ExitCode::FAILURE)
+}
+
+/// The part of `report.json` that is printed at the end of a run.
+#[derive(Debug, Default, Deserialize)]
+struct ReportSummary {
+    errors: Vec<ErrorSummary>,
+    cost: CostSummary,
+}
+
+/// An error against the exact solution.
+#[derive(Debug, Deserialize)]
+struct ErrorSummary {
+    quantity: String,
+    norm: String,
+    value: Option<f64>,
+    time: Value,
+}
+
+/// Times in seconds, and steps.
+#[derive(Debug, Default, Deserialize)]
+struct CostSummary {
+    wall_s: f64,
+    cpu_s: f64,
+    steps: u64,
 }
 
 /// Shows records on a terminal and keeps the newest checkpoints.

@@ -2,8 +2,8 @@
 //!
 //! It computes nothing and stores nothing: it translates between HTTP and `meniscus_jobs`.
 
+pub mod accept;
 pub mod access;
-pub mod application;
 pub mod calibration;
 pub mod cli;
 pub mod config;
@@ -11,8 +11,21 @@ pub mod creation;
 pub mod error;
 pub mod file_response;
 pub mod foreground;
+pub mod idempotency;
+pub mod layers;
+pub mod openapi;
+pub mod pagination;
+pub mod path;
+pub mod problems;
+pub mod query;
+pub mod rate_limit;
+pub mod request_body;
+pub mod resource;
+pub mod response_cache;
 pub mod router;
 pub mod routes;
-pub mod shown;
+pub mod serve;
+pub mod state;
+pub mod store_sources;
 pub mod telemetry;
 pub mod views;

@@ -1,4 +1,24 @@
-//! What clients see: the only wire types.
+//! The JSON that clients receive: the only wire types of the API.
+
+/// Declares the view of a list.
+macro_rules! list {
+    ($(#[$doc:meta])* $name:ident of $item:ident, next: $next:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Serialize, ToSchema)]
+        pub struct $name {
+            /// The entries.
+            pub items: Vec<$item>,
+            #[doc = $next]
+            pub next: Option<String>,
+        }
+
+        impl From<(Vec<$item>, Option<String>)> for $name {
+            fn from((items, next): (Vec<$item>, Option<String>)) -> Self {
+                Self { items, next }
+            }
+        }
+    };
+}
 
 mod collections;
 
@@ -7,7 +27,7 @@ pub use collections::{DryRunView, EstimateView, StudyList, StudyView, UploadList
 use meniscus_jobs::service::store::{CheckpointRow, Event, FileRow, JobRow};
 use meniscus_jobs::spec::records::{HealthRecord, Progress, Usage};
 use meniscus_jobs::system::build;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
@@ -17,66 +37,66 @@ use utoipa::ToSchema;
 pub struct JobView {
     /// `job_` and a ULID.
     pub id: String,
-    /// Rises with every change of state.
+    /// Revision; rises with every change of state.
     pub rev: i64,
     /// `queued`, `running`, `pausing`, `paused`, `canceling`, `interrupted`, `succeeded`, `failed` or `canceled`.
     pub state: String,
-    /// Why, unless the state is plain.
+    /// Reason of the state, from a closed list; null where the state needs none.
     pub reason: Option<String>,
-    /// What to do about it.
+    /// What the client can do about the reason.
     pub hint: Option<String>,
-    /// Numbers and places of a failure.
+    /// What failed, with numbers and places.
     pub message: Option<String>,
-    /// Name.
+    /// Name that the client gave.
     pub name: Option<String>,
-    /// Labels.
+    /// Labels that the client gave.
     pub labels: BTreeMap<String, String>,
     /// The body as sent.
     pub spec: Value,
-    /// The body with every default.
+    /// The body with every default filled in.
     pub resolved: Value,
-    /// How far it is.
+    /// Progress of the run.
     pub progress: ProgressView,
-    /// How sound it looks.
+    /// Health of the run.
     pub health: HealthView,
-    /// Number of the latest attempt.
+    /// Number of the latest attempt, from 1; 0 before the first.
     pub attempt: u64,
-    /// Cost so far.
+    /// Resources used so far.
     pub usage: UsageView,
-    /// Where it comes from.
+    /// Objects that the job was made from.
     pub lineage: LineageView,
-    /// What its numbers depend on.
+    /// Build and instruction set, on which the last digits of results depend.
     pub deterministic: DeterministicView,
-    /// RFC 3339, UTC.
+    /// Time of creation (RFC 3339, UTC).
     pub created_at: String,
-    /// RFC 3339, UTC.
+    /// Start of the first attempt (RFC 3339, UTC).
     pub started_at: Option<String>,
-    /// RFC 3339, UTC.
+    /// Time at which the job ended (RFC 3339, UTC).
     pub finished_at: Option<String>,
-    /// Where to go from here.
+    /// Addresses of related resources.
     pub links: BTreeMap<&'static str, String>,
 }
 
-/// How far a job is.
+/// Progress of a job.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ProgressView {
-    /// 0 to 1; never falls.
+    /// Share of the run that is done, from 0 to 1; never decreases.
     pub fraction: f64,
-    /// Scene time.
+    /// Simulated time, in units of the scene.
     pub time: f64,
-    /// Scene time at the end.
+    /// Simulated time at which the run ends.
     pub end_time: f64,
-    /// Steps done.
+    /// Completed steps.
     pub step: u64,
-    /// Speed of late.
+    /// Recent speed in steps per second; null while no worker runs.
     pub steps_per_s: Option<f64>,
-    /// Particles.
+    /// Number of particles.
     pub particles: u64,
-    /// What is being done.
+    /// What the worker does at the moment, or the state of the job.
     pub phase: String,
-    /// Seconds to the end.
+    /// Estimated seconds until the run ends; null while no worker runs.
     pub eta_s: Option<f64>,
-    /// What the estimate rests on.
+    /// Measurements on which the estimate rests.
     pub eta_basis: Option<String>,
 }
 
@@ -95,63 +115,59 @@ pub struct HealthView {
     pub warnings: Vec<String>,
 }
 
-/// Cost of a job.
+/// Resources that a job has used.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct UsageView {
-    /// Running time.
+    /// Wall-clock time of all attempts in seconds.
     pub wall_s: f64,
-    /// CPU time.
+    /// CPU time of all attempts in seconds.
     pub cpu_s: f64,
-    /// Most resident memory.
+    /// Largest resident memory in bytes.
     pub peak_memory_bytes: u64,
-    /// Size of all files.
+    /// Size of all files in bytes.
     pub disk_bytes: u64,
 }
 
-/// Where a job comes from.
+/// Objects that a job was made from.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct LineageView {
-    /// Study.
+    /// Id of the study that the job belongs to.
     pub study: Option<String>,
-    /// Checkpoint that it began with.
+    /// Id of the checkpoint that the job started from.
     pub restarted_from: Option<String>,
-    /// Job that it repeats.
+    /// Id of the failed or canceled job that this job repeats.
     pub retry_of: Option<String>,
 }
 
-/// What a job's numbers depend on.
+/// Build and instruction set: equal values give equal results to the last bit.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct DeterministicView {
-    /// Program.
+    /// Version and commit of the program.
     pub build: String,
-    /// Instruction set.
+    /// Instruction set of the numerics.
     pub isa: String,
 }
 
-/// A page of jobs.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct JobList {
-    /// The jobs.
-    pub items: Vec<JobView>,
-    /// Cursor of the next page.
-    pub next: Option<String>,
+list! {
+    /// A page of jobs.
+    JobList of JobView, next: "Cursor of the next page."
 }
 
-/// An event.
+/// An event in the life of a job.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct EventView {
     /// Number within the job (or the study), from 1 without gaps.
     pub id: u64,
-    /// The job, in the events of a study.
+    /// Id of the job, in the events of a study.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub job: Option<String>,
     /// `state`, `progress`, `checkpoint`, `frame`, `warning` or `finding`.
     pub r#type: String,
-    /// RFC 3339, UTC.
+    /// Time of the event (RFC 3339, UTC).
     pub at: String,
-    /// Attempt.
+    /// Number of the attempt during which it happened.
     pub attempt: u64,
-    /// Particulars.
+    /// Data of the event; its fields depend on the type.
     pub data: Value,
 }
 
@@ -167,27 +183,23 @@ pub struct EventList {
 /// A published file.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct FileView {
-    /// Path among the job's files.
+    /// Path below `/v1/jobs/{id}/files/`.
     pub path: String,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the content, hexadecimal.
     pub sha256: String,
-    /// Media type.
+    /// Media type of the content.
     pub media_type: String,
-    /// Scene time.
+    /// Simulated time that the file shows; null where it shows none.
     pub time: Option<f64>,
-    /// Step.
+    /// Step that the file shows; null where it shows none.
     pub step: Option<u64>,
 }
 
-/// All published files of a job.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct FileList {
-    /// The files in the order of their paths.
-    pub items: Vec<FileView>,
-    /// Always null: the list is whole.
-    pub next: Option<String>,
+list! {
+    /// All published files of a job.
+    FileList of FileView, next: "Always null: the list is whole."
 }
 
 /// A verified checkpoint.
@@ -195,36 +207,32 @@ pub struct FileList {
 pub struct CheckpointView {
     /// `ckpt_` and a ULID.
     pub id: String,
-    /// Job that wrote it.
+    /// Id of the job that wrote it.
     pub job: String,
-    /// Step.
+    /// Step after which it was written.
     pub step: u64,
-    /// Scene time.
+    /// Simulated time of that step.
     pub time: f64,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// RFC 3339, UTC.
+    /// Time of creation (RFC 3339, UTC).
     pub created_at: String,
-    /// Instruction set.
+    /// Instruction set of the machine that wrote it.
     pub isa: String,
-    /// Program.
+    /// Version and commit of the program that wrote it.
     pub build: String,
-    /// Where to go from here.
+    /// Addresses of related resources.
     pub links: BTreeMap<&'static str, String>,
 }
 
-/// All checkpoints of a job, newest first.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct CheckpointList {
-    /// The checkpoints.
-    pub items: Vec<CheckpointView>,
-    /// Always null: the list is whole.
-    pub next: Option<String>,
+list! {
+    /// All checkpoints of a job, newest first.
+    CheckpointList of CheckpointView, next: "Always null: the list is whole."
 }
 
-/// What the service is.
+/// Version and limits of the service.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ServiceView {
     /// Always `meniscus`.
@@ -233,69 +241,79 @@ pub struct ServiceView {
     pub build: String,
     /// Instruction set of the numerics.
     pub isa: String,
-    /// What a job may ask for.
+    /// Limits of requests and jobs.
     pub limits: ServiceLimits,
-    /// Where to go from here.
+    /// Addresses of related resources.
     pub links: BTreeMap<&'static str, &'static str>,
 }
 
-/// What a job may ask for.
+/// Limits of requests and jobs.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct ServiceLimits {
-    /// Jobs at once.
+    /// Jobs that run at the same time.
     pub slots: usize,
-    /// Threads of a job.
+    /// Most threads of a job.
     pub threads: u64,
-    /// Memory of a job.
+    /// Largest memory of a job in bytes.
     pub memory_bytes: u64,
-    /// Bytes of a request's body.
+    /// Largest body of a job in bytes.
     pub body_bytes: usize,
-    /// Bytes of a study's body.
+    /// Largest body of a study in bytes.
     pub study_bytes: usize,
-    /// Bytes of an upload.
+    /// Largest upload in bytes.
     pub upload_bytes: u64,
 }
 
 /// A kind of scene.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct SceneKindView {
-    /// The `kind`.
+    /// Value of `kind` in a scene.
     pub kind: &'static str,
-    /// One line.
+    /// Title in one line.
     pub title: &'static str,
     /// JSON Schema 2020-12 with defaults and ranges.
     pub schema: Value,
-    /// Presets.
+    /// Names of presets.
     pub presets: Vec<&'static str>,
-    /// Fields that a restart may change.
+    /// JSON pointers of the fields that a restart may change.
     pub restart_safe: Vec<String>,
-    /// A job body that runs in seconds.
+    /// A job body that runs within seconds.
     pub example: Value,
 }
 
-/// All kinds of scenes.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct SceneKindList {
-    /// The kinds.
-    pub items: Vec<SceneKindView>,
-    /// Always null: the list is whole.
-    pub next: Option<String>,
+list! {
+    /// All kinds of scenes.
+    SceneKindList of SceneKindView, next: "Always null: the list is whole."
 }
 
-/// Whether the service lives or is ready.
+/// Answer of a health check.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct StatusView {
-    /// `ok`.
+    /// Always `ok`.
     pub status: &'static str,
+}
+
+/// The address of an object, and those of its parts.
+fn links(base: String, parts: &[&'static str]) -> BTreeMap<&'static str, String> {
+    let below = parts.iter().map(|part| (*part, format!("{base}/{part}")));
+    let mut links: BTreeMap<_, _> = below.collect();
+    links.insert("self", base);
+    links
+}
+
+/// What a stored estimate says of a run that has not reported progress yet.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct StoredEstimate {
+    particles: u64,
+    steps: u64,
+    time_step: f64,
 }
 
 impl From<JobRow> for JobView {
     fn from(job: JobRow) -> Self {
-        let base = format!("/v1/jobs/{}", job.id);
-        let mut links = BTreeMap::from([("self", base.clone())]);
-        for name in ["cancel", "pause", "resume", "events", "log", "series", "report", "files", "checkpoints"] {
-            links.insert(name, format!("{base}/{name}"));
-        }
+        let parts = ["cancel", "pause", "resume", "events", "log", "series", "report", "files", "checkpoints"];
+        let links = links(format!("/v1/jobs/{}", job.id), &parts);
         let Progress {
             fraction,
             time,
@@ -309,16 +327,12 @@ impl From<JobRow> for JobView {
             health,
             usage: _,
         } = job.progress;
-        // A job at rest has no speed.
-        let moving = job.state.has_worker();
+        // Speed and remaining time have a meaning only while a worker runs.
+        let is_running = job.state.has_worker();
         let HealthRecord { finite, max_cfl, volume_drift, rescued_fits } = health;
         let Usage { wall_s, cpu_s, peak_memory_bytes, disk_bytes } = job.usage;
-        let end_time = if end_time > 0.0 {
-            end_time
-        } else {
-            let estimate = |name: &str| job.estimate[name].as_f64().unwrap_or(0.0);
-            estimate("steps") * estimate("time_step")
-        };
+        let estimate = StoredEstimate::deserialize(&job.estimate).unwrap_or_default();
+        let end_time = if end_time > 0.0 { end_time } else { estimate.steps as f64 * estimate.time_step };
         Self {
             rev: job.rev,
             state: job.state.word().to_owned(),
@@ -334,11 +348,11 @@ impl From<JobRow> for JobView {
                 time,
                 end_time,
                 step,
-                steps_per_s: steps_per_s.filter(|_| moving),
-                particles: if particles > 0 { particles } else { job.estimate["particles"].as_u64().unwrap_or(0) },
-                phase: if moving { phase } else { job.state.word().to_owned() },
-                eta_s: eta_s.filter(|_| moving),
-                eta_basis: eta_basis.filter(|_| moving),
+                steps_per_s: steps_per_s.filter(|_| is_running),
+                particles: if particles > 0 { particles } else { estimate.particles },
+                phase: if is_running { phase } else { job.state.word().to_owned() },
+                eta_s: eta_s.filter(|_| is_running),
+                eta_basis: eta_basis.filter(|_| is_running),
             },
             health: HealthView { finite, max_cfl, volume_drift, rescued_fits, warnings: job.warnings },
             attempt: job.attempt,

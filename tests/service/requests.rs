@@ -104,7 +104,11 @@ fn other_requests_get_problems_too() {
         assert_eq!(answer.json()["status"], status);
         assert!(answer.header("x-request-id").is_some());
         assert!(!answer.text().contains(service.data.to_str().unwrap()));
+        let explained = service.get(answer.json()["type"].as_str().unwrap());
+        assert_eq!((explained.status, explained.header("content-type")), (200, Some("text/plain; charset=utf-8")));
+        assert!(explained.text().starts_with(answer.json()["title"].as_str().unwrap()), "{}", explained.text());
     }
+    assert_eq!(service.get("/problems/nothing").status, 404);
     // curl waits for a word before it sends a large body, and gets the answer instead.
     let large = service.data.join("large.json");
     std::fs::write(&large, vec![b' '; 2 << 20]).unwrap();
@@ -117,6 +121,24 @@ fn other_requests_get_problems_too() {
     assert_eq!(String::from_utf8_lossy(&said.stdout), "413");
     // The service is none the worse for it.
     assert_eq!(service.get("/readyz").status, 200);
+}
+
+#[test]
+fn all_errors_of_a_query_come_at_once() {
+    let (_directory, service) = service(&[]);
+    let query = "stat=queued&state=queued,asleep&limit=501&created_after=yesterday&sort=created&label.a=1";
+    let answer = service.get(&format!("/v1/jobs?{query}"));
+    assert_eq!(answer.status, 422, "{}", answer.text());
+    assert_eq!(answer.pointers(), ["stat", "state", "limit", "created_after", "sort"]);
+    let errors = answer.json()["errors"].clone();
+    assert_eq!(errors[0]["did_you_mean"], "state");
+    assert_eq!((&errors[1]["got"], &errors[1]["code"]), (&json!("asleep"), &json!("unknown")));
+    assert!(errors[1]["allowed"].as_array().unwrap().contains(&json!("canceled")));
+    assert_eq!((&errors[2]["code"], &errors[2]["allowed"]), (&json!("range"), &json!("1 to 500")));
+    assert_eq!(errors[4]["did_you_mean"], "created_at");
+    let answer = service.request("POST", "/v1/uploads?nam=x", &[], Some(b"1 2 3\n"));
+    assert_eq!(answer.pointers(), ["nam", "as"]);
+    assert_eq!(answer.json()["errors"][1]["allowed"], json!(["checkpoint", "points", "surface", "queries"]));
 }
 
 #[test]

@@ -1,84 +1,95 @@
 //! Checkpoints of jobs.
 
-use crate::application::Application;
 use crate::error::{ApiError, Problem};
 use crate::file_response::{FileFacts, file_response};
-use crate::routes::{job, with_store};
+use crate::path::Path;
+use crate::resource::{self, Deletion, Resource};
+use crate::state::AppState;
 use crate::views::{CheckpointList, CheckpointView, JobView};
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Redirect, Response};
-use meniscus_jobs::service::store::CheckpointRow;
+use meniscus_jobs::service::store::{CheckpointRow, JobRow, Store, StoreError};
 use meniscus_jobs::spec::attempt_spec::attempt_directory;
 use meniscus_jobs::spec::states::State as JobState;
 use meniscus_jobs::worker::observers::frames::HDF5;
 
-/// A job's verified checkpoints, newest first.
+/// Verified checkpoints of a job, newest first.
 #[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 200, body = CheckpointList), (status = 404, body = Problem)))]
-pub async fn list(
-    State(application): State<Application>,
-    Path(id): Path<String>,
-) -> Result<Json<CheckpointList>, ApiError> {
-    let row = job(&application, &id).await?;
-    let rows = with_store(&application, move |store| Ok(store.checkpoints(&row.id)?)).await?;
-    Ok(Json(CheckpointList { items: rows.into_iter().map(CheckpointView::from).collect(), next: None }))
+pub async fn list(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<CheckpointList>, ApiError> {
+    let views = of_job(&state, id).await?.into_iter().map(CheckpointView::from).collect();
+    Ok(Json(CheckpointList::from((views, None))))
 }
 
-/// Asks for a checkpoint at the end of the running step.
+/// Requests a checkpoint at the end of the current step.
 #[utoipa::path(post, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn request(State(application): State<Application>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    let row = job(&application, &id).await?;
+pub async fn request(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
+    let row = resource::find::<JobRow>(&state, id).await?;
     if row.state != JobState::Running {
-        return Err(ApiError::Conflict(format!("a job that is {} writes no checkpoints", row.state.word())));
+        let why = format!("The job is {}. Only running jobs write checkpoints.", row.state.word());
+        return Err(ApiError::Conflict(why));
     }
-    application.supervisor.checkpoint(&row.id);
+    state.supervisor.checkpoint(&row.id);
     Ok((StatusCode::ACCEPTED, Json(JobView::from(row))).into_response())
 }
 
-/// The content of the newest checkpoint, by redirection.
+/// Redirects to the content of the newest checkpoint.
 #[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints/latest/content", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 307), (status = 404, body = Problem)))]
-pub async fn latest(State(application): State<Application>, Path(id): Path<String>) -> Result<Redirect, ApiError> {
-    let row = job(&application, &id).await?;
-    let rows = with_store(&application, move |store| Ok(store.checkpoints(&row.id)?)).await?;
+pub async fn latest(State(state): State<AppState>, Path(id): Path<String>) -> Result<Redirect, ApiError> {
+    let rows = of_job(&state, id).await?;
     let newest = rows.first().ok_or(ApiError::NotFound("checkpoint"))?;
     Ok(Redirect::temporary(&format!("/v1/checkpoints/{}/content", newest.id)))
 }
 
-async fn checkpoint(application: &Application, id: String) -> Result<CheckpointRow, ApiError> {
-    with_store(application, move |store| store.checkpoint(&id)?.ok_or(ApiError::NotFound("checkpoint"))).await
+/// The checkpoints of a job, newest first.
+async fn of_job(state: &AppState, id: String) -> Result<Vec<CheckpointRow>, ApiError> {
+    let job = resource::find::<JobRow>(state, id).await?;
+    state.with_store(move |store| Ok(store.checkpoints(&job.id)?)).await
+}
+
+impl Resource for CheckpointRow {
+    const NOUN: &'static str = "checkpoint";
+    const IS_ONE_ROW: bool = true;
+    type View = CheckpointView;
+
+    fn id(&self) -> &str {
+        &self.id
+    }
+
+    fn find(store: &Store, id: &str) -> Result<Option<Self>, StoreError> {
+        store.checkpoint(id)
+    }
+
+    /// A download that is in progress keeps its file open and completes.
+    fn delete(&self, store: &Store) -> Result<Deletion, StoreError> {
+        if let Some(job) = store.job(&self.job)?.filter(|job| !job.state.is_terminal()) {
+            let state = job.state.word();
+            let why = format!("The job that wrote it is {state} and may continue from it. Cancel the job first.");
+            return Ok(Deletion::Refused(why));
+        }
+        if store.delete_checkpoint(self)? {
+            return Ok(Deletion::Done);
+        }
+        Ok(Deletion::Refused("An unfinished job restarts from it. Wait, or cancel that job first.".to_owned()))
+    }
 }
 
 /// One checkpoint.
 #[utoipa::path(get, path = "/v1/checkpoints/{id}", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 200, body = CheckpointView), (status = 404, body = Problem)))]
-pub async fn get(
-    State(application): State<Application>,
-    Path(id): Path<String>,
-) -> Result<Json<CheckpointView>, ApiError> {
-    Ok(Json(checkpoint(&application, id).await?.into()))
+pub async fn get(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<CheckpointView>, ApiError> {
+    resource::get::<CheckpointRow>(&state, id).await
 }
 
-/// Deletes a checkpoint of a job at its end. While the job may still need it, 409.
+/// Deletes a checkpoint of a job that has ended, unless an unfinished job restarts from it.
 #[utoipa::path(delete, path = "/v1/checkpoints/{id}", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn delete(State(application): State<Application>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    let row = checkpoint(&application, id).await?;
-    let owner = job(&application, &row.job).await?;
-    if !owner.state.is_terminal() {
-        return Err(ApiError::Conflict(format!(
-            "the job that wrote it is {} and may go on from it",
-            owner.state.word()
-        )));
-    }
-    // A download that is under way keeps its file open and comes to its end.
-    if with_store(&application, move |store| Ok(store.delete_checkpoint(&row)?)).await? {
-        return Ok(StatusCode::NO_CONTENT);
-    }
-    Err(ApiError::Conflict("a restart from it has not ended".to_owned()))
+pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
+    resource::delete::<CheckpointRow>(&state, id).await
 }
 
 /// The file of a checkpoint, or a part of it.
@@ -87,12 +98,12 @@ pub async fn delete(State(application): State<Application>, Path(id): Path<Strin
     responses((status = 200, content_type = "application/x-hdf5"), (status = 206), (status = 304),
         (status = 404, body = Problem), (status = 416, body = Problem)))]
 pub async fn content(
-    State(application): State<Application>,
+    State(state): State<AppState>,
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let row = checkpoint(&application, id).await?;
+    let row = resource::find::<CheckpointRow>(&state, id).await?;
     let facts = FileFacts { sha256: Some(row.sha256), media_type: HDF5.to_owned(), name: format!("{}.h5", row.id) };
-    let place = attempt_directory(&application.store.job_directory(&row.job), row.attempt).join(&row.path);
+    let place = attempt_directory(&state.store.job_directory(&row.job), row.attempt).join(&row.path);
     file_response(&place, &facts, &headers).await
 }

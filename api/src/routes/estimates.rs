@@ -1,33 +1,32 @@
-//! What a job would take, without making it.
+//! What a job would need, without creating it.
 
-use crate::application::Application;
-use crate::creation::read;
 use crate::error::{ApiError, Problem};
+use crate::request_body;
 use crate::routes::jobs::BODY_LIMIT;
-use crate::routes::{StoreSources, with_store};
+use crate::state::AppState;
+use crate::store_sources::StoreSources;
 use crate::views::EstimateView;
 use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::HeaderMap;
-use meniscus_jobs::spec::strict_json;
 
-/// Checks a job's body and says what it would take. Nothing is made.
+/// Checks the body of a job and estimates its particles, steps, memory, disk space and time. Creates nothing.
 #[utoipa::path(post, path = "/v1/estimates", tag = "jobs",
     request_body(content = Object, description = "a job body, as for POST /v1/jobs"),
     responses((status = 200, body = EstimateView), (status = 400, body = Problem), (status = 413, body = Problem),
         (status = 422, body = Problem)))]
 pub async fn estimate(
-    State(application): State<Application>,
+    State(state): State<AppState>,
     headers: HeaderMap,
     content: Body,
 ) -> Result<Json<EstimateView>, ApiError> {
-    let bytes = read(&headers, content, BODY_LIMIT).await?;
-    let allowance = application.config.allowance();
-    with_store(&application, move |store| {
-        let spec = strict_json::parse(&bytes).map_err(|error| ApiError::Unparsable(error.to_string()))?;
+    let bytes = request_body::read(&headers, content, BODY_LIMIT).await?;
+    let allowance = state.config.allowance();
+    let estimated = state.with_store(move |store| {
+        let spec = request_body::parse_json(&bytes)?;
         let body = StoreSources::new(store).understand(&spec, allowance, &store.calibration()?)?;
-        Ok(Json(EstimateView::from(body)))
-    })
-    .await
+        Ok::<_, ApiError>(Json(EstimateView::from(body)))
+    });
+    estimated.await
 }

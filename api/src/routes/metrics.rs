@@ -1,8 +1,7 @@
-//! What an operator watches, as Prometheus text.
+//! Counters and gauges for operators, as Prometheus text.
 
-use crate::application::Application;
 use crate::error::{ApiError, Problem};
-use crate::routes::with_store;
+use crate::state::AppState;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -13,8 +12,8 @@ use metrics::gauge;
 /// Counters and gauges as Prometheus text.
 #[utoipa::path(get, path = "/metrics", tag = "service",
     responses((status = 200, content_type = "text/plain"), (status = 503, body = Problem)))]
-pub async fn metrics(State(application): State<Application>) -> Result<Response, ApiError> {
-    let census = with_store(&application, |store| Ok(store.census()?)).await?;
+pub async fn metrics(State(state): State<AppState>) -> Result<Response, ApiError> {
+    let census = state.with_store(|store| Ok::<_, ApiError>(store.census()?)).await?;
     for state in JobState::ALL {
         let count = census.by_state.get(state).copied().unwrap_or(0);
         gauge!("meniscus_jobs", "state" => state.word()).set(count as f64);
@@ -22,13 +21,13 @@ pub async fn metrics(State(application): State<Application>) -> Result<Response,
     gauge!("meniscus_queue_oldest_seconds").set(census.oldest_queued_s);
     gauge!("meniscus_store_bytes").set(census.store_bytes as f64);
     gauge!("meniscus_uploads_quarantined").set(census.quarantined as f64);
-    gauge!("meniscus_slots").set(application.config.slots as f64);
-    let free = process::free_space(application.store.directory()).unwrap_or(0);
+    gauge!("meniscus_slots").set(state.config.slots as f64);
+    let free = process::free_space(state.store.directory()).unwrap_or(0);
     gauge!("meniscus_disk_free_bytes").set(free as f64);
-    gauge!("meniscus_disk_reserve_bytes").set(application.config.disk_reserve_bytes as f64);
+    gauge!("meniscus_disk_reserve_bytes").set(state.config.disk_reserve_bytes as f64);
     gauge!("meniscus_resident_bytes").set(process::resident_bytes(std::process::id()).unwrap_or(0) as f64);
     gauge!("meniscus_cpu_seconds_total").set(process::cpu_seconds());
     gauge!("meniscus_memory_available_bytes").set(process::available_memory().unwrap_or(0) as f64);
-    let text = application.metrics.render();
+    let text = state.metrics.render();
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())
 }

@@ -1,9 +1,9 @@
 //! Kinds of scenes.
 
 use crate::error::{ApiError, Problem};
+use crate::path::Path;
 use crate::views::{SceneKindList, SceneKindView};
 use axum::Json;
-use axum::extract::Path;
 use meniscus::scene::{SceneKind, json_schema};
 use meniscus::scenes::{SCENES, find};
 
@@ -14,18 +14,18 @@ fn view(kind: &SceneKind) -> SceneKindView {
         schema: json_schema::of_kind(kind),
         presets: kind.presets.to_vec(),
         restart_safe: json_schema::restart_safe(kind),
-        // Part of the program; a test runs every one.
+        // The example is part of the program; a test runs it.
         example: serde_json::from_str(kind.example).unwrap_or_default(),
     }
 }
 
-/// All kinds with their schemas.
+/// All kinds of scenes with their schemas.
 #[utoipa::path(get, path = "/v1/scenes", tag = "scenes", responses((status = 200, body = SceneKindList)))]
 pub async fn list() -> Json<SceneKindList> {
-    Json(SceneKindList { items: SCENES.iter().map(|kind| view(kind)).collect(), next: None })
+    Json(SceneKindList::from((SCENES.iter().map(|kind| view(kind)).collect(), None)))
 }
 
-/// One kind with its schema.
+/// One kind of scene with its schema.
 #[utoipa::path(get, path = "/v1/scenes/{kind}", tag = "scenes", params(("kind" = String, Path)),
     responses((status = 200, body = SceneKindView), (status = 404, body = Problem)))]
 pub async fn get(Path(kind): Path<String>) -> Result<Json<SceneKindView>, ApiError> {

@@ -1,31 +1,30 @@
-//! What the service is and whether it works.
+//! Version, limits and health of the service.
 
-use crate::application::Application;
 use crate::error::{ApiError, Problem};
 use crate::routes::jobs::BODY_LIMIT;
 use crate::routes::studies;
+use crate::state::AppState;
 use crate::views::{ServiceLimits, ServiceView, StatusView};
 use axum::Json;
 use axum::extract::State;
 use meniscus_jobs::system::build;
 use std::collections::BTreeMap;
-use std::sync::atomic::Ordering;
 
-/// Version, limits, links.
+/// Version and limits of the service, and links to all lists.
 #[utoipa::path(get, path = "/v1", tag = "service", responses((status = 200, body = ServiceView)))]
-pub async fn index(State(application): State<Application>) -> Json<ServiceView> {
-    let allowance = application.config.allowance();
+pub async fn index(State(state): State<AppState>) -> Json<ServiceView> {
+    let allowance = state.config.allowance();
     Json(ServiceView {
         name: "meniscus",
         build: build::name(),
         isa: build::isa(),
         limits: ServiceLimits {
-            slots: application.config.slots,
+            slots: state.config.slots,
             threads: allowance.threads,
             memory_bytes: allowance.memory_bytes,
             body_bytes: BODY_LIMIT,
             study_bytes: studies::BODY_LIMIT,
-            upload_bytes: application.config.upload_bytes,
+            upload_bytes: state.config.upload_bytes,
         },
         links: BTreeMap::from([
             ("scenes", "/v1/scenes"),
@@ -39,19 +38,15 @@ pub async fn index(State(application): State<Application>) -> Json<ServiceView> 
     })
 }
 
-/// The process answers.
+/// The process is alive.
 #[utoipa::path(get, path = "/healthz", tag = "service", responses((status = 200, body = StatusView)))]
 pub async fn health() -> Json<StatusView> {
     Json(StatusView { status: "ok" })
 }
 
-/// Every unfinished job is in a legal state; work is accepted.
+/// The service has recovered its jobs and accepts requests.
 #[utoipa::path(get, path = "/readyz", tag = "service",
     responses((status = 200, body = StatusView), (status = 503, body = Problem)))]
-pub async fn ready(State(application): State<Application>) -> Result<Json<StatusView>, ApiError> {
-    if application.ready.load(Ordering::Acquire) {
-        Ok(Json(StatusView { status: "ok" }))
-    } else {
-        Err(ApiError::NotReady)
-    }
+pub async fn ready(State(state): State<AppState>) -> Result<Json<StatusView>, ApiError> {
+    if state.phase.is_ready() { Ok(Json(StatusView { status: "ok" })) } else { Err(ApiError::NotReady) }
 }

@@ -1,4 +1,4 @@
-//! Studies, uploads and estimates as clients see them.
+//! Views of studies, uploads and estimates.
 
 use meniscus_jobs::service::store::{StudyRow, UploadRow};
 use meniscus_jobs::spec::body::JobBody;
@@ -13,15 +13,15 @@ use utoipa::ToSchema;
 pub struct StudyView {
     /// `std_` and a ULID.
     pub id: String,
-    /// Name.
+    /// Name that the client gave.
     pub name: Option<String>,
-    /// Labels.
+    /// Labels that the client gave.
     pub labels: BTreeMap<String, String>,
-    /// `queued`, `running`, `paused`, `succeeded`, `failed` or `canceled`, from what its points are in.
+    /// `queued`, `running`, `paused`, `succeeded`, `failed` or `canceled`: follows from the states of its points.
     pub state: &'static str,
     /// Points by the state of their latest job; `deleted` where the job was deleted.
     pub counts: BTreeMap<String, u64>,
-    /// Points.
+    /// Number of points.
     pub points: u64,
     /// Share of the points that have ended.
     pub fraction: f64,
@@ -29,35 +29,31 @@ pub struct StudyView {
     pub base: Value,
     /// The sweep as sent.
     pub sweep: Value,
-    /// Pointers that vary.
+    /// JSON pointers of the values that vary.
     pub axes: Vec<String>,
-    /// Jobs at once.
+    /// Most jobs of the study that run at the same time; null for no limit.
     pub max_parallel: Option<u64>,
-    /// `continue` or `stop`.
+    /// What happens if a point fails: `continue` or `stop`.
     pub on_failure: String,
-    /// What all points were estimated to take.
+    /// Estimate of all points together.
     pub estimate: Value,
-    /// RFC 3339, UTC.
+    /// Time of creation (RFC 3339, UTC).
     pub created_at: String,
-    /// Where to go from here.
+    /// Addresses of related resources.
     pub links: BTreeMap<&'static str, String>,
 }
 
-/// A page of studies.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct StudyList {
-    /// The studies.
-    pub items: Vec<StudyView>,
-    /// Cursor of the next page.
-    pub next: Option<String>,
+list! {
+    /// A page of studies.
+    StudyList of StudyView, next: "Cursor of the next page."
 }
 
-/// What a study would be.
+/// Points and estimate of a study that was not created.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct DryRunView {
     /// The values of every point, by pointer.
     pub points: Vec<Value>,
-    /// What all points would take.
+    /// Estimate of all points together.
     pub estimate: Value,
 }
 
@@ -66,64 +62,61 @@ pub struct DryRunView {
 pub struct UploadView {
     /// `upl_` and a ULID.
     pub id: String,
-    /// `checkpoint`, `points`, `surface` or `queries`.
+    /// What the file is used as: `checkpoint`, `points`, `surface` or `queries`.
     pub r#as: &'static str,
     /// `quarantined`, `ready` or `rejected`.
     pub state: String,
-    /// Why it was rejected.
+    /// Why the file was rejected.
     pub reason: Option<String>,
-    /// What was found in it.
+    /// What was found in the file.
     pub found: Value,
-    /// Name.
+    /// Name that the client gave.
     pub name: Option<String>,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// RFC 3339, UTC.
+    /// Time of creation (RFC 3339, UTC).
     pub created_at: String,
-    /// When the check ended.
+    /// Time at which the examination ended (RFC 3339, UTC).
     pub checked_at: Option<String>,
-    /// Where to go from here.
+    /// Addresses of related resources.
     pub links: BTreeMap<&'static str, String>,
 }
 
-/// A page of uploads.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct UploadList {
-    /// The uploads.
-    pub items: Vec<UploadView>,
-    /// Cursor of the next page.
-    pub next: Option<String>,
+list! {
+    /// A page of uploads.
+    UploadList of UploadView, next: "Cursor of the next page."
 }
 
-/// What a job would take.
+/// What a job would need.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct EstimateView {
-    /// The body with every default.
+    /// The body with every default filled in.
     pub resolved: Value,
-    /// Particles.
+    /// Number of particles.
     pub particles: u64,
-    /// Time step.
+    /// Time step, in units of the scene.
     pub time_step: f64,
-    /// Steps.
+    /// Number of steps.
     pub steps: u64,
-    /// Resident memory of the worker.
+    /// Resident memory of the worker in bytes.
     pub memory_bytes: u64,
-    /// Size of all files.
+    /// Size of all files in bytes.
     pub disk_bytes: u64,
-    /// CPU seconds; null while nothing is known of this machine.
+    /// CPU time in seconds; null if the speed of this machine is unknown.
     pub cpu_s: Option<f64>,
-    /// Seconds by the clock, once it runs.
+    /// Wall-clock time in seconds, without waiting in the queue; null if the speed of this machine is unknown.
     pub wall_s: Option<f64>,
-    /// What the times rest on.
+    /// Measurements on which the times rest.
     pub basis: String,
 }
 
 impl From<JobBody> for EstimateView {
     fn from(body: JobBody) -> Self {
-        let json = body.forecast.to_json();
+        let basis = body.forecast.basis().to_owned();
         let estimate = body.forecast.estimate;
+        let time = body.forecast.time.as_ref();
         Self {
             resolved: body.resolved,
             particles: estimate.particles,
@@ -131,20 +124,20 @@ impl From<JobBody> for EstimateView {
             steps: estimate.steps,
             memory_bytes: body.forecast.memory_bytes,
             disk_bytes: body.forecast.disk_bytes,
-            cpu_s: json["cpu_s"].as_f64(),
-            wall_s: json["wall_s"].as_f64(),
-            basis: json["basis"].as_str().unwrap_or_default().to_owned(),
+            cpu_s: time.map(|time| time.cpu_s),
+            wall_s: time.map(|time| time.wall_s),
+            basis,
         }
     }
 }
 
-/// What a study is in, by its points.
+/// State of a study from the states of its points.
 fn state_of(counts: &BTreeMap<State, u64>) -> &'static str {
     let has = |wanted: &[State]| counts.iter().any(|(state, count)| *count > 0 && wanted.contains(state));
     if has(&[State::Running, State::Pausing, State::Canceling, State::Interrupted]) {
         "running"
     } else if has(&[State::Queued]) {
-        // Between two of its jobs a study runs.
+        // A study also runs between two of its jobs.
         if has(&[State::Succeeded, State::Failed]) { "running" } else { "queued" }
     } else if has(&[State::Paused]) {
         "paused"
@@ -167,11 +160,8 @@ impl From<StudyRow> for StudyView {
         if deleted > 0 {
             counts.insert("deleted".to_owned(), deleted);
         }
-        let base = format!("/v1/studies/{}", row.id);
-        let mut links = BTreeMap::from([("self", base.clone())]);
-        for name in ["jobs", "events", "table", "report", "cancel", "pause", "resume", "retry"] {
-            links.insert(name, format!("{base}/{name}"));
-        }
+        let parts = ["jobs", "events", "table", "report", "cancel", "pause", "resume", "retry"];
+        let links = super::links(format!("/v1/studies/{}", row.id), &parts);
         Self {
             state: state_of(&row.counts),
             fraction: (ended + deleted) as f64 / row.points.max(1) as f64,

@@ -50,6 +50,12 @@ impl Forecast {
         self.time = calibration.time(&self.family, &self.work, self.threads);
     }
 
+    /// Measurements on which the estimated times rest.
+    #[must_use]
+    pub fn basis(&self) -> &str {
+        self.time.as_ref().map_or("nothing was measured on this machine yet", |time| &time.basis)
+    }
+
     /// As it stands in the store and in answers.
     #[must_use]
     pub fn to_json(&self) -> Value {
@@ -64,7 +70,7 @@ impl Forecast {
             "disk_bytes": self.disk_bytes,
             "cpu_s": self.time.as_ref().map(|time| time.cpu_s),
             "wall_s": self.time.as_ref().map(|time| time.wall_s),
-            "basis": self.time.as_ref().map_or("nothing was measured on this machine yet", |time| &time.basis),
+            "basis": self.basis(),
             "time": self.time,
             "family": self.family,
             "work": work,

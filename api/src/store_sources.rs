@@ -1,26 +1,32 @@
-//! Checkpoints and uploads as the store knows them.
+//! Checkpoints and uploads that bodies name, looked up in the store.
 
 use crate::error::ApiError;
 use meniscus_jobs::service::store::{Store, StoreError};
 use meniscus_jobs::spec::body::{self, Allowance, JobBody, RestartSource, Sources};
 use meniscus_jobs::spec::calibration::Calibration;
 use meniscus_jobs::spec::uploads::Purpose;
+use serde::Deserialize;
 use serde_json::Value;
 use std::cell::RefCell;
 
-/// Looks things up; remembers when the store failed, since that is not the same as "not there".
-pub(crate) struct StoreSources<'a> {
+/// Looks up ids in the store. A failure of the store is remembered, since it does not mean that the id is unknown.
+pub struct StoreSources<'a> {
     store: &'a Store,
     failure: RefCell<Option<StoreError>>,
 }
 
 impl<'a> StoreSources<'a> {
-    pub(crate) fn new(store: &'a Store) -> Self {
+    /// Sources in this store.
+    #[must_use]
+    pub fn new(store: &'a Store) -> Self {
         Self { store, failure: RefCell::new(None) }
     }
 
-    /// A job's body as it will be run, with what it will take.
-    pub(crate) fn understand(
+    /// Checks the body of a job, fills in its defaults, and estimates its time.
+    ///
+    /// # Errors
+    /// All that is wrong with the body, or a failing store.
+    pub fn understand(
         &self,
         spec: &Value,
         allowance: Allowance,
@@ -33,8 +39,11 @@ impl<'a> StoreSources<'a> {
         Ok(body)
     }
 
-    /// Whether the store failed while it was asked.
-    pub(crate) fn check(&self) -> Result<(), ApiError> {
+    /// Reports a failure of the store since the last check.
+    ///
+    /// # Errors
+    /// The failure.
+    pub fn check(&self) -> Result<(), ApiError> {
         self.failure.take().map_or(Ok(()), |error| Err(error.into()))
     }
 
@@ -44,6 +53,12 @@ impl<'a> StoreSources<'a> {
             None
         })
     }
+}
+
+/// What an examination found in a file with points.
+#[derive(Deserialize)]
+struct FoundPoints {
+    points: u64,
 }
 
 impl Sources for StoreSources<'_> {
@@ -57,6 +72,7 @@ impl Sources for StoreSources<'_> {
 
     fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
         let row = self.found(self.store.upload(id)).filter(|row| row.state == "ready")?;
-        Some((row.purpose, row.found["points"].as_u64()?))
+        let found = FoundPoints::deserialize(&row.found).ok()?;
+        Some((row.purpose, found.points))
     }
 }
