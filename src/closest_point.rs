@@ -5,7 +5,7 @@
 //! polynomial's zero.
 
 pub mod detection;
-pub mod enclosed_measure;
+pub mod enclosed_moments;
 pub mod level_surface;
 pub mod material;
 pub mod method;
@@ -19,7 +19,7 @@ pub mod surface_columns;
 pub use level_surface::LevelSurface;
 pub use material::MaterialSurface;
 pub use method::PcpMethod;
-pub use queries::Answers;
+pub use queries::ClosestPoints;
 pub use redistancing::{ClosestPoint, Redistancing};
-pub use rescue::{RescueCounts, Soundness};
+pub use rescue::{FitDiagnostics, RescueCounts};
 pub use surface_columns::SurfaceColumns;

@@ -33,5 +33,5 @@ pub trait NeighborSearch<const D: usize> {
     }
 
     /// The nearest point not farther than `reach`, as (index, distance); among equals the least index.
-    fn nearest(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)>;
+    fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)>;
 }

@@ -17,4 +17,4 @@ pub use charts::{Chart, FlatChart, Functional, NormalCopies, TangentChart};
 pub use construction::{Construction, construct};
 pub use derivative_tensor::{Tensor, derivative_tensor, divergence, sum_of_minors};
 pub use evaluation::Evaluation;
-pub use fits::{Soundness, Support};
+pub use fits::{Support, SupportDiagnostics};

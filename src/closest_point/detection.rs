@@ -76,7 +76,7 @@ impl<const D: usize> Detection<D> {
         self.is_inside.clear();
         self.is_inside.extend(level.iter().map(|l| *l < 0.0));
         let (cells, is_inside) = (&self.cells, &self.is_inside);
-        let (starts, order) = (cells.starts(), cells.order());
+        let (starts, order) = (cells.starts(), cells.permutation());
         self.signs.clear();
         self.signs.extend(order.iter().map(|i| is_inside[*i]));
         let signs = &self.signs;
@@ -85,7 +85,7 @@ impl<const D: usize> Detection<D> {
             let mark = |inside: &bool| if *inside { INSIDE } else { OUTSIDE };
             signs[range[0]..range[1]].iter().map(mark).fold(0, |all, mark| all | mark)
         }));
-        cells.spread(&mut self.marks, &mut self.before);
+        cells.spread_marks(&mut self.marks, &mut self.before);
         self.candidates.clear();
         for (cell, mark) in self.marks.iter().enumerate() {
             if *mark == INSIDE | OUTSIDE {

@@ -1,9 +1,9 @@
 //! A surface of particles, by whichever fits: in space or in material coordinates.
 
 use super::material::MaterialSurface;
-use super::queries::Answers;
+use super::queries::ClosestPoints;
 use super::redistancing::{ClosestPoint, Redistancing};
-use super::rescue::Soundness;
+use super::rescue::FitDiagnostics;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
@@ -11,9 +11,9 @@ use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 /// The zero of a level set carried by particles.
 #[derive(Debug)]
 pub enum LevelSurface<const D: usize> {
-    /// Fits over neighbours in space.
+    /// Fits over neighbors in space.
     Spatial(Box<Redistancing<D>>),
-    /// Fits over neighbours in the initial positions.
+    /// Fits over neighbors in the initial positions.
     Material(Box<MaterialSurface<D>>),
 }
 
@@ -60,8 +60,8 @@ impl<const D: usize> LevelSurface<D> {
 
     /// The closest point of the surface for any point with a point of the surface within `reach`.
     #[must_use]
-    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
-        each!(self, surface => surface.query(x, reach))
+    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
+        each!(self, surface => surface.query(x, cutoff))
     }
 
     /// [`Self::query`] for many points.
@@ -71,11 +71,11 @@ impl<const D: usize> LevelSurface<D> {
     pub fn closest_points(
         &self,
         points: &[Vector<D>],
-        reach: f64,
-        answers: &mut Answers<D>,
+        cutoff: f64,
+        answers: &mut ClosestPoints<D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
-        each!(self, surface => surface.closest_points(points, reach, answers, interrupt))
+        each!(self, surface => surface.closest_points(points, cutoff, answers, interrupt))
     }
 
     /// h.
@@ -109,17 +109,17 @@ impl<const D: usize> LevelSurface<D> {
 
     /// How sound fits and queries have been so far.
     #[must_use]
-    pub fn soundness(&self) -> &Soundness {
-        each!(self, surface => surface.soundness())
+    pub fn fit_diagnostics(&self) -> &FitDiagnostics {
+        each!(self, surface => surface.fit_diagnostics())
     }
 
     /// The same, to take over that of an earlier part of the run or of a copy.
-    pub fn soundness_mut(&mut self) -> &mut Soundness {
-        each!(self, surface => surface.soundness_mut())
+    pub fn fit_diagnostics_mut(&mut self) -> &mut FitDiagnostics {
+        each!(self, surface => surface.fit_diagnostics_mut())
     }
 
     /// Mean and maximum of a measure over the points of the surface, in their order; (0, 0) without any.
-    pub fn over_samples(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
+    pub fn mean_and_max(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
         let values: Vec<f64> = self.sample_points().par_iter().map(&measure).collect();
         // A NaN must not be lost in the maximum.
         let is_broken = values.iter().any(|v| v.is_nan());

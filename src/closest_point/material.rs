@@ -1,8 +1,8 @@
 //! The surface by fits in material coordinates, for particles with unbroken histories.
 //!
 //! Where particles are carried by a flow and keep their level ψ, both ψ and the position x are smooth functions of the
-//! particle's initial position X, however distorted the particles lie now. Fits of ψ(X) and x(X) over neighbours in the
-//! *initial* positions keep two sheets of a filament apart by themselves, and the neighbours never change. The chain rule
+//! particle's initial position X, however distorted the particles lie now. Fits of ψ(X) and x(X) over neighbors in the
+//! *initial* positions keep two sheets of a filament apart by themselves, and the neighbors never change. The chain rule
 //! gives the level set in space:
 //!
 //! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹,
@@ -13,9 +13,9 @@ use super::detection::Detection;
 use super::method::PcpMethod;
 use super::newton::{ACCEPTED, LONGEST_STEP, Progress, is_last_step, newton_step, tangents};
 use super::projection::{Projected, project};
-use super::queries::{Answers, QUERIES};
-use super::redistancing::{ClosestPoint, Tally};
-use super::rescue::{Soundness, add};
+use super::queries::{ClosestPoints, QUERIES};
+use super::redistancing::{ClosestPoint, QueryCounts};
+use super::rescue::{FitDiagnostics, add};
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
@@ -48,7 +48,7 @@ pub struct MaterialSurface<const D: usize> {
     found: Vec<Vec<Seed<D>>>,
     seed_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
-    soundness: Soundness,
+    fit_diagnostics: FitDiagnostics,
 }
 
 /// A point of the surface.
@@ -72,11 +72,11 @@ struct Spot<const D: usize> {
 }
 
 /// Share of a spacing, in initial positions, that a patch's seeds reach along the surface.
-const SEED_REACH: f64 = 0.8;
+const SEED_EXTENT: f64 = 0.8;
 /// Most seeds to either side along one direction: a stretch beyond that leaves gaps between them.
-const MOST_SEEDS: i32 = 64;
+const MAX_SEEDS: i32 = 64;
 /// Rounds of moving on to another seed's fit before the seed itself is taken.
-const MOST_HOPS: usize = 4;
+const MAX_SAMPLE_CHANGES: usize = 4;
 
 impl<const D: usize> MaterialSurface<D> {
     /// For particles at their initial positions with the level that they keep. An interrupt leaves a surface without
@@ -103,7 +103,7 @@ impl<const D: usize> MaterialSurface<D> {
             found: Vec::new(),
             seed_cells: CellList::new(Domain::unbounded()),
             scratch: PerThread::new(),
-            soundness: Soundness::default(),
+            fit_diagnostics: FitDiagnostics::default(),
         }
     }
 
@@ -121,13 +121,13 @@ impl<const D: usize> MaterialSurface<D> {
 
     /// How sound fits and queries have been so far.
     #[must_use]
-    pub fn soundness(&self) -> &Soundness {
-        &self.soundness
+    pub fn fit_diagnostics(&self) -> &FitDiagnostics {
+        &self.fit_diagnostics
     }
 
     /// The same, to take over that of an earlier part of the run.
-    pub fn soundness_mut(&mut self) -> &mut Soundness {
-        &mut self.soundness
+    pub fn fit_diagnostics_mut(&mut self) -> &mut FitDiagnostics {
+        &mut self.fit_diagnostics
     }
 
     /// Points of the surface.
@@ -162,20 +162,21 @@ impl<const D: usize> MaterialSurface<D> {
                     return;
                 }
                 let last = near.len() - 1;
-                let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
+                let centers: [Vector<D>; LANES] = std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
                 let values = |j: usize, q: usize| if q == 0 { origin.level[j] } else { positions[j][q - 1] };
                 let data =
                     FitData { search: origin.detection.cells(), values, quantities, admit: |_: usize, _: usize| true };
                 scratch.with(|scratch| {
-                    let found = regression.fit_lanes(&data, &centres[..near.len()], scratch, coefficients);
+                    let found = regression.fit_lanes(&data, &centers[..near.len()], scratch, coefficients);
                     fits.copy_from_slice(&found[..near.len()]);
                 });
             });
         interrupt.check()?;
         for fit in &self.fits {
-            self.soundness.counts.take_fit(fit.as_ref(), self.regression.degree());
-            self.soundness.worst_condition =
-                fit.map_or(self.soundness.worst_condition, |fit| self.soundness.worst_condition.max(fit.condition));
+            self.fit_diagnostics.counts.count_fit(fit.as_ref(), self.regression.degree());
+            self.fit_diagnostics.worst_condition = fit.map_or(self.fit_diagnostics.worst_condition, |fit| {
+                self.fit_diagnostics.worst_condition.max(fit.condition)
+            });
         }
         let mut found = std::mem::take(&mut self.found);
         found.resize_with(near.len(), Vec::new);
@@ -189,7 +190,7 @@ impl<const D: usize> MaterialSurface<D> {
         interrupt.check()?;
         self.seeds.clear();
         for (list, fit) in found.iter().zip(&self.fits) {
-            add(&self.soundness.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
+            add(&self.fit_diagnostics.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
             self.seeds.extend(list);
         }
         self.found = found;
@@ -204,7 +205,7 @@ impl<const D: usize> MaterialSurface<D> {
         let degree = self.regression.degree();
         let coefficients = &self.coefficients[patch * (1 + D) * terms..(patch + 1) * (1 + D) * terms];
         let scale = 1.0 / fit.scale;
-        let t: [f64; D] = ((material - fit.centre) * scale).into();
+        let t: [f64; D] = ((material - fit.center) * scale).into();
         let of = |quantity: usize| {
             let own = &coefficients[quantity * terms..(quantity + 1) * terms];
             Jet::from_local(&derivatives(degree, |place| own[place], &t), scale)
@@ -238,7 +239,7 @@ impl<const D: usize> MaterialSurface<D> {
         self.spot(patch, fit, &material).map(|spot| Seed { patch, material, spot })
     }
 
-    /// The seeds of a patch: its projected centre, and points along the surface every h where it has been stretched.
+    /// The seeds of a patch: its projected center, and points along the surface every h where it has been stretched.
     fn seed(&self, patch: usize, seeds: &mut Vec<Seed<D>>) {
         seeds.clear();
         let Some(fit) = &self.fits[patch] else { return };
@@ -247,12 +248,12 @@ impl<const D: usize> MaterialSurface<D> {
         let (s, t) = tangents(&first.spot.jet.normal());
         let along = first.spot.inverse * Vector::<D>::from(s) * self.spacing;
         let across = first.spot.inverse * Vector::<D>::from(t) * self.spacing;
-        let reach = SEED_REACH * self.spacing;
+        let cutoff = SEED_EXTENT * self.spacing;
         let most = |way: &Vector<D>| {
-            let wanted = reach / way.norm();
+            let wanted = cutoff / way.norm();
             // A stretch beyond what seeds can cover leaves gaps.
-            add(&self.soundness.counts.unprojected, u64::from(wanted > f64::from(MOST_SEEDS)));
-            (wanted as i32).min(MOST_SEEDS)
+            add(&self.fit_diagnostics.counts.unprojected, u64::from(wanted > f64::from(MAX_SEEDS)));
+            (wanted as i32).min(MAX_SEEDS)
         };
         let (i_most, j_most) = (most(&along), if D == 3 { most(&across) } else { 0 });
         for j in -j_most..=j_most {
@@ -261,7 +262,7 @@ impl<const D: usize> MaterialSurface<D> {
                     let start = first.material + along * f64::from(i) + across * f64::from(j);
                     match self.project(patch, fit, &start) {
                         Some(seed) => seeds.push(seed),
-                        None => add(&self.soundness.counts.unprojected, 1),
+                        None => add(&self.fit_diagnostics.counts.unprojected, 1),
                     }
                 }
             }
@@ -270,22 +271,22 @@ impl<const D: usize> MaterialSurface<D> {
 
     /// The closest point of the surface for any point whose nearest seed lies within `reach`; None if none does.
     #[must_use]
-    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
-        let (nearest, distance) = self.seed_cells.nearest(x, reach)?;
-        Some(self.solve(nearest, distance, x, &mut Tally::default()))
+    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
+        let (nearest, distance) = self.seed_cells.nearest(x, cutoff)?;
+        Some(self.solve(nearest, distance, x, &mut QueryCounts::default()))
     }
 
     /// Newton from the nearest seed; where it leaves the fit, on from the seed nearest to there; a foot farther than the
     /// seed, or none: the seed itself (counted).
-    fn solve(&self, nearest: usize, distance: f64, x: &Vector<D>, tally: &mut Tally) -> ClosestPoint<D> {
-        tally.queries += 1;
+    fn solve(&self, nearest: usize, distance: f64, x: &Vector<D>, query_counts: &mut QueryCounts) -> ClosestPoint<D> {
+        query_counts.queries += 1;
         let mut current = nearest;
-        for hop in 0..=MOST_HOPS {
-            match self.newton(&self.seeds[current], x, tally) {
+        for hop in 0..=MAX_SAMPLE_CHANGES {
+            match self.newton(&self.seeds[current], x, query_counts) {
                 Ok(answer) => {
                     let slack = self.method.slack(x);
                     if answer.distance <= distance * (1.0 + 1e-9) + slack {
-                        tally.hopped += u64::from(hop > 0);
+                        query_counts.other_sample += u64::from(hop > 0);
                         return answer;
                     }
                     break;
@@ -297,13 +298,18 @@ impl<const D: usize> MaterialSurface<D> {
                 Err(None) => break,
             }
         }
-        tally.sample_distance += 1;
+        query_counts.sample_distance += 1;
         let Spot { point, jet, .. } = &self.seeds[nearest].spot;
         answer(x, point, jet, true)
     }
 
     /// The foot, or where the iteration left the fit, if it did.
-    fn newton(&self, seed: &Seed<D>, x: &Vector<D>, tally: &mut Tally) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
+    fn newton(
+        &self,
+        seed: &Seed<D>,
+        x: &Vector<D>,
+        query_counts: &mut QueryCounts,
+    ) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
         let fit = self.fits[seed.patch].as_ref().ok_or(None)?;
         let mut material = seed.material;
         let mut spot = seed.spot;
@@ -311,7 +317,7 @@ impl<const D: usize> MaterialSurface<D> {
         let mut left = false;
         let mut progress = Progress::default();
         for _ in 0..self.method.max_iterations {
-            tally.iterations += 1;
+            query_counts.iterations += 1;
             let offset: [f64; D] = (x - spot.point).into();
             let step = newton_step(&spot.jet, &offset);
             let mut shift = spot.inverse * Vector::<D>::from(step);
@@ -321,7 +327,7 @@ impl<const D: usize> MaterialSurface<D> {
             }
             if is_last_step(&self.method, length, last, fit.radius, material.amax()) {
                 let foot = spot.point + Vector::<D>::from(step);
-                return Ok(answer(x, &foot, &spot.jet.moved(&step), false));
+                return Ok(answer(x, &foot, &spot.jet.translated(&step), false));
             }
             if progress.is_stuck(length) {
                 return Err(None);
@@ -350,22 +356,22 @@ impl<const D: usize> MaterialSurface<D> {
     pub fn closest_points(
         &self,
         points: &[Vector<D>],
-        reach: f64,
-        answers: &mut Answers<D>,
+        cutoff: f64,
+        answers: &mut ClosestPoints<D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
-        let feet = answers.one_a_query(points.len());
+        let feet = answers.resize_to_queries(points.len());
         feet.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(feet, points)| {
             if interrupt.is_raised() {
                 return;
             }
-            let mut tally = Tally::default();
+            let mut query_counts = QueryCounts::default();
             let mut last = None;
             for (foot, x) in feet.iter_mut().zip(points) {
-                let nearest = self.seed_cells.nearest_next(x, reach, &mut last, |seed| self.seeds[seed].spot.point);
-                *foot = nearest.map(|(seed, r2)| self.solve(seed, r2.sqrt(), x, &mut tally));
+                let nearest = self.seed_cells.nearest_next(x, cutoff, &mut last, |seed| self.seeds[seed].spot.point);
+                *foot = nearest.map(|(seed, r2)| self.solve(seed, r2.sqrt(), x, &mut query_counts));
             }
-            tally.book(&self.soundness.counts);
+            query_counts.add_to(&self.fit_diagnostics.counts);
         });
         interrupt.check()
     }

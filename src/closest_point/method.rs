@@ -16,11 +16,11 @@ pub struct PcpMethod {
     pub neighborhood: NeighborhoodChoice,
     /// How regressions are solved.
     pub solver: Solver,
-    /// Whether only particles take part whose last normals agree with that of the fit's centre.
+    /// Whether only particles take part whose last normals agree with that of the fit's center.
     pub same_branch: bool,
     /// k of the weight exp(−k r²/r_c²).
     pub weight: f64,
-    /// Least number of neighbours per coefficient.
+    /// Least number of neighbors per coefficient.
     pub minimum_ratio: f64,
     /// ξ/h: particles with the other sign within ξ become sample particles.
     pub sample_threshold_h: f64,
@@ -30,7 +30,7 @@ pub struct PcpMethod {
     pub max_iterations: u32,
 }
 
-/// A neighbourhood in multiples of the spacing.
+/// A neighborhood in multiples of the spacing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NeighborhoodChoice {
     /// All within `cutoff_h` spacings.
@@ -64,7 +64,7 @@ impl PcpMethod {
         Regression::new(basis, neighborhood, self.weight, self.minimum_ratio, spacing, self.solver)
     }
 
-    /// r_c/h of evenly filled neighbourhoods.
+    /// r_c/h of evenly filled neighborhoods.
     #[must_use]
     pub fn even_cutoff_h<const D: usize>(&self) -> f64 {
         let cutoff = match self.neighborhood {
@@ -77,16 +77,16 @@ impl PcpMethod {
         cutoff.max(radius_of_count::<D>(self.minimum_ratio * terms))
     }
 
-    /// How far from the surface the particles of evenly filled neighbourhoods lie, in multiples of h.
+    /// How far from the surface the particles of evenly filled neighborhoods lie, in multiples of h.
     #[must_use]
-    pub fn even_reach_h<const D: usize>(&self) -> f64 {
+    pub fn even_fit_band_h<const D: usize>(&self) -> f64 {
         self.sample_threshold_h + self.even_cutoff_h::<D>()
     }
 
     /// How far from the surface particles take part in fits, in multiples of h, growth of the radius included.
     #[must_use]
-    pub fn reach_h<const D: usize>(&self) -> f64 {
-        // Half again over what an even distribution needs leaves room for the growth of a starved neighbourhood.
+    pub fn fit_band_h<const D: usize>(&self) -> f64 {
+        // Half again over what an even distribution needs leaves room for the growth of a starved neighborhood.
         self.sample_threshold_h + 1.5 * self.even_cutoff_h::<D>() + 1.0
     }
 

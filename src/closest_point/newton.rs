@@ -7,7 +7,7 @@
 
 use super::method::PcpMethod;
 use crate::geometry::Vector;
-use crate::linear_algebra::number::{LANES, Lanes, Number, add_scaled, difference, dot, times};
+use crate::linear_algebra::number::{LANES, Lanes, Number, add_scaled, difference, dot, multiply_symmetric};
 use crate::polynomials::horner::derivatives;
 use crate::polynomials::{Fit, Jet};
 
@@ -30,7 +30,7 @@ pub struct Patch<'a, const D: usize> {
 #[derive(Debug, Clone, Copy)]
 pub enum NewtonEnd<const D: usize> {
     /// A stationary point of the distance on p = 0.
-    Converged(Foot<D>),
+    Converged(FootPoint<D>),
     /// The iterate left the support of the fit; another sample may know more there.
     LeftSupport(Vector<D>),
     /// The iteration did not settle.
@@ -39,7 +39,7 @@ pub enum NewtonEnd<const D: usize> {
 
 /// A closest point with what the polynomial says there.
 #[derive(Debug, Clone, Copy)]
-pub struct Foot<const D: usize> {
+pub struct FootPoint<const D: usize> {
     /// The point.
     pub point: Vector<D>,
     /// ∇p/|∇p|.
@@ -48,7 +48,7 @@ pub struct Foot<const D: usize> {
     pub curvature: f64,
 }
 
-/// Least pivot of the reduced Hessian; 1 is a plane, 0 the centre of curvature.
+/// Least pivot of the reduced Hessian; 1 is a plane, 0 the center of curvature.
 const PIVOT_FLOOR: f64 = 0.1;
 /// Longest step as a share of the support's radius.
 pub(super) const LONGEST_STEP: f64 = 0.4;
@@ -106,20 +106,20 @@ pub fn closest_points<const D: usize>(
 ) -> ([NewtonEnd<D>; LANES], u64) {
     let fit = patch.fit;
     let mut ends = [NewtonEnd::Stuck; LANES];
-    let live = queries.len().min(LANES);
+    let count = queries.len().min(LANES);
     let mut active = [false; LANES];
-    active[..live].fill(true);
+    active[..count].fill(true);
     let zero = Lanes::splat(0.0);
-    let (mut query, mut x, mut middle, mut centre) = ([zero; D], [zero; D], [zero; D], [zero; D]);
+    let (mut query, mut x, mut middle, mut center) = ([zero; D], [zero; D], [zero; D], [zero; D]);
     for d in 0..D {
         let mut lanes = [queries[0][d]; LANES];
-        for lane in 1..live {
+        for lane in 1..count {
             lanes[lane] = queries[lane][d];
         }
         query[d] = Lanes::new(lanes);
         x[d] = Lanes::splat(patch.start[d]);
         middle[d] = Lanes::splat(fit.middle[d]);
-        centre[d] = Lanes::splat(fit.centre[d]);
+        center[d] = Lanes::splat(fit.center[d]);
     }
     let mut jet = Jet {
         value: Lanes::splat(patch.jet.value),
@@ -171,11 +171,11 @@ pub fn closest_points<const D: usize>(
         }
         if any_done {
             // The jet is at most one last step away: its quadratic part tells the normal there.
-            let jet = jet.moved(&step);
+            let jet = jet.translated(&step);
             let foot = add_scaled(&x, Lanes::splat(1.0), &step);
             let (normal, curvature) = (jet.normal(), jet.curvature().to_array());
             for lane in (0..LANES).filter(|lane| done[*lane]) {
-                ends[lane] = NewtonEnd::Converged(Foot {
+                ends[lane] = NewtonEnd::Converged(FootPoint {
                     point: Vector::<D>::from_fn(|d, _| foot[d].to_array()[lane]),
                     normal: Vector::<D>::from_fn(|d, _| normal[d].to_array()[lane]),
                     curvature: curvature[lane],
@@ -187,7 +187,7 @@ pub fn closest_points<const D: usize>(
         }
         x = next;
         last = lengths;
-        let t = difference(&x, &centre).map(|c| c * Lanes::splat(inverse_scale));
+        let t = difference(&x, &center).map(|c| c * Lanes::splat(inverse_scale));
         let local = derivatives(patch.degree, |place| Lanes::splat(patch.coefficients[place]), &t);
         jet = Jet::from_local(&local, Lanes::splat(inverse_scale));
     }
@@ -206,15 +206,15 @@ pub(super) fn newton_step<T: Number, const D: usize>(jet: &Jet<T, D>, offset: &[
     let along = -(jet.value * inverse);
     let step = n.map(|c| c * along);
     // What is left to slide after the normal step: the offset less (I + λ∇∇p) times that step.
-    let bend = times(&jet.hessian, &step);
+    let bend = multiply_symmetric(&jet.hessian, &step);
     let pull = add_scaled(&difference(offset, &step), -lambda, &bend);
     let (s, t) = tangents(&n);
-    let bent = times(&jet.hessian, &s);
+    let bent = multiply_symmetric(&jet.hessian, &s);
     let first = Number::max(lambda.mul_add(dot(&s, &bent), one), floor);
     let mut slide = dot(&s, &pull) / first;
     if D == 3 {
         let factor = lambda * dot(&t, &bent) / first;
-        let diagonal = lambda.mul_add(dot(&t, &times(&jet.hessian, &t)), one);
+        let diagonal = lambda.mul_add(dot(&t, &multiply_symmetric(&jet.hessian, &t)), one);
         let second = Number::max(diagonal - factor * factor * first, floor);
         let other = (dot(&t, &pull) - factor * first * slide) / second;
         slide = slide - factor * other;
@@ -283,7 +283,7 @@ mod tests {
         for d in 0..3 {
             assert!((step[d] - expected[d]).abs() < 1e-15);
         }
-        // Beyond the centre of curvature the pivot is held above its floor.
+        // Beyond the center of curvature the pivot is held above its floor.
         let far = newton_step(&jet, &[0.0, 0.01, 5.0]);
         assert!((far[1] - 0.1).abs() < 1e-15);
     }

@@ -4,7 +4,7 @@
 //! 2. Queries sorted by sample, so that those of one sample stand side by side.
 //! 3. Newton's method on the sample's polynomial for several queries in vector lanes.
 
-use super::redistancing::{ClosestPoint, Redistancing, Tally};
+use super::redistancing::{ClosestPoint, QueryCounts, Redistancing};
 use crate::geometry::Vector;
 use crate::linear_algebra::number::LANES;
 use crate::parallel::{Interrupt, Interrupted};
@@ -17,7 +17,7 @@ const NONE: usize = usize::MAX;
 
 /// The answers to the queries that have a sample in reach, in the order of samples.
 #[derive(Debug)]
-pub struct Answers<const D: usize> {
+pub struct ClosestPoints<const D: usize> {
     /// Nearest sample and squared distance from it, query by query.
     nearest: Vec<(usize, f64)>,
     /// First place of each sample in `queries`.
@@ -26,20 +26,20 @@ pub struct Answers<const D: usize> {
     feet: Vec<Option<ClosestPoint<D>>>,
 }
 
-impl<const D: usize> Default for Answers<D> {
+impl<const D: usize> Default for ClosestPoints<D> {
     fn default() -> Self {
         Self { nearest: Vec::new(), starts: Vec::new(), queries: Vec::new(), feet: Vec::new() }
     }
 }
 
-impl<const D: usize> Answers<D> {
+impl<const D: usize> ClosestPoints<D> {
     /// Queries and their answers, each query at most once.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &ClosestPoint<D>)> {
         self.queries.iter().zip(&self.feet).filter_map(|(query, foot)| Some((*query, foot.as_ref()?)))
     }
 
     /// Room for one answer a query, in the order of queries.
-    pub(super) fn one_a_query(&mut self, queries: usize) -> &mut [Option<ClosestPoint<D>>] {
+    pub(super) fn resize_to_queries(&mut self, queries: usize) -> &mut [Option<ClosestPoint<D>>] {
         self.queries.clear();
         self.queries.extend(0..queries);
         self.feet.resize(queries, None);
@@ -73,8 +73,8 @@ impl<const D: usize> Redistancing<D> {
     pub fn closest_points(
         &self,
         points: &[Vector<D>],
-        reach: f64,
-        answers: &mut Answers<D>,
+        cutoff: f64,
+        answers: &mut ClosestPoints<D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         answers.nearest.resize(points.len(), (NONE, 0.0));
@@ -84,19 +84,19 @@ impl<const D: usize> Redistancing<D> {
                 if interrupt.is_raised() {
                     return;
                 }
-                *slot = self.nearest_sample(x, reach, &mut last).unwrap_or((NONE, 0.0));
+                *slot = self.nearest_sample(x, cutoff, &mut last).unwrap_or((NONE, 0.0));
             }
         });
         interrupt.check()?;
         answers.sort_by_sample(self.samples().len());
-        let Answers { nearest, queries, feet, .. } = answers;
+        let ClosestPoints { nearest, queries, feet, .. } = answers;
         feet.resize(queries.len(), None);
         let nearest = &*nearest;
         feet.par_chunks_mut(QUERIES).zip(queries.par_chunks(QUERIES)).for_each(|(feet, queries)| {
             if interrupt.is_raised() {
                 return;
             }
-            let mut tally = Tally::default();
+            let mut query_counts = QueryCounts::default();
             let mut done = 0;
             for same in queries.chunk_by(|a, b| nearest[*a].0 == nearest[*b].0) {
                 let sample = nearest[same[0]].0;
@@ -104,12 +104,12 @@ impl<const D: usize> Redistancing<D> {
                     let last = lanes.len() - 1;
                     let at: [Vector<D>; LANES] = std::array::from_fn(|lane| points[lanes[lane.min(last)]]);
                     let away: [f64; LANES] = std::array::from_fn(|lane| nearest[lanes[lane.min(last)]].1.sqrt());
-                    let live = lanes.len();
-                    self.solve(sample, &at[..live], &away[..live], &mut feet[done..done + live], &mut tally);
+                    let count = lanes.len();
+                    self.solve(sample, &at[..count], &away[..count], &mut feet[done..done + count], &mut query_counts);
                     done += lanes.len();
                 }
             }
-            tally.book(&self.soundness().counts);
+            query_counts.add_to(&self.fit_diagnostics().counts);
         });
         interrupt.check()
     }

@@ -2,9 +2,9 @@
 
 use super::detection::Detection;
 use super::method::PcpMethod;
-use super::newton::{Foot, NewtonEnd, Patch, closest_points};
+use super::newton::{FootPoint, NewtonEnd, Patch, closest_points};
 use super::projection::{Projected, project};
-use super::rescue::{RescueCounts, Soundness, add};
+use super::rescue::{FitDiagnostics, RescueCounts, add};
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
@@ -47,7 +47,7 @@ pub struct Redistancing<const D: usize> {
     samples: Vec<Sample<D>>,
     sample_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
-    soundness: Soundness,
+    fit_diagnostics: FitDiagnostics,
 }
 
 /// A sample particle: a point of the surface with the polynomial that it was projected with.
@@ -61,7 +61,7 @@ pub(super) struct Sample<const D: usize> {
 }
 
 /// Rounds of moving on to another sample's polynomial before the sample itself is taken.
-const MOST_HOPS: usize = 4;
+const MAX_SAMPLE_CHANGES: usize = 4;
 
 impl<const D: usize> Redistancing<D> {
     /// A redistancing without a surface yet, for particles of spacing h.
@@ -78,7 +78,7 @@ impl<const D: usize> Redistancing<D> {
             coefficients: Vec::new(),
             samples: Vec::new(),
             scratch: PerThread::new(),
-            soundness: Soundness::default(),
+            fit_diagnostics: FitDiagnostics::default(),
         }
     }
 
@@ -99,13 +99,13 @@ impl<const D: usize> Redistancing<D> {
 
     /// How sound fits and queries have been so far.
     #[must_use]
-    pub fn soundness(&self) -> &Soundness {
-        &self.soundness
+    pub fn fit_diagnostics(&self) -> &FitDiagnostics {
+        &self.fit_diagnostics
     }
 
     /// The same, to take over that of an earlier part of the run.
-    pub fn soundness_mut(&mut self) -> &mut Soundness {
-        &mut self.soundness
+    pub fn fit_diagnostics_mut(&mut self) -> &mut FitDiagnostics {
+        &mut self.fit_diagnostics
     }
 
     /// Step one of a rebuild: the particles with another of the opposite sign within ξ (PCP 3.1).
@@ -122,7 +122,7 @@ impl<const D: usize> Redistancing<D> {
     /// Step two of a rebuild: fits about the near-surface particles and their projection onto the surface.
     ///
     /// `normals` are those of the last redistancing (zero where unknown): where the method says so, only particles
-    /// whose normals agree with that of the fit's centre take part, so that two sheets of a filament are kept apart.
+    /// whose normals agree with that of the fit's center take part, so that two sheets of a filament are kept apart.
     ///
     /// # Errors
     /// [`Interrupted`] when somebody asked to stop.
@@ -138,7 +138,7 @@ impl<const D: usize> Redistancing<D> {
         self.fitted.resize(near.len(), None);
         self.coefficients.resize(near.len() * terms, 0.0);
         let (cells, regression, method, scratch, counts) =
-            (self.detection.cells(), &self.regression, &self.method, &self.scratch, &self.soundness.counts);
+            (self.detection.cells(), &self.regression, &self.method, &self.scratch, &self.fit_diagnostics.counts);
         let normals = normals.filter(|_| method.same_branch);
         let is_same_branch = |i: usize, j: usize| {
             // Unknown normals, which are zero, agree with every other.
@@ -158,29 +158,29 @@ impl<const D: usize> Redistancing<D> {
                     let lanes = fitted.chunks_mut(LANES).zip(coefficients.chunks_mut(LANES * terms));
                     for ((fitted, coefficients), near) in lanes.zip(near.chunks(LANES)) {
                         let last = near.len() - 1;
-                        let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| positions[near[lane.min(last)]]);
+                        let centers: [Vector<D>; LANES] = std::array::from_fn(|lane| positions[near[lane.min(last)]]);
                         let admit = |lane: usize, j: usize| is_same_branch(near[lane], j);
                         let data = FitData { search: cells, values: |j, _| level[j], quantities: 1, admit };
-                        let fits = regression.fit_lanes(&data, &centres[..near.len()], scratch, coefficients);
+                        let fits = regression.fit_lanes(&data, &centers[..near.len()], scratch, coefficients);
                         for ((slot, coefficients), (fit, x)) in
-                            fitted.iter_mut().zip(coefficients.chunks(terms)).zip(fits.iter().zip(&centres))
+                            fitted.iter_mut().zip(coefficients.chunks(terms)).zip(fits.iter().zip(&centers))
                         {
                             *slot = fit.and_then(|fit| {
                                 let polynomial = fit.polynomial(regression.degree(), coefficients);
                                 let projected = project(method, &fit, x, |x| {
-                                    let jet = polynomial.jet(&(x - fit.centre));
+                                    let jet = polynomial.jet(&(x - fit.center));
                                     Some((jet.value, Vector::<D>::from(jet.gradient), jet))
                                 });
                                 add(&counts.unprojected, u64::from(projected.is_none()));
                                 projected.map(|Projected { x, step, found }| Sample {
                                     point: x + step,
-                                    jet: found.moved(&step.into()),
+                                    jet: found.translated(&step.into()),
                                     fit,
                                     place,
                                 })
                             });
                             place += terms;
-                            counts.take_fit(fit.as_ref(), regression.degree());
+                            counts.count_fit(fit.as_ref(), regression.degree());
                         }
                     }
                 });
@@ -188,8 +188,8 @@ impl<const D: usize> Redistancing<D> {
         interrupt.check()?;
         self.samples.clear();
         self.samples.extend(self.fitted.iter().flatten());
-        self.soundness.worst_condition =
-            self.samples.iter().fold(self.soundness.worst_condition, |worst, s| worst.max(s.fit.condition));
+        self.fit_diagnostics.worst_condition =
+            self.samples.iter().fold(self.fit_diagnostics.worst_condition, |worst, s| worst.max(s.fit.condition));
         self.sample_cells.rebuild(self.samples.iter().map(|s| s.point), SAMPLE_CELL * self.spacing);
         Ok(())
     }
@@ -200,18 +200,18 @@ impl<const D: usize> Redistancing<D> {
     /// 2. Where the iterate leaves that polynomial's support: on with the sample nearest to it.
     /// 3. A foot farther than the sample, or none: the sample itself (counted).
     #[must_use]
-    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
-        let (nearest, distance) = self.sample_cells.nearest(x, reach)?;
+    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
+        let (nearest, distance) = self.sample_cells.nearest(x, cutoff)?;
         let mut foot = [None];
         // Only the queries of a redistancing are counted.
-        self.solve(nearest, &[*x], &[distance], &mut foot, &mut Tally::default());
+        self.solve(nearest, &[*x], &[distance], &mut foot, &mut QueryCounts::default());
         foot[0]
     }
 
     /// The nearest sample not farther than `reach`, and its squared distance, for one query after another: each search
     /// starts from the sample that `last` holds.
-    pub(super) fn nearest_sample(&self, x: &Vector<D>, reach: f64, last: &mut Option<usize>) -> Option<(usize, f64)> {
-        self.sample_cells.nearest_next(x, reach, last, |sample| self.samples[sample].point)
+    pub(super) fn nearest_sample(&self, x: &Vector<D>, cutoff: f64, last: &mut Option<usize>) -> Option<(usize, f64)> {
+        self.sample_cells.nearest_next(x, cutoff, last, |sample| self.samples[sample].point)
     }
 
     fn patch(&self, sample: usize) -> Patch<'_, D> {
@@ -221,7 +221,7 @@ impl<const D: usize> Redistancing<D> {
     }
 
     /// The point in the frame of a sample: the short way round a periodic axis.
-    fn in_frame_of(&self, sample: usize, x: &Vector<D>) -> Vector<D> {
+    fn image_near(&self, sample: usize, x: &Vector<D>) -> Vector<D> {
         let point = self.samples[sample].point;
         point + self.domain.displacement(&point, x)
     }
@@ -233,28 +233,29 @@ impl<const D: usize> Redistancing<D> {
         points: &[Vector<D>],
         distances: &[f64],
         feet: &mut [Option<ClosestPoint<D>>],
-        tally: &mut Tally,
+        query_counts: &mut QueryCounts,
     ) {
         let last = points.len() - 1;
-        let queries: [Vector<D>; LANES] =
-            std::array::from_fn(|lane| self.in_frame_of(nearest, &points[lane.min(last)]));
+        let queries: [Vector<D>; LANES] = std::array::from_fn(|lane| self.image_near(nearest, &points[lane.min(last)]));
         let (ends, iterations) = closest_points(&self.method, &self.patch(nearest), &queries[..points.len()]);
-        tally.queries += points.len() as u64;
-        tally.iterations += iterations;
+        query_counts.queries += points.len() as u64;
+        query_counts.iterations += iterations;
         for (lane, (x, foot)) in points.iter().zip(feet).enumerate() {
             let distance = distances[lane];
             let found = match ends[lane] {
                 NewtonEnd::Converged(foot) => self.accepted(&queries[lane], &foot, distance),
-                NewtonEnd::LeftSupport(at) => self.hop(nearest, x, &at, distance, tally),
+                NewtonEnd::LeftSupport(at) => {
+                    self.continue_from_another_sample(nearest, x, &at, distance, query_counts)
+                }
                 NewtonEnd::Stuck => None,
             };
-            tally.sample_distance += u64::from(found.is_none());
+            query_counts.sample_distance += u64::from(found.is_none());
             *foot = Some(found.unwrap_or_else(|| self.sample_itself(nearest, x, distance)));
         }
     }
 
     /// The answer of a foot, unless it lies farther from the query than the sample does.
-    fn accepted(&self, query: &Vector<D>, foot: &Foot<D>, sample_distance: f64) -> Option<ClosestPoint<D>> {
+    fn accepted(&self, query: &Vector<D>, foot: &FootPoint<D>, sample_distance: f64) -> Option<ClosestPoint<D>> {
         let offset = query - foot.point;
         let distance = offset.norm();
         // Equal up to the tolerance and the last bits of the coordinates counts as not farther.
@@ -270,28 +271,28 @@ impl<const D: usize> Redistancing<D> {
     }
 
     /// On with the sample nearest to where an iterate left its polynomial's support, a few times.
-    fn hop(
+    fn continue_from_another_sample(
         &self,
         from: usize,
         x: &Vector<D>,
         at: &Vector<D>,
         distance: f64,
-        tally: &mut Tally,
+        query_counts: &mut QueryCounts,
     ) -> Option<ClosestPoint<D>> {
         let (mut current, mut at) = (from, *at);
-        for _ in 0..MOST_HOPS {
+        for _ in 0..MAX_SAMPLE_CHANGES {
             let (next, _) = self.sample_cells.nearest(&at, f64::INFINITY)?;
             if next == current {
                 return None;
             }
             current = next;
-            let query = self.in_frame_of(current, x);
+            let query = self.image_near(current, x);
             let (ends, iterations) = closest_points(&self.method, &self.patch(current), &[query]);
-            tally.iterations += iterations;
+            query_counts.iterations += iterations;
             match ends[0] {
                 NewtonEnd::Converged(foot) => {
                     let accepted = self.accepted(&query, &foot, distance);
-                    tally.hopped += u64::from(accepted.is_some());
+                    query_counts.other_sample += u64::from(accepted.is_some());
                     return accepted;
                 }
                 NewtonEnd::LeftSupport(place) => at = place,
@@ -333,18 +334,18 @@ const SAMPLE_CELL: f64 = 3.0;
 
 /// Counts of one block of queries, booked at once to keep threads off each other's cache lines.
 #[derive(Debug, Default)]
-pub(super) struct Tally {
+pub(super) struct QueryCounts {
     pub(super) queries: u64,
     pub(super) iterations: u64,
-    pub(super) hopped: u64,
+    pub(super) other_sample: u64,
     pub(super) sample_distance: u64,
 }
 
-impl Tally {
-    pub(super) fn book(&self, counts: &RescueCounts) {
+impl QueryCounts {
+    pub(super) fn add_to(&self, counts: &RescueCounts) {
         add(&counts.queries, self.queries);
         add(&counts.iterations, self.iterations);
-        add(&counts.hopped, self.hopped);
+        add(&counts.other_sample, self.other_sample);
         add(&counts.sample_distance, self.sample_distance);
     }
 }

@@ -36,16 +36,16 @@ macro_rules! counters {
 
 /// How sound the fits and queries of a surface have been.
 #[derive(Debug, Default)]
-pub struct Soundness {
+pub struct FitDiagnostics {
     /// What did not go the plain way so far.
     pub counts: RescueCounts,
     /// The worst condition of a scaled regression matrix so far.
     pub worst_condition: f64,
 }
 
-impl Soundness {
+impl FitDiagnostics {
     /// Adds that of another surface of the same particles.
-    pub fn take_over(&mut self, other: &Self) {
+    pub fn merge(&mut self, other: &Self) {
         self.counts.add(&other.counts);
         self.worst_condition = self.worst_condition.max(other.worst_condition);
     }
@@ -58,7 +58,7 @@ counters! {
     enlarged => "fits.larger_radius",
     /// Fits of a lower degree than asked.
     lowered => "fits.lower_degree",
-    /// Fits that moments were asked for and could not do (too few neighbours, too small a pivot, values that are no
+    /// Fits that moments were asked for and could not do (too few neighbors, too small a pivot, values that are no
     /// numbers), left to orthogonal decomposition.
     decomposed => "fits.orthogonal",
     /// Near-surface particles without any fit.
@@ -71,14 +71,14 @@ counters! {
     /// Newton iterations of all queries.
     iterations => "queries.iterations",
     /// Queries that went on with another sample's polynomial.
-    hopped => "queries.other_sample",
+    other_sample => "queries.other_sample",
     /// Queries answered by the nearest sample itself.
     sample_distance => "queries.sample_distance",
 }
 
 impl RescueCounts {
     /// Takes a fit, or the want of one, into account for a method of the given degree.
-    pub(super) fn take_fit<const D: usize>(&self, fit: Option<&Fit<D>>, degree: usize) {
+    pub(super) fn count_fit<const D: usize>(&self, fit: Option<&Fit<D>>, degree: usize) {
         add(&self.fits, 1);
         match fit {
             None => add(&self.unfitted, 1),
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn counts_survive_a_round_trip() {
         let counts = RescueCounts::default();
-        add(&counts.hopped, 3);
+        add(&counts.other_sample, 3);
         add(&counts.queries, 70);
         let saved: Vec<u64> = counts.entries().into_iter().map(|e| e.1).collect();
         let other = RescueCounts::default();

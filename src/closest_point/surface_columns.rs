@@ -1,7 +1,7 @@
 //! What particles know of the surface: the signed distance, closest point, normal and curvature, and who is in the
 //! narrow band (PCP paper, sections 3.3 and 3.4).
 
-use super::queries::Answers;
+use super::queries::ClosestPoints;
 use super::redistancing::ClosestPoint;
 use crate::geometry::Vector;
 use crate::particles::{FlagKey, Particles, ScalarKey, VectorKey};
@@ -68,7 +68,7 @@ impl SurfaceColumns {
         &self,
         particles: &mut Particles<D>,
         level: ScalarKey,
-        answers: &Answers<D>,
+        answers: &ClosestPoints<D>,
         half_band: f64,
     ) {
         // Who leaves the band keeps its last normal: an old one still tells branches apart better than none (measured).

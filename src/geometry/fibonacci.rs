@@ -23,7 +23,11 @@ pub fn sphere(count: usize) -> Vec<Vector<3>> {
 /// Points of a surface of revolution about z: `share(s)`, rising from 0 to 1 over [0, 1], is the part of the area up to the
 /// parameter s, `profile(s)` the distance from the axis and z there.
 #[must_use]
-pub fn of_revolution(count: usize, share: impl Fn(f64) -> f64, profile: impl Fn(f64) -> (f64, f64)) -> Vec<Vector<3>> {
+pub fn surface_of_revolution(
+    count: usize,
+    share: impl Fn(f64) -> f64,
+    profile: impl Fn(f64) -> (f64, f64),
+) -> Vec<Vector<3>> {
     (0..count)
         .map(|i| {
             let wanted = (i as f64 + 0.5) / count as f64;
@@ -60,7 +64,8 @@ mod tests {
 
     #[test]
     fn the_sphere_is_a_surface_of_revolution() {
-        let turned = super::of_revolution(300, |s| 0.5 * (1.0 - (PI * s).cos()), |s| ((PI * s).sin(), (PI * s).cos()));
+        let turned =
+            super::surface_of_revolution(300, |s| 0.5 * (1.0 - (PI * s).cos()), |s| ((PI * s).sin(), (PI * s).cos()));
         for (x, y) in turned.iter().zip(super::sphere(300)) {
             assert!((x - y).norm() < 1e-12);
         }

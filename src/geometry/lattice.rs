@@ -9,7 +9,7 @@ use crate::parallel::Interrupt;
 pub struct Lattice {
     /// Spacing h > 0.
     pub spacing: f64,
-    /// 0 puts points on multiples of h, ½ on the centres of cells.
+    /// 0 puts points on multiples of h, ½ on the centers of cells.
     pub offset: f64,
     /// α in `[0, 0.5)`: with a half two points could meet.
     pub jitter: f64,
@@ -28,7 +28,7 @@ impl Lattice {
         &self,
         low: &Vector<D>,
         high: &Vector<D>,
-        reach: f64,
+        cutoff: f64,
         distance: impl Fn(&Vector<D>) -> f64,
         interrupt: &Interrupt,
     ) -> Vec<Vector<D>> {
@@ -46,7 +46,7 @@ impl Lattice {
         loop {
             while node[0] <= last[0] {
                 let x = self.point(&random, &node);
-                let beyond = (distance(&x).abs() - reach) / h;
+                let beyond = (distance(&x).abs() - cutoff) / h;
                 if beyond <= 0.0 {
                     points.push(x);
                 }

@@ -1,7 +1,7 @@
 //! Random numbers by counter: the value at a counter depends on the seed and the counter alone, so that no
 //! order of evaluation and no number of threads can change a scene.
 //!
-//! The mixing function is the finaliser of SplitMix64 (Steele, Lea, Flood 2014).
+//! The mixing function is the finalizer of SplitMix64 (Steele, Lea, Flood 2014).
 
 /// A keyed source of uniform numbers without state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

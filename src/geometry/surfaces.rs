@@ -46,7 +46,7 @@ pub trait Surface<const D: usize>: Send + Sync {
     fn bounding_box(&self) -> (Vector<D>, Vector<D>);
 
     /// The enclosed area (2D) or volume (3D).
-    fn measure(&self) -> f64;
+    fn area_or_volume(&self) -> f64;
 
     /// Whether `x` lies within `tolerance` of a place with more than one closest point, where normals and
     /// curvatures of a numerical answer may rightly differ from this surface's choice.

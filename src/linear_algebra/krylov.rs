@@ -17,9 +17,9 @@ pub trait LinearMap: Sync {
     /// out = A x.
     fn apply(&self, x: &[f64], out: &mut [f64]);
     /// ‖A‖∞, or a bound of it.
-    fn largest_row(&self) -> f64;
+    fn infinity_norm(&self) -> f64;
     /// Whether somebody asks to give the solution up.
-    fn is_given_up(&self) -> bool {
+    fn is_interrupted(&self) -> bool {
         false
     }
 }
@@ -41,11 +41,11 @@ impl LinearMap for Interruptible<'_> {
         self.map.apply(x, out);
     }
 
-    fn largest_row(&self) -> f64 {
-        self.map.largest_row()
+    fn infinity_norm(&self) -> f64 {
+        self.map.infinity_norm()
     }
 
-    fn is_given_up(&self) -> bool {
+    fn is_interrupted(&self) -> bool {
         self.interrupt.is_raised()
     }
 }
@@ -59,8 +59,8 @@ impl LinearMap for SparseRows {
         Self::apply(self, x, out);
     }
 
-    fn largest_row(&self) -> f64 {
-        Self::largest_row(self)
+    fn infinity_norm(&self) -> f64 {
+        Self::infinity_norm(self)
     }
 }
 
@@ -84,8 +84,8 @@ impl LinearMap for WithMean<'_> {
         out.iter_mut().for_each(|value| *value += self.alpha * mean);
     }
 
-    fn largest_row(&self) -> f64 {
-        self.rows.largest_row() + self.alpha.abs()
+    fn infinity_norm(&self) -> f64 {
+        self.rows.infinity_norm() + self.alpha.abs()
     }
 }
 
@@ -95,7 +95,7 @@ pub struct Stopping {
     /// ‖b − A x‖ by ‖b‖.
     pub tolerance: f64,
     /// Applications of the preconditioned map at most, about.
-    pub most_iterations: u64,
+    pub max_iterations: u64,
 }
 
 /// What a solution came to.
@@ -131,16 +131,16 @@ impl Convergence {
 
     /// Of a solution: its residual anew, with room for a vector.
     #[must_use]
-    pub fn of(map: &dyn LinearMap, b: &[f64], x: &[f64], iterations: u64, room: &mut Vec<f64>) -> Self {
-        room.resize(b.len(), 0.0);
-        map.apply(x, room);
-        room.iter_mut().zip(b).for_each(|(a, b)| *a = b - *a);
+    pub fn from_solution(map: &dyn LinearMap, b: &[f64], x: &[f64], iterations: u64, scratch: &mut Vec<f64>) -> Self {
+        scratch.resize(b.len(), 0.0);
+        map.apply(x, scratch);
+        scratch.iter_mut().zip(b).for_each(|(a, b)| *a = b - *a);
         let by = match norm(b) {
             size if size > 0.0 => 1.0 / size,
             _ => 1.0,
         };
-        let floor = ROUNDING * f64::EPSILON * map.largest_row() * norm(x) * by;
-        Self { iterations, residual: norm(room) * by, floor }
+        let floor = ROUNDING * f64::EPSILON * map.infinity_norm() * norm(x) * by;
+        Self { iterations, residual: norm(scratch) * by, floor }
     }
 }
 
@@ -176,7 +176,7 @@ mod tests {
         rows.sorted()
     }
 
-    const STOPPING: Stopping = Stopping { tolerance: 1e-11, most_iterations: 2000 };
+    const STOPPING: Stopping = Stopping { tolerance: 1e-11, max_iterations: 2000 };
 
     #[test]
     fn both_methods_solve_what_is_not_symmetric() {
@@ -184,14 +184,14 @@ mod tests {
         let exact: Vec<f64> = (0..300).map(|i| f64::from(i).sin()).collect();
         let mut b = vec![0.0; 300];
         a.apply(&exact, &mut b);
-        // An incomplete factorization of three diagonals is a complete one; half of A's neighbours make it one that is not.
-        let factors = IncompleteFactors::of(&operator(300, true).sorted()).unwrap();
+        // An incomplete factorization of three diagonals is a complete one; half of A's neighbors make it one that is not.
+        let factors = IncompleteFactors::from_rows(&operator(300, true).sorted()).unwrap();
         let mut x = vec![0.0; 300];
-        let found = bicgstab::solve(&a, &factors, &b, &mut x, STOPPING, &mut bicgstab::Storage::default());
+        let found = bicgstab::solve(&a, &factors, &b, &mut x, STOPPING, &mut bicgstab::Workspace::default());
         assert!(found.residual < 1e-10, "{found:?}");
         assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-6));
         let mut x = vec![0.0; 300];
-        let found = gmres::solve(&a, &factors, &b, &mut x, 40, STOPPING, &mut gmres::Storage::default());
+        let found = gmres::solve(&a, &factors, &b, &mut x, 40, STOPPING, &mut gmres::Workspace::default());
         assert!(found.residual < 1e-10 && found.iterations > 0, "{found:?}");
         assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-6));
     }
@@ -203,9 +203,9 @@ mod tests {
         let mut b = vec![0.0; 200];
         a.apply(&exact, &mut b);
         let map = WithMean { rows: &a, alpha: 1.0 };
-        let factors = IncompleteFactors::of(&a).unwrap();
+        let factors = IncompleteFactors::from_rows(&a).unwrap();
         let mut x = vec![0.0; 200];
-        let found = bicgstab::solve(&map, &factors, &b, &mut x, STOPPING, &mut bicgstab::Storage::default());
+        let found = bicgstab::solve(&map, &factors, &b, &mut x, STOPPING, &mut bicgstab::Workspace::default());
         assert!(found.residual < 1e-10, "{found:?}");
         assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-7));
         assert_eq!(map.size(), 200);
@@ -224,45 +224,45 @@ mod tests {
             a.push_row(&columns, &weights);
         }
         let b: Vec<f64> = (0..n).map(|i| (std::f64::consts::PI * i as f64 / n as f64).sin()).collect();
-        let factors = IncompleteFactors::of(&a).unwrap();
+        let factors = IncompleteFactors::from_rows(&a).unwrap();
         for tolerance in [1e-10, 1e-14] {
-            let stopping = Stopping { tolerance, most_iterations: 500 };
+            let stopping = Stopping { tolerance, max_iterations: 500 };
             let mut x = vec![0.0; n];
-            let found = bicgstab::solve(&a, &factors, &b, &mut x, stopping, &mut bicgstab::Storage::default());
+            let found = bicgstab::solve(&a, &factors, &b, &mut x, stopping, &mut bicgstab::Workspace::default());
             assert!(found.residual > 10.0 * tolerance && found.is_within(stopping), "{found:?}");
             assert!(found.iterations < 20, "{found:?}");
             let mut x = vec![0.0; n];
-            let found = gmres::solve(&a, &factors, &b, &mut x, 40, stopping, &mut gmres::Storage::default());
+            let found = gmres::solve(&a, &factors, &b, &mut x, 40, stopping, &mut gmres::Workspace::default());
             assert!(found.residual > 10.0 * tolerance && found.is_within(stopping), "{found:?}");
             assert!(found.iterations < 20, "{found:?}");
         }
         // What is wrong is not taken for rounding.
-        let wrong = super::Convergence::of(&a, &b, &vec![0.0; n], 0, &mut Vec::new());
+        let wrong = super::Convergence::from_solution(&a, &b, &vec![0.0; n], 0, &mut Vec::new());
         assert!(!wrong.is_within(STOPPING), "{wrong:?}");
     }
 
     #[test]
     fn a_solution_is_given_up_when_asked() {
         let a = operator(300, true);
-        let factors = IncompleteFactors::of(&operator(300, false)).unwrap();
+        let factors = IncompleteFactors::from_rows(&operator(300, false)).unwrap();
         let interrupt = Interrupt::default();
         interrupt.raise();
         let map = Interruptible { map: &a, interrupt: &interrupt };
         let b: Vec<f64> = (0..300).map(f64::from).collect();
-        let never = Stopping { tolerance: 0.0, most_iterations: u64::MAX };
+        let never = Stopping { tolerance: 0.0, max_iterations: u64::MAX };
         let mut x = vec![0.0; 300];
-        let found = bicgstab::solve(&map, &factors, &b, &mut x, never, &mut bicgstab::Storage::default());
+        let found = bicgstab::solve(&map, &factors, &b, &mut x, never, &mut bicgstab::Workspace::default());
         assert_eq!(found.iterations, 0);
-        let found = gmres::solve(&map, &factors, &b, &mut x, 40, never, &mut gmres::Storage::default());
+        let found = gmres::solve(&map, &factors, &b, &mut x, 40, never, &mut gmres::Workspace::default());
         assert_eq!(found.iterations, 0);
     }
 
     #[test]
     fn nothing_is_solved_by_nothing() {
         let a = operator(10, false);
-        let factors = IncompleteFactors::of(&a).unwrap();
+        let factors = IncompleteFactors::from_rows(&a).unwrap();
         let (b, mut x) = (vec![0.0; 10], vec![0.0; 10]);
-        let found = bicgstab::solve(&a, &factors, &b, &mut x, STOPPING, &mut bicgstab::Storage::default());
+        let found = bicgstab::solve(&a, &factors, &b, &mut x, STOPPING, &mut bicgstab::Workspace::default());
         assert_eq!((found.residual, x), (0.0, vec![0.0; 10]));
     }
 }

@@ -15,7 +15,7 @@ pub struct LeastSquares {
 
 /// What a solve found out about its matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Factorisation {
+pub struct Factorization {
     /// Columns that are linearly independent to `1e-12` of the largest.
     pub rank: usize,
     /// Ratio of the largest to the least pivot of the scaled matrix: an estimate of its condition.
@@ -47,8 +47,8 @@ impl LeastSquares {
         self.rhs[row] = rhs;
     }
 
-    /// Factorises and solves. For lower rank it is a basic solution: the columns beyond the rank are left out.
-    pub fn solve(&mut self) -> (Factorisation, &[f64]) {
+    /// Factorizes and solves. For lower rank it is a basic solution: the columns beyond the rank are left out.
+    pub fn solve(&mut self) -> (Factorization, &[f64]) {
         let (m, n) = (self.rows, self.columns);
         for k in 0..n {
             let column = &mut self.matrix[k * m..(k + 1) * m];
@@ -79,7 +79,7 @@ impl LeastSquares {
             largest / least
         };
         self.back_substitute(rank);
-        (Factorisation { rank, condition }, &self.solution[..n])
+        (Factorization { rank, condition }, &self.solution[..n])
     }
 
     fn exchange(&mut self, k: usize, j: usize) {

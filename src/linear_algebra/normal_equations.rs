@@ -9,7 +9,7 @@ use super::number::Lanes;
 #[derive(Debug, Clone, Default)]
 pub struct LaneSystems {
     size: usize,
-    /// G on the way in; below the diagonal L, on it 1/d after [`Self::factorise`].
+    /// G on the way in; below the diagonal L, on it 1/d after [`Self::factorize`].
     matrix: Vec<Lanes>,
     /// The rows of L D in the making.
     row: Vec<Lanes>,
@@ -35,9 +35,9 @@ impl LaneSystems {
         &mut self.matrix
     }
 
-    /// Factorises in place. Returns, for each lane, the least share d_i/G_ii of a pivot in its diagonal: how far a
+    /// Factorizes in place. Returns, for each lane, the least share d_i/G_ii of a pivot in its diagonal: how far a
     /// column is from a combination of those before it. Zero or less (or NaN) means a matrix of low rank.
-    pub fn factorise(&mut self) -> Lanes {
+    pub fn factorize(&mut self) -> Lanes {
         let n = self.size;
         let one = Lanes::splat(1.0);
         let mut least = one;
@@ -154,7 +154,7 @@ mod tests {
                     systems.matrix_mut()[packed_row(i) + j] = Lanes::new(std::array::from_fn(|l| gram(l, i, j)));
                 }
             }
-            let least = systems.factorise().to_array();
+            let least = systems.factorize().to_array();
             assert!(least.iter().all(|s| *s > 1e-6 && *s <= 1.0), "{least:?}");
             let exact = |lane: usize, i: usize| random.symmetric(&[99, lane as i64, i as i64]);
             let mut b: Vec<Lanes> = (0..n)
@@ -178,7 +178,7 @@ mod tests {
         let lanes = |first: f64| Lanes::new([first, 2.0, 2.0, 2.0]);
         systems.matrix_mut().copy_from_slice(&[lanes(1.0), lanes(1.0), lanes(1.0)]);
         systems.matrix_mut()[1] = Lanes::new([1.0, 0.5, 0.5, 0.5]);
-        let least = systems.factorise().to_array();
+        let least = systems.factorize().to_array();
         assert_eq!(least[0], 0.0);
         assert!(least[1] > 0.9);
     }

@@ -1,5 +1,5 @@
 //! What hot loops compute with: one number, or several side by side in a vector register. One implementation of a
-//! formula serves both, and a lane gives the same bits wherever it stands and whatever its neighbours hold.
+//! formula serves both, and a lane gives the same bits wherever it stands and whatever its neighbors hold.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -125,7 +125,7 @@ pub fn difference<T: Number, const D: usize>(a: &[T; D], b: &[T; D]) -> [T; D] {
 
 /// A b for a symmetric matrix.
 #[inline(always)]
-pub fn times<T: Number, const D: usize>(matrix: &[[T; D]; D], b: &[T; D]) -> [T; D] {
+pub fn multiply_symmetric<T: Number, const D: usize>(matrix: &[[T; D]; D], b: &[T; D]) -> [T; D] {
     let mut product = *b;
     for d in 0..D {
         product[d] = dot(&matrix[d], b);

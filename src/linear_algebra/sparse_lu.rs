@@ -25,7 +25,7 @@ struct Correction {
 /// The matrix is singular, or too large.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("sparse LU decomposition of {size} rows failed: {reason}")]
-pub struct Undecomposed {
+pub struct DecompositionFailed {
     /// Rows.
     pub size: usize,
     /// What the library says.
@@ -37,9 +37,9 @@ impl SparseLu {
     ///
     /// # Errors
     /// [`Undecomposed`].
-    pub fn of(rows: &SparseRows, alpha: Option<f64>) -> Result<Self, Undecomposed> {
+    pub fn from_rows(rows: &SparseRows, alpha: Option<f64>) -> Result<Self, DecompositionFailed> {
         let size = rows.rows();
-        let failed = |reason: String| Undecomposed { size, reason };
+        let failed = |reason: String| DecompositionFailed { size, reason };
         let mut triplets = Vec::with_capacity(rows.entries() + 1);
         let mut largest = 0.0_f64;
         for i in 0..size {
@@ -114,7 +114,7 @@ mod tests {
             let a = ring(diagonal);
             let (mut b, mut x) = (vec![0.0; n], vec![0.0; n]);
             a.apply(&exact, &mut b);
-            SparseLu::of(&a, alpha).unwrap().solve(&b, &mut x);
+            SparseLu::from_rows(&a, alpha).unwrap().solve(&b, &mut x);
             assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-10));
         }
     }

@@ -1,4 +1,4 @@
-//! A linear operator as sparse rows: each point its neighbours and their weights (compressed sparse rows).
+//! A linear operator as sparse rows: each point its neighbors and their weights (compressed sparse rows).
 
 use rayon::prelude::{IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
@@ -103,7 +103,7 @@ impl SparseRows {
 
     /// max_i Σ_j |w_ij|.
     #[must_use]
-    pub fn largest_row(&self) -> f64 {
+    pub fn infinity_norm(&self) -> f64 {
         let sum = |i: usize| self.row(i).1.iter().map(|weight| weight.abs()).sum::<f64>();
         // A maximum does not depend on the order.
         (0..self.rows()).into_par_iter().with_min_len(ROWS).map(sum).reduce(|| 0.0, f64::max)
@@ -134,7 +134,7 @@ mod tests {
         let mut out = [7.0; 3];
         operator.apply(&[1.0, 2.0, 3.0], &mut out);
         assert_eq!((out, operator.rows(), operator.entries()), ([-5.0, 0.0, 6.0], 3, 3));
-        assert!((operator.largest_row() - 3.0).abs() < f64::EPSILON);
+        assert!((operator.infinity_norm() - 3.0).abs() < f64::EPSILON);
     }
 
     #[test]

@@ -23,9 +23,9 @@ impl<const D: usize> NeighborSearch<D> for BruteForce<'_, D> {
         }
     }
 
-    fn nearest(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)> {
-        let mut best = (usize::MAX, reach * reach);
-        self.for_each_within(x, reach, |j, _, r2| {
+    fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)> {
+        let mut best = (usize::MAX, cutoff * cutoff);
+        self.for_each_within(x, cutoff, |j, _, r2| {
             if r2 < best.1 || r2 <= best.1 && j < best.0 {
                 best = (j, r2);
             }

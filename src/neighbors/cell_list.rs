@@ -173,10 +173,10 @@ impl<const D: usize> CellList<D> {
     /// Range of (unwrapped) cell indices along axis d that can hold points within `radius` of `x`.
     fn span(&self, x: &Vector<D>, radius: f64, d: usize) -> (i64, i64) {
         // The padding covers rounding of the divisions for points exactly `radius` away.
-        let (at, reach) = ((x[d] - self.low[d]) * self.inverse_edge[d], radius * self.inverse_edge[d]);
+        let (at, cutoff) = ((x[d] - self.low[d]) * self.inverse_edge[d], radius * self.inverse_edge[d]);
         let pad = 1e-9 * (1.0 + at.abs());
-        let first = (at - reach - pad).floor();
-        let last = (at + reach + pad).floor();
+        let first = (at - cutoff - pad).floor();
+        let last = (at + cutoff + pad).floor();
         let count = self.counts[d] as f64;
         if self.is_periodic(d) {
             if last - first + 1.0 >= count { (0, self.counts[d] as i64 - 1) } else { (first as i64, last as i64) }
@@ -288,14 +288,14 @@ impl<const D: usize> NeighborSearch<D> for CellList<D> {
         });
     }
 
-    fn nearest(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)> {
+    fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)> {
         if self.is_empty() {
             return None;
         }
         // Search balls of doubling radius until one holds a point: the nearest point of that ball is the nearest.
         let edge = self.edge.max();
         let widest = self.farthest(x);
-        let mut radius = edge.min(reach);
+        let mut radius = edge.min(cutoff);
         loop {
             let mut best = (usize::MAX, f64::INFINITY);
             self.for_each_within(x, radius, |j, _, r2| {
@@ -306,10 +306,10 @@ impl<const D: usize> NeighborSearch<D> for CellList<D> {
             if best.0 != usize::MAX {
                 return Some((best.0, best.1.sqrt()));
             }
-            if radius >= reach || radius > widest {
+            if radius >= cutoff || radius > widest {
                 return None;
             }
-            radius = (2.0 * radius).min(reach);
+            radius = (2.0 * radius).min(cutoff);
         }
     }
 }
@@ -317,7 +317,7 @@ impl<const D: usize> NeighborSearch<D> for CellList<D> {
 impl<const D: usize> CellList<D> {
     /// The points in the order of their cells.
     #[must_use]
-    pub fn order(&self) -> &[usize] {
+    pub fn permutation(&self) -> &[usize] {
         &self.order
     }
 
@@ -349,7 +349,7 @@ impl<const D: usize> CellList<D> {
     }
 
     /// Gives every cell the union of its own marks and those of the cells round it.
-    pub fn spread(&self, marks: &mut Vec<u8>, before: &mut Vec<u8>) {
+    pub fn spread_marks(&self, marks: &mut Vec<u8>, before: &mut Vec<u8>) {
         let mut stride = 1;
         for d in 0..D {
             let (count, wraps) = (self.counts[d], self.is_periodic(d));
@@ -394,8 +394,8 @@ impl<const D: usize> CellList<D> {
             }
             let mut along = spans[0];
             if !is_whole[0] && !self.is_row_short(base, along) {
-                let reach = (best.1 - away * (1.0 - 1e-9)).sqrt();
-                let narrow = self.span(&x, reach, 0);
+                let cutoff = (best.1 - away * (1.0 - 1e-9)).sqrt();
+                let narrow = self.span(&x, cutoff, 0);
                 along = (along.0.max(narrow.0), along.1.min(narrow.1));
             }
             self.for_each_part(base, along, |from, to| {
@@ -417,17 +417,17 @@ impl<const D: usize> CellList<D> {
     pub fn nearest_next(
         &self,
         x: &Vector<D>,
-        reach: f64,
+        cutoff: f64,
         last: &mut Option<usize>,
         at: impl Fn(usize) -> Vector<D>,
     ) -> Option<(usize, f64)> {
         let nearest = match *last {
             Some(point) => self.nearest_from(x, (point, self.displacement(x, &at(point)).norm_squared())),
             // Without a point to start from, the search itself ends at the reach.
-            None => self.nearest(x, reach).map(|(point, distance)| (point, distance * distance))?,
+            None => self.nearest(x, cutoff).map(|(point, distance)| (point, distance * distance))?,
         };
         *last = Some(nearest.0);
-        (nearest.1.sqrt() <= reach).then_some(nearest)
+        (nearest.1.sqrt() <= cutoff).then_some(nearest)
     }
 
     /// A distance that no point of the list exceeds from `x`.

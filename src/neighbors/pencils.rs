@@ -1,6 +1,6 @@
-//! Pairs of neighbours, each once, as groups that stand side by side in memory: points of a periodic box sorted into pencils
+//! Pairs of neighbors, each once, as groups that stand side by side in memory: points of a periodic box sorted into pencils
 //! along x (stripes in the plane), in each by x, so that those within reach of a point are a few contiguous ranges, cut into
-//! groups of [`GROUP`]. Of two neighbours the one that stands earlier in the order lists the other, the box being closed to a
+//! groups of [`GROUP`]. Of two neighbors the one that stands earlier in the order lists the other, the box being closed to a
 //! ring along its last axis: sums go to both sides of a pair.
 //!
 //! A loop over groups needs no condition: the last group of a range may reach beyond it, to points that are out of reach,
@@ -21,9 +21,9 @@ pub use slabs::Window;
 /// Places of a group.
 pub const GROUP: usize = 4;
 /// Who stands at a place where nobody stands.
-const NOBODY: u32 = u32::MAX;
+const EMPTY_SLOT: u32 = u32::MAX;
 /// Pencils that the reach spans: more follow the round support closer, fewer are longer (measured).
-const fn pencils_a_reach(dimension: usize) -> f64 {
+const fn pencils_per_cutoff(dimension: usize) -> f64 {
     if dimension == 2 { 3.0 } else { 2.0 }
 }
 /// Edge of the cells along x by the edge of a pencil.
@@ -49,16 +49,16 @@ struct Slab {
     ends: Vec<u32>,
 }
 
-/// The neighbours that one place lists: groups by image.
+/// The neighbors that one place lists: groups by image.
 #[derive(Debug, Clone, Copy)]
-pub struct Near<'a, const D: usize> {
+pub struct NeighborGroups<'a, const D: usize> {
     groups: &'a [u32],
     runs: &'a [Run],
     begin: u32,
     shifts: &'a [Vector<D>],
 }
 
-impl<'a, const D: usize> Near<'a, D> {
+impl<'a, const D: usize> NeighborGroups<'a, D> {
     /// Groups with the displacement of the image that they are met from: add it to the position of the point.
     pub fn runs(&self) -> impl Iterator<Item = (&'a Vector<D>, &'a [u32])> + '_ {
         let mut begin = self.begin as usize;
@@ -78,7 +78,7 @@ pub struct Pencils<const D: usize> {
     /// Cells along x, pencils along the others.
     counts: [usize; D],
     edges: Vector<D>,
-    reach: f64,
+    cutoff: f64,
     /// Pencils along every axis that the reach may span.
     spans: [i64; D],
     starts: Vec<u32>,
@@ -93,22 +93,22 @@ pub struct Pencils<const D: usize> {
 
 /// A box that is too small for a reach.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("a periodic length of {length} is too short for neighbours within {reach}: {least} is needed")]
+#[error("a periodic length of {length} is too short for neighbors within {cutoff}: {least} is needed")]
 pub struct BoxTooSmall {
     /// The length.
     pub length: f64,
     /// The reach.
-    pub reach: f64,
+    pub cutoff: f64,
     /// What would do.
     pub least: f64,
 }
 
 impl<const D: usize> Pencils<D> {
-    /// Nobody yet, in a box that is periodic along every axis, for neighbours within `reach`.
+    /// Nobody yet, in a box that is periodic along every axis, for neighbors within `reach`.
     ///
     /// # Errors
     /// [`BoxTooSmall`] where a point could meet two images of another; an axis without a period counts as length 0.
-    pub fn new(domain: &Domain<D>, reach: f64) -> Result<Self, BoxTooSmall> {
+    pub fn new(domain: &Domain<D>, cutoff: f64) -> Result<Self, BoxTooSmall> {
         let mut low = Vector::<D>::zeros();
         let mut lengths = Vector::<D>::zeros();
         for (d, axis) in domain.axes().iter().enumerate() {
@@ -117,17 +117,17 @@ impl<const D: usize> Pencils<D> {
                 lengths[d] = *length;
             }
         }
-        let edge = reach / pencils_a_reach(D);
-        let least = (2.0 * pencils_a_reach(D) + 2.0) * edge;
+        let edge = cutoff / pencils_per_cutoff(D);
+        let least = (2.0 * pencils_per_cutoff(D) + 2.0) * edge;
         if let Some(length) = lengths.iter().copied().find(|length| *length < least) {
-            return Err(BoxTooSmall { length, reach, least });
+            return Err(BoxTooSmall { length, cutoff, least });
         }
         let counts: [usize; D] = std::array::from_fn(|d| {
             let wanted = if d == 0 { CELL * edge } else { edge };
             (lengths[d] / wanted).floor().max(1.0) as usize
         });
         let edges = Vector::<D>::from_fn(|d, _| lengths[d] / counts[d] as f64);
-        let spans = std::array::from_fn(|d| if d == 0 { 0 } else { (reach / edges[d]).ceil() as i64 });
+        let spans = std::array::from_fn(|d| if d == 0 { 0 } else { (cutoff / edges[d]).ceil() as i64 });
         let shifts = (0..3_usize.pow(D as u32))
             .map(|image| Vector::<D>::from_fn(|d, _| (image / 3_usize.pow(d as u32) % 3) as f64 - 1.0))
             .map(|turns| turns.component_mul(&lengths))
@@ -137,7 +137,7 @@ impl<const D: usize> Pencils<D> {
             lengths,
             counts,
             edges,
-            reach,
+            cutoff,
             spans,
             starts: Vec::new(),
             cell_of: Vec::new(),
@@ -165,7 +165,7 @@ impl<const D: usize> Pencils<D> {
                 return;
             }
             for place in slab.places.clone() {
-                if this.order[place] != NOBODY {
+                if this.order[place] != EMPTY_SLOT {
                     this.find_groups(place, slab);
                 }
                 slab.ends.push(slab.runs.len() as u32);
@@ -179,19 +179,19 @@ impl<const D: usize> Pencils<D> {
 
     /// How many places there are, those of the first slab counted twice.
     #[must_use]
-    pub fn places(&self) -> usize {
+    pub fn slot_count(&self) -> usize {
         self.order.len()
     }
 
     /// Places and who stands there.
     pub fn occupied(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let once = self.order.iter().take(self.sorted.len()).enumerate();
-        once.filter(|(_, i)| **i != NOBODY).map(|(place, i)| (place, *i as usize))
+        once.filter(|(_, i)| **i != EMPTY_SLOT).map(|(place, i)| (place, *i as usize))
     }
 
     /// One number a place; `nobodys` where nobody stands.
-    pub fn by_place(&self, nobodys: f64, value: impl Fn(usize) -> f64) -> impl Iterator<Item = f64> {
-        self.order.iter().map(move |i| if *i == NOBODY { nobodys } else { value(*i as usize) })
+    pub fn by_slot(&self, padding: f64, value: impl Fn(usize) -> f64) -> impl Iterator<Item = f64> {
+        self.order.iter().map(move |i| if *i == EMPTY_SLOT { padding } else { value(*i as usize) })
     }
 
     fn cell(&self, x: &Vector<D>) -> usize {
@@ -218,7 +218,7 @@ impl<const D: usize> Pencils<D> {
             self.starts[cell + 1] += self.starts[cell] + if pencil_ends { GROUP as u32 } else { 0 };
         }
         self.order.clear();
-        self.order.resize(self.starts[cells] as usize, NOBODY);
+        self.order.resize(self.starts[cells] as usize, EMPTY_SLOT);
         for (i, cell) in self.cell_of.iter().enumerate() {
             let place = &mut self.starts[*cell as usize];
             self.order[*place as usize] = i as u32;
@@ -271,7 +271,7 @@ impl<const D: usize> Pencils<D> {
     fn groups_of_pencil(&self, place: usize, own: &[i64; D], away: &[i64; D], first_run: usize, found: &mut Slab) {
         let x = &self.sorted[place];
         let is_own = away.iter().all(|steps| *steps == 0);
-        let (mut chord, mut base, mut image, mut digit) = (self.reach * self.reach, 0, 0, 1);
+        let (mut chord, mut base, mut image, mut digit) = (self.cutoff * self.cutoff, 0, 0, 1);
         for d in 1..D {
             let pencil = own[d] + away[d];
             let start = self.low[d] + pencil as f64 * self.edges[d];
@@ -330,13 +330,13 @@ impl<const D: usize> Pencils<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Domain, GROUP, Interrupt, NOBODY, Pencils, Vector};
+    use super::{Domain, EMPTY_SLOT, GROUP, Interrupt, Pencils, Vector};
     use crate::geometry::domain::Axis;
     use crate::geometry::random::CounterRandom;
     use crate::neighbors::{BruteForce, NeighborSearch};
     use std::sync::Mutex;
 
-    fn check<const D: usize>(lengths: [f64; D], count: usize, reach: f64) {
+    fn check<const D: usize>(lengths: [f64; D], count: usize, cutoff: f64) {
         let domain = Domain::new(std::array::from_fn(|d| Axis::Periodic { start: -0.3, length: lengths[d] }));
         let random = CounterRandom::new(7);
         let points: Vec<Vector<D>> = (0..count as i64)
@@ -345,12 +345,12 @@ mod tests {
                 domain.wrap(Vector::<D>::from_fn(|d, _| -0.3 + lengths[d] * draw(d)))
             })
             .collect();
-        let mut pencils = Pencils::new(&domain, reach).unwrap();
+        let mut pencils = Pencils::new(&domain, cutoff).unwrap();
         pencils.rebuild(&points, &Interrupt::default()).unwrap();
         let standing: Vec<Option<usize>> =
-            pencils.order.iter().map(|i| (*i != NOBODY).then_some(*i as usize)).collect();
+            pencils.order.iter().map(|i| (*i != EMPTY_SLOT).then_some(*i as usize)).collect();
         let met = Mutex::new(Vec::new());
-        let mut sums = vec![0.0; pencils.places()];
+        let mut sums = vec![0.0; pencils.slot_count()];
         pencils
             .sum([&mut sums], &Interrupt::default(), |place, near, window| {
                 let i = standing[place].unwrap();
@@ -358,7 +358,7 @@ mod tests {
                     let x = points[i] + shift;
                     // What a group holds beyond its range is out of reach, or it would be found twice.
                     for other in groups.iter().flat_map(|first| *first as usize..*first as usize + GROUP) {
-                        if let Some(j) = standing[other].filter(|j| (x - points[*j]).norm() <= reach) {
+                        if let Some(j) = standing[other].filter(|j| (x - points[*j]).norm() <= cutoff) {
                             met.lock().unwrap().push((i.min(j), i.max(j)));
                             window.columns[0][place - window.begin] += 1.0;
                             window.columns[0][other - window.begin] += 1.0;
@@ -371,7 +371,7 @@ mod tests {
         let mut expected = Vec::new();
         for (place, i) in pencils.occupied() {
             let mut neighbors = 0;
-            brute.for_each_within(&points[i], reach, |j, _, _| {
+            brute.for_each_within(&points[i], cutoff, |j, _, _| {
                 neighbors += usize::from(j != i);
                 if i < j {
                     expected.push((i, j));

@@ -6,15 +6,15 @@ use crate::linear_algebra::number::{Lanes, Number};
 use crate::polynomials::multi_index::MultiIndexSet;
 
 /// Highest degree.
-pub(super) const MOST_DEGREE: usize = 7;
+pub(super) const MAX_DEGREE: usize = 7;
 
 /// T_n^(k)(0) for n and k up to the highest degree, from T_{n+1} = 2 x T_n − T_{n−1}.
-fn derivatives_at_origin() -> [[f64; MOST_DEGREE + 1]; MOST_DEGREE + 1] {
-    let mut t = [[0.0; MOST_DEGREE + 1]; MOST_DEGREE + 1];
+fn derivatives_at_origin() -> [[f64; MAX_DEGREE + 1]; MAX_DEGREE + 1] {
+    let mut t = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];
     t[0][0] = 1.0;
     t[1][1] = 1.0;
-    for n in 2..=MOST_DEGREE {
-        for k in 0..=MOST_DEGREE {
+    for n in 2..=MAX_DEGREE {
+        for k in 0..=MAX_DEGREE {
             let rise = if k > 0 { 2.0 * k as f64 * t[n - 1][k - 1] } else { 0.0 };
             t[n][k] = rise - t[n - 2][k];
         }
@@ -34,7 +34,7 @@ pub(super) struct Basis<const M: usize> {
 
 impl<const M: usize> Basis<M> {
     pub fn new(degree: usize) -> Self {
-        let degree = degree.min(MOST_DEGREE);
+        let degree = degree.min(MAX_DEGREE);
         let at_origin = derivatives_at_origin();
         let set = MultiIndexSet::<M>::total_degree(degree);
         let indices = &set.indices()[1..];
@@ -55,7 +55,7 @@ impl<const M: usize> Basis<M> {
     #[inline(always)]
     pub fn values(&self, x: [Lanes; M], out: &mut [Lanes]) {
         let one = Lanes::splat(1.0);
-        let mut t = [[one; MOST_DEGREE + 1]; M];
+        let mut t = [[one; MAX_DEGREE + 1]; M];
         for (t, x) in t.iter_mut().zip(x) {
             t[1] = x;
             for n in 2..=self.degree {
@@ -63,11 +63,11 @@ impl<const M: usize> Basis<M> {
             }
         }
         for (out, (a, origin)) in out.iter_mut().zip(&self.functions) {
-            let mut product = t[0][usize::from(a[0]) & MOST_DEGREE];
+            let mut product = t[0][usize::from(a[0]) & MAX_DEGREE];
             for d in 1..M - 1 {
-                product *= t[d][usize::from(a[d]) & MOST_DEGREE];
+                product *= t[d][usize::from(a[d]) & MAX_DEGREE];
             }
-            let last = if M > 1 { t[M - 1][usize::from(a[M - 1]) & MOST_DEGREE] } else { one };
+            let last = if M > 1 { t[M - 1][usize::from(a[M - 1]) & MAX_DEGREE] } else { one };
             *out = Number::mul_add(product, last, Lanes::splat(-origin));
         }
     }

@@ -36,8 +36,8 @@ pub trait Chart<const M: usize>: Sync {
     fn count(&self) -> usize;
 
     /// What lies about point i within `reach`: nodes of one index follow one another; those of index i itself are copies of the
-    /// centre, which take part in the fit and have no weight in the row. As a last resort also what would not belong to it.
-    fn gather(&self, i: usize, reach: f64, is_last_resort: bool, near: &mut Vec<Node<M>>);
+    /// center, which take part in the fit and have no weight in the row. As a last resort also what would not belong to it.
+    fn gather(&self, i: usize, radius: f64, is_last_resort: bool, near: &mut Vec<Node<M>>);
 
     /// The support of point i by that of the others.
     fn scale(&self, _i: usize) -> f64 {
@@ -69,7 +69,7 @@ fn second<const M: usize>(a: usize, b: usize) -> [u8; M] {
 }
 
 /// A functional in the coordinates of space themselves.
-fn in_space<const D: usize>(functional: Functional<D>, terms: &mut Vec<([u8; D], f64)>) {
+fn cartesian_terms<const D: usize>(functional: Functional<D>, terms: &mut Vec<([u8; D], f64)>) {
     match functional {
         Functional::Partial(alpha) => terms.push((alpha, 1.0)),
         Functional::LaplaceBeltrami => terms.extend((0..D).map(|d| (second(d, d), 1.0))),

@@ -51,7 +51,7 @@ mod tests {
     fn fields_on_the_sphere_have_their_divergence() {
         let points: Vec<Vector<3>> = fibonacci::sphere(2000);
         let radius = 4.0 * (4.0 * std::f64::consts::PI / 2000.0).sqrt();
-        let chart = TangentChart::new(&points, &points, Metric::OfNormals, radius);
+        let chart = TangentChart::new(&points, &points, Metric::FromNormals, radius);
         let functionals: Vec<Functional<2>> = (0..3).map(Functional::Gradient).collect();
         let support = Support { degree: 5, radius };
         let built = construct::<2>(&chart, support, &functionals, &Interrupt::default()).unwrap();

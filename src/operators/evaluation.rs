@@ -2,7 +2,7 @@
 
 use super::basis::Basis;
 use super::charts::{Chart, Functional, Node};
-use super::fits::{BLOCK, Fits, Outcome, RowSink, Soundness, Support, Work};
+use super::fits::{BLOCK, FitOutcome, Fits, RowSink, Support, SupportDiagnostics, Workspace};
 use crate::linear_algebra::number::Lanes;
 use crate::parallel::{Interrupt, Interrupted, PerThread};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
@@ -13,17 +13,17 @@ pub struct Evaluation<const M: usize> {
     basis: Basis<M>,
     support: Support,
     functionals: Vec<Functional<M>>,
-    work: PerThread<(Work<M>, Outcome<M>)>,
+    workspace: PerThread<(Workspace<M>, FitOutcome<M>)>,
 }
 
 /// Fields that are evaluated at a time, at most.
-pub const MOST_FIELDS: usize = 4;
+pub const MAX_FIELDS: usize = 4;
 
 impl<const M: usize> Evaluation<M> {
     /// Of functionals.
     #[must_use]
     pub fn new(support: Support, functionals: Vec<Functional<M>>) -> Self {
-        Self { basis: Basis::new(support.degree), support, functionals, work: PerThread::new() }
+        Self { basis: Basis::new(support.degree), support, functionals, workspace: PerThread::new() }
     }
 
     /// Numbers of a point for so many fields.
@@ -43,25 +43,25 @@ impl<const M: usize> Evaluation<M> {
         fields: &[&[f64]],
         out: &mut [f64],
         interrupt: &Interrupt,
-    ) -> Result<Soundness, Interrupted> {
-        let fields = &fields[..fields.len().min(MOST_FIELDS)];
+    ) -> Result<SupportDiagnostics, Interrupted> {
+        let fields = &fields[..fields.len().min(MAX_FIELDS)];
         let numbers = self.numbers(fields.len());
         let fits = Fits { chart, basis: &self.basis, radius: self.support.radius, functionals: &self.functionals };
-        let soundness = Mutex::new(Soundness::none());
+        let fit_diagnostics = Mutex::new(SupportDiagnostics::none());
         out.par_chunks_mut(BLOCK * numbers).enumerate().with_min_len(1).for_each(|(block, out)| {
-            self.work.with(|(work, outcome)| {
-                outcome.soundness = Soundness::none();
+            self.workspace.with(|(workspace, outcome)| {
+                outcome.fit_diagnostics = SupportDiagnostics::none();
                 outcome.heights.clear();
                 let first = block * BLOCK;
                 let mut sums = Sums { first, fields, numbers, out };
                 let points = first..first + sums.out.len() / numbers;
-                fits.run(points, interrupt, work, &mut sums, outcome);
+                fits.run(points, interrupt, workspace, &mut sums, outcome);
                 // Counts and a minimum: the order of adding does not matter.
-                soundness.lock().unwrap_or_else(PoisonError::into_inner).add(&outcome.soundness);
+                fit_diagnostics.lock().unwrap_or_else(PoisonError::into_inner).add(&outcome.fit_diagnostics);
             });
         });
         interrupt.check()?;
-        Ok(soundness.into_inner().unwrap_or_else(PoisonError::into_inner))
+        Ok(fit_diagnostics.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
@@ -77,11 +77,11 @@ impl<const M: usize> RowSink<M> for Sums<'_> {
     fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>) {
         let count = self.fields.len();
         // What is not known must not look like a number.
-        let mut sums = [f64::NAN; MOST_FIELDS];
+        let mut sums = [f64::NAN; MAX_FIELDS];
         if let Some((weights, lane)) = weights {
-            let mut own = [0.0; MOST_FIELDS];
+            let mut own = [0.0; MAX_FIELDS];
             own.iter_mut().zip(self.fields).for_each(|(own, field)| *own = field[i]);
-            sums = [0.0; MOST_FIELDS];
+            sums = [0.0; MAX_FIELDS];
             for (node, weights) in nodes.iter().zip(weights) {
                 let weight = weights.as_array()[lane];
                 for ((sum, field), own) in sums.iter_mut().zip(self.fields).zip(own) {
@@ -120,8 +120,8 @@ mod tests {
         let mut out = vec![0.0; 4 * 300];
         let evaluation = Evaluation::<2>::new(support, functionals);
         let interrupt = Interrupt::default();
-        let soundness = evaluation.evaluate(&chart, &[&fields[0], &fields[1]], &mut out, &interrupt).unwrap();
-        assert_eq!(soundness, built.soundness);
+        let fit_diagnostics = evaluation.evaluate(&chart, &[&fields[0], &fields[1]], &mut out, &interrupt).unwrap();
+        assert_eq!(fit_diagnostics, built.fit_diagnostics);
         for (f, field) in fields.iter().enumerate() {
             for (k, rows) in built.operators.iter().enumerate() {
                 let mut expected = vec![0.0; 300];

@@ -21,7 +21,7 @@ pub struct Support {
 
 /// What became of points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Soundness {
+pub struct SupportDiagnostics {
     /// How often a support was enlarged.
     pub enlarged: u64,
     /// Points whose moment conditions were solved by the rank-revealing decomposition.
@@ -33,14 +33,14 @@ pub struct Soundness {
     /// The first of them.
     pub first_failed: Option<usize>,
     /// The least share of a pivot in its diagonal, of all points that were solved directly.
-    pub least_pivot: f64,
+    pub min_pivot: f64,
 }
 
-impl Soundness {
+impl SupportDiagnostics {
     /// Of no points.
     #[must_use]
     pub fn none() -> Self {
-        Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, first_failed: None, least_pivot: 1.0 }
+        Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, first_failed: None, min_pivot: 1.0 }
     }
 
     /// Supports that were rescued, in one way or another.
@@ -52,13 +52,13 @@ impl Soundness {
     /// What a checkpoint keeps: the counts in their order, and the least pivot.
     #[must_use]
     pub fn to_numbers(&self) -> ([u64; 4], f64) {
-        ([self.enlarged, self.low_rank, self.unresolved, self.failed], self.least_pivot)
+        ([self.enlarged, self.low_rank, self.unresolved, self.failed], self.min_pivot)
     }
 
     /// Takes it back; which point failed first is not kept.
     #[must_use]
-    pub fn from_numbers([enlarged, low_rank, unresolved, failed]: [u64; 4], least_pivot: f64) -> Self {
-        Self { enlarged, low_rank, unresolved, failed, first_failed: None, least_pivot }
+    pub fn from_numbers([enlarged, low_rank, unresolved, failed]: [u64; 4], min_pivot: f64) -> Self {
+        Self { enlarged, low_rank, unresolved, failed, first_failed: None, min_pivot }
     }
 
     /// With others.
@@ -68,18 +68,18 @@ impl Soundness {
         self.unresolved += other.unresolved;
         self.failed += other.failed;
         self.first_failed = [self.first_failed, other.first_failed].into_iter().flatten().min();
-        self.least_pivot = self.least_pivot.min(other.least_pivot);
+        self.min_pivot = self.min_pivot.min(other.min_pivot);
     }
 }
 
-/// Neighbours for a function at least: fewer make the fit an interpolation of noise.
-const NEIGHBORS_A_FUNCTION: f64 = 1.4;
+/// Neighbors for a function at least: fewer make the fit an interpolation of noise.
+const NEIGHBORS_PER_FUNCTION: f64 = 1.4;
 /// How a support grows that is not enough, and how far.
 const GROWTH: f64 = 1.2;
 /// The largest support by r_c.
-pub const MOST_GROWTH: f64 = 2.5;
+pub const MAX_GROWTH: f64 = 2.5;
 /// Below this share of a pivot in its diagonal the moment conditions do not hold to the digits that are wanted.
-const LEAST_PIVOT: f64 = 1e-9;
+const MIN_PIVOT: f64 = 1e-9;
 /// Moment conditions that a rank-revealing solution may leave open, by the largest.
 const OPEN_MOMENTS: f64 = 1e-6;
 /// Points of a parallel task; a multiple of the lanes.
@@ -92,20 +92,20 @@ pub(super) trait RowSink<const M: usize> {
 }
 
 /// What comes of a range of points beside the weights.
-pub(super) struct Outcome<const M: usize> {
+pub(super) struct FitOutcome<const M: usize> {
     pub heights: Vec<Heights<M>>,
-    pub soundness: Soundness,
+    pub fit_diagnostics: SupportDiagnostics,
 }
 
-impl<const M: usize> Default for Outcome<M> {
+impl<const M: usize> Default for FitOutcome<M> {
     fn default() -> Self {
-        Self { heights: Vec::new(), soundness: Soundness::none() }
+        Self { heights: Vec::new(), fit_diagnostics: SupportDiagnostics::none() }
     }
 }
 
 /// Storage of a thread.
 #[derive(Default)]
-pub(super) struct Work<const M: usize> {
+pub(super) struct Workspace<const M: usize> {
     fit: MomentFit<M>,
     terms: Vec<([u8; M], f64)>,
     functional: Vec<f64>,
@@ -127,69 +127,76 @@ impl<const M: usize> Fits<'_, M> {
         &self,
         points: Range<usize>,
         interrupt: &Interrupt,
-        work: &mut Work<M>,
+        workspace: &mut Workspace<M>,
         sink: &mut dyn RowSink<M>,
-        outcome: &mut Outcome<M>,
+        outcome: &mut FitOutcome<M>,
     ) {
         let end = points.end;
         for first in points.step_by(LANES) {
             if interrupt.is_raised() {
                 return;
             }
-            self.rows_of(first..(first + LANES).min(end), work, sink, outcome);
+            self.rows_of(first..(first + LANES).min(end), workspace, sink, outcome);
         }
     }
 
     /// The rows of up to four points, one a lane.
-    fn rows_of(&self, points: Range<usize>, work: &mut Work<M>, sink: &mut dyn RowSink<M>, outcome: &mut Outcome<M>) {
+    fn rows_of(
+        &self,
+        points: Range<usize>,
+        workspace: &mut Workspace<M>,
+        sink: &mut dyn RowSink<M>,
+        outcome: &mut FitOutcome<M>,
+    ) {
         let number = self.basis.size();
-        let wanted = (NEIGHBORS_A_FUNCTION * number as f64).ceil() as usize;
+        let wanted = (NEIGHBORS_PER_FUNCTION * number as f64).ceil() as usize;
         let last = points.end - 1;
         let nominal: [f64; LANES] =
             std::array::from_fn(|lane| self.radius * self.chart.scale((points.start + lane).min(last)));
-        let mut reach = nominal;
-        let can_grow = |lane: usize, reach: f64| self.chart.may_grow() && reach * GROWTH <= MOST_GROWTH * nominal[lane];
+        let mut radius = nominal;
+        let can_grow =
+            |lane: usize, radius: f64| self.chart.may_grow() && radius * GROWTH <= MAX_GROWTH * nominal[lane];
         for (lane, i) in points.clone().enumerate() {
             loop {
-                self.chart.gather(i, reach[lane], false, &mut work.fit.near[lane]);
-                if work.fit.near[lane].len() >= wanted || !can_grow(lane, reach[lane]) {
+                self.chart.gather(i, radius[lane], false, &mut workspace.fit.near[lane]);
+                if workspace.fit.near[lane].len() >= wanted || !can_grow(lane, radius[lane]) {
                     break;
                 }
-                reach[lane] *= GROWTH;
-                outcome.soundness.enlarged += 1;
+                radius[lane] *= GROWTH;
+                outcome.fit_diagnostics.enlarged += 1;
             }
         }
         for lane in points.len()..LANES {
             // Spare lanes repeat the first.
-            let (first, rest) = work.fit.near.split_at_mut(1);
+            let (first, rest) = workspace.fit.near.split_at_mut(1);
             rest[lane - 1].clone_from(&first[0]);
-            reach[lane] = reach[0];
+            radius[lane] = radius[0];
         }
         let mut is_last_resort = [!self.chart.may_grow(); LANES];
         loop {
-            let pivots = work.fit.factorise(self.basis);
+            let pivots = workspace.fit.factorize(self.basis);
             let sound: [bool; LANES] =
-                std::array::from_fn(|lane| pivots[lane] > LEAST_PIVOT && work.fit.near[lane].len() >= number);
+                std::array::from_fn(|lane| pivots[lane] > MIN_PIVOT && workspace.fit.near[lane].len() >= number);
             let mut is_again = false;
             for (lane, i) in points.clone().enumerate().filter(|(lane, _)| !sound[*lane]) {
-                if can_grow(lane, reach[lane]) && !is_last_resort[lane] {
-                    reach[lane] *= GROWTH;
-                    outcome.soundness.enlarged += 1;
+                if can_grow(lane, radius[lane]) && !is_last_resort[lane] {
+                    radius[lane] *= GROWTH;
+                    outcome.fit_diagnostics.enlarged += 1;
                 } else if !is_last_resort[lane] {
-                    reach[lane] = nominal[lane] * GROWTH;
+                    radius[lane] = nominal[lane] * GROWTH;
                     is_last_resort[lane] = true;
-                    outcome.soundness.unresolved += 1;
+                    outcome.fit_diagnostics.unresolved += 1;
                 } else {
                     continue;
                 }
-                self.chart.gather(i, reach[lane], is_last_resort[lane], &mut work.fit.near[lane]);
+                self.chart.gather(i, radius[lane], is_last_resort[lane], &mut workspace.fit.near[lane]);
                 is_again = true;
             }
             if !is_again {
                 for lane in (0..points.len()).filter(|lane| sound[*lane]) {
-                    outcome.soundness.least_pivot = outcome.soundness.least_pivot.min(pivots[lane]);
+                    outcome.fit_diagnostics.min_pivot = outcome.fit_diagnostics.min_pivot.min(pivots[lane]);
                 }
-                self.finish(&points, reach, sound, work, sink, outcome);
+                self.finish(&points, radius, sound, workspace, sink, outcome);
                 return;
             }
         }
@@ -199,48 +206,48 @@ impl<const M: usize> Fits<'_, M> {
     fn finish(
         &self,
         points: &Range<usize>,
-        reach: [f64; LANES],
+        radius: [f64; LANES],
         sound: [bool; LANES],
-        work: &mut Work<M>,
+        workspace: &mut Workspace<M>,
         sink: &mut dyn RowSink<M>,
-        outcome: &mut Outcome<M>,
+        outcome: &mut FitOutcome<M>,
     ) {
-        let heights = self.chart.needs_heights().then(|| self.heights(reach, sound, work));
+        let heights = self.chart.needs_heights().then(|| self.heights(radius, sound, workspace));
         // Where the moments are singular, so are those of the heights: a metric of what comes out would be a metric of nothing.
         let mut holds = sound.map(|is_sound| is_sound || heights.is_none());
         for (k, functional) in self.functionals.iter().enumerate() {
-            work.values.clear();
-            work.values.resize(self.basis.size(), [0.0; LANES]);
+            workspace.values.clear();
+            workspace.values.resize(self.basis.size(), [0.0; LANES]);
             for lane in 0..LANES {
                 let i = points.start + lane.min(points.len().saturating_sub(1));
-                work.terms.clear();
+                workspace.terms.clear();
                 let of_lane = heights.as_ref().map(|heights| &heights[lane]);
-                self.chart.terms(*functional, i, of_lane, &mut work.terms);
-                for (alpha, coefficient) in &work.terms {
+                self.chart.terms(*functional, i, of_lane, &mut workspace.terms);
+                for (alpha, coefficient) in &workspace.terms {
                     // Functions are of coordinates by the reach.
                     let order: u8 = alpha.iter().sum();
-                    let scale = coefficient * reach[lane].powi(-i32::from(order));
+                    let scale = coefficient * radius[lane].powi(-i32::from(order));
                     if let Some(values) = self.basis.derivative(alpha) {
-                        for (sum, value) in work.values.iter_mut().zip(values) {
+                        for (sum, value) in workspace.values.iter_mut().zip(values) {
                             sum[lane] += scale * value;
                         }
                     }
                 }
             }
-            work.fit.solution.clear();
-            work.fit.solution.extend(work.values.iter().map(|values| Lanes::new(*values)));
-            work.fit.solve();
+            workspace.fit.solution.clear();
+            workspace.fit.solution.extend(workspace.values.iter().map(|values| Lanes::new(*values)));
+            workspace.fit.solve();
             for (lane, i) in points.clone().enumerate() {
                 if !sound[lane] && holds[lane] {
-                    work.functional.clear();
-                    work.functional.extend(work.values.iter().map(|values| values[lane]));
-                    holds[lane] = work.fit.solve_low_rank(lane, &work.functional) <= OPEN_MOMENTS;
+                    workspace.functional.clear();
+                    workspace.functional.extend(workspace.values.iter().map(|values| values[lane]));
+                    holds[lane] = workspace.fit.solve_low_rank(lane, &workspace.functional) <= OPEN_MOMENTS;
                 }
-                let weights = holds[lane].then_some((work.fit.weights.as_slice(), lane));
-                sink.take(k, i, &work.fit.near[lane], weights);
+                let weights = holds[lane].then_some((workspace.fit.weights.as_slice(), lane));
+                sink.take(k, i, &workspace.fit.near[lane], weights);
             }
         }
-        let Soundness { low_rank, failed, first_failed, .. } = &mut outcome.soundness;
+        let SupportDiagnostics { low_rank, failed, first_failed, .. } = &mut outcome.fit_diagnostics;
         for (lane, i) in points.clone().enumerate().filter(|(lane, _)| !sound[*lane]) {
             if holds[lane] {
                 *low_rank += 1;
@@ -255,21 +262,21 @@ impl<const M: usize> Fits<'_, M> {
     }
 
     /// Slopes and second derivatives of the surface over the plane of each lane, no numbers where it is not sound.
-    fn heights(&self, reach: [f64; LANES], sound: [bool; LANES], work: &mut Work<M>) -> [Heights<M>; LANES] {
-        work.fit.solve_heights(self.basis.size());
+    fn heights(&self, radius: [f64; LANES], sound: [bool; LANES], workspace: &mut Workspace<M>) -> [Heights<M>; LANES] {
+        workspace.fit.solve_heights(self.basis.size());
         let derivative = |alpha: [u8; M], lane: usize| -> f64 {
             if !sound[lane] {
                 return f64::NAN;
             }
             let values = self.basis.derivative(&alpha).unwrap_or(&[]);
-            values.iter().zip(&work.fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
+            values.iter().zip(&workspace.fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
         };
         std::array::from_fn(|lane| Heights {
             first: std::array::from_fn(|a| derivative(std::array::from_fn(|d| u8::from(d == a)), lane)),
             second: std::array::from_fn(|a| {
                 std::array::from_fn(|b| {
                     let alpha = std::array::from_fn(|d| u8::from(d == a) + u8::from(d == b));
-                    derivative(alpha, lane) / reach[lane]
+                    derivative(alpha, lane) / radius[lane]
                 })
             }),
         })

@@ -10,7 +10,7 @@ use crate::linear_algebra::number::{LANES, Lanes};
 pub struct Node<const M: usize> {
     /// Whose value it takes.
     pub index: u32,
-    /// Coordinates from the centre, by the reach of the support.
+    /// Coordinates from the center, by the reach of the support.
     pub at: [f64; M],
     /// Weight of the fit, not negative.
     pub window: f64,
@@ -39,7 +39,7 @@ pub(super) struct MomentFit<const M: usize> {
 impl<const M: usize> MomentFit<M> {
     /// Takes the supports as they stand: moments Σ W p pᵀ and their factorization. Returns the least share of a pivot in its
     /// diagonal, lane by lane.
-    pub fn factorise(&mut self, basis: &Basis<M>) -> [f64; LANES] {
+    pub fn factorize(&mut self, basis: &Basis<M>) -> [f64; LANES] {
         let number = basis.size();
         let most = self.near.iter().map(Vec::len).max().unwrap_or(0);
         self.systems.reset(number);
@@ -69,7 +69,7 @@ impl<const M: usize> MomentFit<M> {
                 }
             }
         }
-        self.systems.factorise().to_array()
+        self.systems.factorize().to_array()
     }
 
     /// The fit of the heights of the nodes: its coefficients are left in `solution`.

@@ -147,7 +147,7 @@ impl Bump {
         let grading = self.grading();
         let mut found = BumpPoints::default();
         let count = (grading.squares() / (spacing * spacing)).ceil() as usize;
-        for x in fibonacci::of_revolution(count, |s| grading.share(s), |s| (s * OUTER, 0.0)) {
+        for x in fibonacci::surface_of_revolution(count, |s| grading.share(s), |s| (s * OUTER, 0.0)) {
             let ratio = grading.ratio(x[0].hypot(x[1]) / OUTER);
             found.points.push(self.above(CENTER[0] + x[0], CENTER[1] + x[1]));
             found.areas.push((ratio * spacing).powi(2));
@@ -171,7 +171,7 @@ impl Bump {
                 }
             }
         }
-        share_out_the_rim(&mut found, &nodes, cells);
+        distribute_rim_area(&mut found, &nodes, cells);
         for probe in probes {
             let probe = self.above(probe[0], probe[1]);
             let nearest = found.points.iter().enumerate().map(|(k, p)| (k, (p.point - probe.point).norm()));
@@ -207,7 +207,7 @@ impl Grading {
         self.cumulated.last().copied().unwrap_or(0.0)
     }
 
-    fn between(of: &[f64], s: f64) -> f64 {
+    fn interpolate(of: &[f64], s: f64) -> f64 {
         let rings = of.len() - 1;
         let place = s.clamp(0.0, 1.0) * rings as f64;
         let k = (place as usize).min(rings - 1);
@@ -215,17 +215,17 @@ impl Grading {
     }
 
     fn ratio(&self, s: f64) -> f64 {
-        Self::between(&self.spacing, s)
+        Self::interpolate(&self.spacing, s)
     }
 
     fn share(&self, s: f64) -> f64 {
-        Self::between(&self.cumulated, s) / self.squares()
+        Self::interpolate(&self.cumulated, s) / self.squares()
     }
 }
 
 /// Gives the plane next to the graded points, which cut through cells, to the nearest nodes that are there. `nodes` tells
 /// which point a node of the lattice is.
-fn share_out_the_rim(found: &mut BumpPoints, nodes: &[Option<usize>], cells: usize) {
+fn distribute_rim_area(found: &mut BumpPoints, nodes: &[Option<usize>], cells: usize) {
     let spacing = 2.0 * HALF_SIDE / cells as f64;
     let at = |k: usize| -HALF_SIDE + k as f64 * spacing;
     let from_center = |x: f64, y: f64| (x - CENTER[0]).hypot(y - CENTER[1]);
@@ -265,14 +265,14 @@ fn share_out_the_rim(found: &mut BumpPoints, nodes: &[Option<usize>], cells: usi
 
 /// Images of points across the edges of the square, within `reach` of them: position, and whose image.
 #[must_use]
-pub fn images(points: &[Vector<3>], reach: f64) -> Vec<(Vector<3>, u32)> {
+pub fn images(points: &[Vector<3>], cutoff: f64) -> Vec<(Vector<3>, u32)> {
     let mut found = Vec::new();
     for (k, x) in points.iter().enumerate() {
         // Along each axis: itself, and its image where an edge is near and it does not lie on it.
         let mirrored = |c: f64| {
             let edge = HALF_SIDE.copysign(c);
             let gap = (edge - c).abs();
-            (gap > 1e-12 && gap < reach).then_some(2.0 * edge - c)
+            (gap > 1e-12 && gap < cutoff).then_some(2.0 * edge - c)
         };
         let across = [mirrored(x[0]), mirrored(x[1])];
         for (mx, my) in [(true, false), (false, true), (true, true)] {

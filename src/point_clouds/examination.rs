@@ -17,12 +17,12 @@ const SAMPLES: usize = 500;
 const MOST_IN_CELL: usize = 4096;
 /// Points are one where they are closer than this share of the spacing there.
 const SAME_POINT: f64 = 1e-3;
-/// Neighbours for normals and directions, by the spacing: about twenty of a surface, four of a curve.
+/// Neighbors for normals and directions, by the spacing: about twenty of a surface, four of a curve.
 const NEAR: f64 = 2.5;
-/// Sine of the elevation over the tangent plane above which a neighbour does not belong to the same sheet: on a sphere
-/// that of normals which differ by 60°, beyond which operators do not take neighbours either.
+/// Sine of the elevation over the tangent plane above which a neighbor does not belong to the same sheet: on a sphere
+/// that of normals which differ by 60°, beyond which operators do not take neighbors either.
 const ASIDE: f64 = 0.5;
-/// The largest angle without a neighbour inside a surface; on a curve (where it is 180° or 360°) inside it.
+/// The largest angle without a neighbor inside a surface; on a curve (where it is 180° or 360°) inside it.
 const WIDEST_GAP: [f64; 2] = [1.5 * std::f64::consts::PI, 2.0 * std::f64::consts::FRAC_PI_3];
 /// Extents whose squares, and the squares of these, are numbers, parts included.
 const EXTENTS: std::ops::Range<f64> = 1e-40..1e40;
@@ -33,23 +33,23 @@ const NAMED: usize = 5;
 
 /// Points by their numbers: the first few, and how many there are.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Named {
+pub struct PointList {
     /// The first few, rising.
     pub first: Vec<usize>,
     /// All.
     pub count: usize,
 }
 
-impl Named {
+impl PointList {
     /// The points for which a condition holds, if there are any.
-    fn those(points: usize, holds: impl Fn(usize) -> bool) -> Option<Self> {
+    fn from_condition(points: usize, holds: impl Fn(usize) -> bool) -> Option<Self> {
         let found: Vec<usize> = (0..points).filter(|i| holds(*i)).collect();
         let first = found.iter().take(NAMED).copied().collect();
         (!found.is_empty()).then_some(Self { first, count: found.len() })
     }
 }
 
-impl fmt::Display for Named {
+impl fmt::Display for PointList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let numbers: Vec<String> = self.first.iter().map(ToString::to_string).collect();
         write!(f, "{} {}", if self.count == 1 { "point" } else { "points" }, numbers.join(", "))?;
@@ -75,7 +75,7 @@ pub enum Unusable {
     #[error("{points}: each lies where another one does (points {} and {} are {distance:.3e} apart); leave one of them", pair[0], pair[1])]
     Duplicates {
         /// All that have another one in their place.
-        points: Named,
+        points: PointList,
         /// The first of them.
         pair: [usize; 2],
         /// How far these are apart.
@@ -83,7 +83,7 @@ pub enum Unusable {
     },
     /// Normals without a direction.
     #[error("{0}: a normal without length")]
-    ZeroNormals(Named),
+    ZeroNormals(PointList),
     /// Coordinates beyond the digits of numbers.
     #[error(
         "{count} points {spacing:.3e} apart, over {extent:.3e}, at coordinates up to {largest:.3e}: these are not told apart well enough; scale or shift them"
@@ -119,17 +119,17 @@ pub enum Unusable {
 /// What makes a computation on points worse.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Flaw {
-    /// Points at an edge: neighbours on one side alone.
-    Holes(Named),
+    /// Points at an edge: neighbors on one side alone.
+    Holes(PointList),
     /// Points whose support reaches another part of the surface.
     CloseSheets {
         /// Which.
-        points: Named,
+        points: PointList,
         /// Of the support.
         radius: f64,
     },
     /// Given normals that opposed those about them, or did not stand on the points about them.
-    InconsistentNormals(Named),
+    InconsistentNormals(PointList),
 }
 
 impl Flaw {
@@ -148,7 +148,7 @@ impl fmt::Display for Flaw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Holes(points) => {
-                write!(f, "{points}: neighbours on one side alone, so the surface has a hole or an edge there")
+                write!(f, "{points}: neighbors on one side alone, so the surface has a hole or an edge there")
             }
             Self::CloseSheets { points, radius } => {
                 write!(f, "{points}: another part of the surface lies within the support of {radius:.4e}")
@@ -156,7 +156,7 @@ impl fmt::Display for Flaw {
             Self::InconsistentNormals(points) => {
                 write!(
                     f,
-                    "{points}: the normal opposes those of most neighbours, or does not stand on the surface; one that is estimated takes its place"
+                    "{points}: the normal opposes those of most neighbors, or does not stand on the surface; one that is estimated takes its place"
                 )
             }
         }
@@ -184,7 +184,7 @@ pub struct Examined<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Examined<'a, D> {
-    /// 1. Equal points by sorting. 2. A first idea of the spacing from some points. 3. That of each by the number of its neighbours.
+    /// 1. Equal points by sorting. 2. A first idea of the spacing from some points. 3. That of each by the number of its neighbors.
     ///    4. Points that are almost one.
     ///
     /// # Errors
@@ -233,7 +233,7 @@ impl<'a, const D: usize> Examined<'a, D> {
         Ok(found)
     }
 
-    /// A radius that holds the neighbours which tell a normal.
+    /// A radius that holds the neighbors which tell a normal.
     #[must_use]
     pub fn radius_of_normals(&self) -> f64 {
         NEAR * self.spacing
@@ -250,24 +250,24 @@ impl<'a, const D: usize> Examined<'a, D> {
             nearest
         };
         let twins: Vec<Option<(usize, f64)>> = self.points.par_iter().with_min_len(64).enumerate().map(twin).collect();
-        let Some(points) = Named::those(twins.len(), |i| twins[i].is_some()) else { return Ok(()) };
+        let Some(points) = PointList::from_condition(twins.len(), |i| twins[i].is_some()) else { return Ok(()) };
         let i = points.first[0];
         let (j, square) = twins[i].unwrap_or((i, 0.0));
         Err(Unusable::Duplicates { points, pair: [i, j], distance: square.sqrt() })
     }
 
     /// What is wrong with the points and their unit normals for operators with supports of a radius. Inconsistent normals are
-    /// replaced by estimated ones that face where most neighbours' do.
+    /// replaced by estimated ones that face where most neighbors' do.
     pub fn flaws(&self, normals: &mut [Vector<D>], source: NormalSource, radius: f64) -> Vec<Flaw> {
         let at = |(i, _): (usize, &Vector<D>)| self.about(i, normals, source, radius);
         let seen: Vec<Seen<D>> = self.points.par_iter().with_min_len(64).enumerate().map(at).collect();
         for (normal, seen) in normals.iter_mut().zip(&seen) {
             *normal = seen.instead.unwrap_or(*normal);
         }
-        let those = |holds: fn(&Seen<D>) -> bool| Named::those(seen.len(), |i| holds(&seen[i]));
-        let holes = those(|seen| seen.is_at_edge).map(Flaw::Holes);
-        let sheets = those(|seen| seen.has_sheet).map(|points| Flaw::CloseSheets { points, radius });
-        let inconsistent = those(|seen| seen.instead.is_some()).map(Flaw::InconsistentNormals);
+        let from_condition = |holds: fn(&Seen<D>) -> bool| PointList::from_condition(seen.len(), |i| holds(&seen[i]));
+        let holes = from_condition(|seen| seen.is_at_edge).map(Flaw::Holes);
+        let sheets = from_condition(|seen| seen.has_sheet).map(|points| Flaw::CloseSheets { points, radius });
+        let inconsistent = from_condition(|seen| seen.instead.is_some()).map(Flaw::InconsistentNormals);
         [holes, sheets, inconsistent].into_iter().flatten().collect()
     }
 
@@ -316,7 +316,7 @@ struct Seen<const D: usize> {
 pub fn unit_normals<const D: usize>(given: &[Vector<D>]) -> Result<Vec<Vector<D>>, Unusable> {
     // By the largest component, whose square may be no number; NaN is not the largest.
     let has_length = |i: usize| given[i].iter().all(|c| c.is_finite()) && given[i].amax() >= f64::MIN_POSITIVE;
-    match Named::those(given.len(), |i| !has_length(i)) {
+    match PointList::from_condition(given.len(), |i| !has_length(i)) {
         Some(points) => Err(Unusable::ZeroNormals(points)),
         None => Ok(given.iter().map(|n| (n / n.amax()).normalize()).collect()),
     }
@@ -334,12 +334,12 @@ fn equal_points<const D: usize>(points: &[Vector<D>]) -> Result<(), Unusable> {
         twin[pair[1]] = Some(pair[0]);
         twin[pair[0]].get_or_insert(pair[1]);
     }
-    let Some(found) = Named::those(points.len(), |i| twin[i].is_some()) else { return Ok(()) };
+    let Some(found) = PointList::from_condition(points.len(), |i| twin[i].is_some()) else { return Ok(()) };
     let i = found.first[0];
     Err(Unusable::Duplicates { points: found, pair: [i, twin[i].unwrap_or(i)], distance: 0.0 })
 }
 
-/// The median distance from some points to their `nearest`-th neighbour.
+/// The median distance from some points to their `nearest`-th neighbor.
 fn typical_distance<const D: usize>(points: &[Vector<D>], nearest: usize, extent: f64) -> f64 {
     let guess = extent * (nearest as f64 / points.len() as f64).powf(1.0 / (D as f64 - 1.0));
     let mut cells = CellList::new(Domain::unbounded());

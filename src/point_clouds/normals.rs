@@ -1,4 +1,4 @@
-//! Unit normals of a surface that is known by its points alone: the plane of least spread through the neighbours of a
+//! Unit normals of a surface that is known by its points alone: the plane of least spread through the neighbors of a
 //! point, and signs carried along the tree that turns least.
 
 use crate::geometry::{Domain, Vector};
@@ -7,15 +7,15 @@ use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, ParallelI
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// A point has too few neighbours to tell a plane.
+/// A point has too few neighbors to tell a plane.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("point {point} at {at:?} has {neighbors} neighbours within {radius:.4e}: too few for a plane")]
+#[error("point {point} at {at:?} has {neighbors} neighbors within {radius:.4e}: too few for a plane")]
 pub struct NoPlane {
     /// Which.
     pub point: usize,
     /// Where.
     pub at: Vec<f64>,
-    /// Neighbours.
+    /// Neighbors.
     pub neighbors: usize,
     /// Of the search.
     pub radius: f64,
@@ -36,7 +36,7 @@ pub fn estimate<const D: usize>(points: &[Vector<D>], radius: f64) -> Result<Vec
     Ok(normals)
 }
 
-/// The direction of least spread of the neighbours about their mean, weighted by (1 − r²/R²)².
+/// The direction of least spread of the neighbors about their mean, weighted by (1 − r²/R²)².
 pub(super) fn plane<const D: usize>(
     cells: &CellList<D>,
     i: usize,
@@ -103,7 +103,7 @@ impl PartialEq for Edge {
 
 impl Eq for Edge {}
 
-/// Gives neighbours the same sign, along the edges that turn least first.
+/// Gives neighbors the same sign, along the edges that turn least first.
 fn orient<const D: usize>(points: &[Vector<D>], cells: &CellList<D>, radius: f64, normals: &mut [Vector<D>]) {
     let mut order: Vec<usize> = (0..points.len()).collect();
     // Parts begin at their highest point, where outward is up.

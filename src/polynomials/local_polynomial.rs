@@ -1,8 +1,8 @@
-//! A polynomial of local coordinates t = (x − centre)/scale, with exact derivatives.
+//! A polynomial of local coordinates t = (x − center)/scale, with exact derivatives.
 
 use super::horner::{Derivatives, derivatives};
 use crate::geometry::Vector;
-use crate::linear_algebra::number::{Number, add_scaled, dot, times};
+use crate::linear_algebra::number::{Number, add_scaled, dot, multiply_symmetric};
 
 /// A fitted polynomial, viewed over storage that belongs to someone else.
 #[derive(Debug, Clone, Copy)]
@@ -12,7 +12,7 @@ pub struct LocalPolynomial<'a, const D: usize> {
     /// Coefficients of the monomials of t in nested order.
     pub coefficients: &'a [f64],
     /// Origin of the local coordinates.
-    pub centre: Vector<D>,
+    pub center: Vector<D>,
     /// Length of one local unit.
     pub scale: f64,
 }
@@ -61,14 +61,14 @@ impl<T: Number, const D: usize> Jet<T, D> {
         for d in 1..D {
             trace = trace + self.hessian[d][d];
         }
-        (trace - dot(&n, &times(&self.hessian, &n))) / self.slope()
+        (trace - dot(&n, &multiply_symmetric(&self.hessian, &n))) / self.slope()
     }
 
     /// The jet of the quadratic part a small way off.
     #[inline(always)]
     #[must_use]
-    pub fn moved(&self, way: &[T; D]) -> Self {
-        let change = times(&self.hessian, way);
+    pub fn translated(&self, way: &[T; D]) -> Self {
+        let change = multiply_symmetric(&self.hessian, way);
         let half = T::splat(0.5);
         Self {
             value: self.value + dot(&self.gradient, way) + half * dot(&change, way),
@@ -79,7 +79,7 @@ impl<T: Number, const D: usize> Jet<T, D> {
 }
 
 impl<const D: usize> LocalPolynomial<'_, D> {
-    /// p, ∇p and ∇∇p at the displacement `dx = x − centre`.
+    /// p, ∇p and ∇∇p at the displacement `dx = x − center`.
     #[must_use]
     #[inline]
     pub fn jet(&self, dx: &Vector<D>) -> Jet<f64, D> {
@@ -88,7 +88,7 @@ impl<const D: usize> LocalPolynomial<'_, D> {
         Jet::from_local(&derivatives(self.degree, |place| self.coefficients[place], &t), inverse)
     }
 
-    /// p(x) at the displacement `dx = x − centre`.
+    /// p(x) at the displacement `dx = x − center`.
     #[must_use]
     pub fn value(&self, dx: &Vector<D>) -> f64 {
         self.jet(dx).value
@@ -105,8 +105,8 @@ mod tests {
         let random = CounterRandom::new(9);
         let indices = nested_indices::<D>(degree);
         let coefficients: Vec<f64> = (0..indices.len()).map(|k| random.symmetric(&[k as i64])).collect();
-        let centre = Vector::<D>::zeros();
-        let p = LocalPolynomial { degree, coefficients: &coefficients, centre, scale: 0.7 };
+        let center = Vector::<D>::zeros();
+        let p = LocalPolynomial { degree, coefficients: &coefficients, center, scale: 0.7 };
         let x = Vector::<D>::from_fn(|d, _| [0.2, -0.1, 0.35][d]);
         let jet = p.jet(&x);
         let plain: f64 = indices
@@ -146,7 +146,7 @@ mod tests {
                 _ => 0.0,
             })
             .collect();
-        let p = LocalPolynomial { degree: 2, coefficients: &coefficients, centre: Vector::<3>::zeros(), scale: 1.0 };
+        let p = LocalPolynomial { degree: 2, coefficients: &coefficients, center: Vector::<3>::zeros(), scale: 1.0 };
         assert!((p.jet(&Vector::<3>::zeros()).curvature() + 3.5).abs() < 1e-15);
     }
 }

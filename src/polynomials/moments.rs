@@ -11,13 +11,13 @@ use crate::linear_algebra::normal_equations::{LaneSystems, packed_row};
 use crate::linear_algebra::number::{LANES, Lanes};
 
 /// The degree from which on solutions are refined.
-pub const REFINED_FROM: usize = 5;
+pub const REFINEMENT_MIN_DEGREE: usize = 5;
 
-/// Neighbours that one pass over the sums takes together, so that a sum is loaded and stored once for all.
-const TOGETHER: usize = 4;
+/// Neighbors that one pass over the sums takes together, so that a sum is loaded and stored once for all.
+const NEIGHBORS_PER_PASS: usize = 4;
 
-/// Powers t⁰ … t^(2 n) of the last coordinate of the neighbours of one pass.
-type Powers = [[Lanes; TOGETHER]; 2 * MAX_DEGREE + 1];
+/// Powers t⁰ … t^(2 n) of the last coordinate of the neighbors of one pass.
+type Powers = [[Lanes; NEIGHBORS_PER_PASS]; 2 * MAX_DEGREE + 1];
 
 /// Regressions of one degree.
 #[derive(Debug, Clone)]
@@ -30,10 +30,10 @@ pub struct Moments<const D: usize> {
 /// Data of the regressions of one batch, and room to solve them.
 #[derive(Debug, Clone)]
 pub struct LaneBatch<const D: usize> {
-    /// Neighbours a lane; lanes with fewer are filled up with weight 0.
+    /// Neighbors a lane; lanes with fewer are filled up with weight 0.
     rows: usize,
     coordinates: [Vec<[f64; LANES]>; D],
-    /// One for a neighbour, zero for a row that fills a lane up; then the weights.
+    /// One for a neighbor, zero for a row that fills a lane up; then the weights.
     weights: Vec<[f64; LANES]>,
     /// Right-hand sides, quantity by quantity.
     values: Vec<[f64; LANES]>,
@@ -57,15 +57,15 @@ impl<const D: usize> Default for LaneBatch<D> {
             solution: Vec::new(),
             correction: Vec::new(),
             residuals: Vec::new(),
-            powers: [[Lanes::splat(1.0); TOGETHER]; 2 * MAX_DEGREE + 1],
+            powers: [[Lanes::splat(1.0); NEIGHBORS_PER_PASS]; 2 * MAX_DEGREE + 1],
         }
     }
 }
 
 impl<const D: usize> LaneBatch<D> {
-    /// Forgets the last batch and makes room for `rows` neighbours a lane.
+    /// Forgets the last batch and makes room for `rows` neighbors a lane.
     pub fn reset(&mut self, rows: usize, quantities: usize) {
-        let rows = rows.next_multiple_of(TOGETHER);
+        let rows = rows.next_multiple_of(NEIGHBORS_PER_PASS);
         self.rows = rows;
         let clear = |numbers: &mut Vec<[f64; LANES]>, length: usize| {
             numbers.clear();
@@ -78,7 +78,7 @@ impl<const D: usize> LaneBatch<D> {
         clear(&mut self.values, rows * quantities);
     }
 
-    /// Writes one neighbour: local coordinates and base weight. The values follow by [`Self::set_value`].
+    /// Writes one neighbor: local coordinates and base weight. The values follow by [`Self::set_value`].
     #[inline(always)]
     pub fn set_row(&mut self, lane: usize, row: usize, t: &[f64; D], weight: f64) {
         for (axis, t) in self.coordinates.iter_mut().zip(t) {
@@ -94,7 +94,7 @@ impl<const D: usize> LaneBatch<D> {
     }
 
     /// Multiplies every weight by exp(−k |t|²).
-    pub fn weigh(&mut self, k: f64) {
+    pub fn apply_weights(&mut self, k: f64) {
         if k == 0.0 {
             return;
         }
@@ -151,9 +151,9 @@ impl<const D: usize> Moments<D> {
         let rows = *rows;
         moments.clear();
         moments.resize(term_count::<D>(2 * N), zero);
-        for first in (0..rows).step_by(TOGETHER) {
-            let mut scale = [zero; TOGETHER];
-            for q in 0..TOGETHER {
+        for first in (0..rows).step_by(NEIGHBORS_PER_PASS) {
+            let mut scale = [zero; NEIGHBORS_PER_PASS];
+            for q in 0..NEIGHBORS_PER_PASS {
                 scale[q] = Lanes::new(weights[first + q]);
             }
             add_monomials::<D, N, true>(coordinates, first, &scale, powers, moments);
@@ -162,20 +162,20 @@ impl<const D: usize> Moments<D> {
         for (entry, place) in systems.matrix_mut().iter_mut().zip(&self.gram) {
             *entry = moments[*place as usize];
         }
-        let least = systems.factorise();
+        let least = systems.factorize();
         solution.clear();
         solution.resize(quantities * terms, zero);
         for (quantity, coefficients) in solution.chunks_exact_mut(terms).enumerate() {
             let values = &values[quantity * rows..(quantity + 1) * rows];
-            for first in (0..rows).step_by(TOGETHER) {
-                let mut scale = [zero; TOGETHER];
-                for q in 0..TOGETHER {
+            for first in (0..rows).step_by(NEIGHBORS_PER_PASS) {
+                let mut scale = [zero; NEIGHBORS_PER_PASS];
+                for q in 0..NEIGHBORS_PER_PASS {
                     scale[q] = Lanes::new(weights[first + q]) * Lanes::new(values[first + q]);
                 }
                 add_monomials::<D, N, false>(coordinates, first, &scale, powers, coefficients);
             }
             systems.solve(coefficients);
-            if N >= REFINED_FROM {
+            if N >= REFINEMENT_MIN_DEGREE {
                 residuals.clear();
                 residuals.extend((0..rows).map(|row| {
                     let mut t = [zero; D];
@@ -186,9 +186,9 @@ impl<const D: usize> Moments<D> {
                 }));
                 correction.clear();
                 correction.resize(terms, zero);
-                for first in (0..rows).step_by(TOGETHER) {
-                    let mut scale = [zero; TOGETHER];
-                    scale.copy_from_slice(&residuals[first..first + TOGETHER]);
+                for first in (0..rows).step_by(NEIGHBORS_PER_PASS) {
+                    let mut scale = [zero; NEIGHBORS_PER_PASS];
+                    scale.copy_from_slice(&residuals[first..first + NEIGHBORS_PER_PASS]);
                     add_monomials::<D, N, false>(coordinates, first, &scale, powers, correction);
                 }
                 systems.solve(correction);
@@ -206,20 +206,20 @@ impl<const D: usize> Moments<D> {
 fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
     coordinates: &[Vec<[f64; LANES]>; D],
     first: usize,
-    scale: &[Lanes; TOGETHER],
+    scale: &[Lanes; NEIGHBORS_PER_PASS],
     powers: &mut Powers,
     sums: &mut [Lanes],
 ) {
     let degree = if DOUBLE { 2 * N } else { N };
     let load = |d: usize, q: usize| Lanes::new(coordinates[d][first + q]);
     let mut x = *scale;
-    let (mut y, mut z) = ([Lanes::splat(0.0); TOGETHER], [Lanes::splat(0.0); TOGETHER]);
-    for q in 0..TOGETHER {
+    let (mut y, mut z) = ([Lanes::splat(0.0); NEIGHBORS_PER_PASS], [Lanes::splat(0.0); NEIGHBORS_PER_PASS]);
+    for q in 0..NEIGHBORS_PER_PASS {
         (y[q], z[q]) = (load(D - 2, q), load(D - 1, q));
         powers[0][q] = Lanes::splat(1.0);
     }
     for k in 1..=degree {
-        for q in 0..TOGETHER {
+        for q in 0..NEIGHBORS_PER_PASS {
             powers[k][q] = powers[k - 1][q] * z[q];
         }
     }
@@ -232,12 +232,12 @@ fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
             place += row.len();
             for (sum, power) in row.iter_mut().zip(powers.iter()) {
                 let mut s = *sum;
-                for q in 0..TOGETHER {
+                for q in 0..NEIGHBORS_PER_PASS {
                     s = a[q].mul_add(power[q], s);
                 }
                 *sum = s;
             }
-            for q in 0..TOGETHER {
+            for q in 0..NEIGHBORS_PER_PASS {
                 a[q] *= y[q];
             }
         }

@@ -1,4 +1,4 @@
-//! Who takes part in a fit. A count drives the radius: what breaks a fit is a number of neighbours close to the number
+//! Who takes part in a fit. A count drives the radius: what breaks a fit is a number of neighbors close to the number
 //! of coefficients.
 
 use crate::geometry::Vector;
@@ -19,7 +19,7 @@ pub enum Neighborhood {
     },
 }
 
-/// The extent of a collected neighbourhood.
+/// The extent of a collected neighborhood.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
     /// r_c after growth, or the distance of the farthest of the nearest.
@@ -31,11 +31,11 @@ pub struct Extent {
 /// Factor of one enlargement.
 pub const GROWTH: f64 = 1.06;
 /// The nearest particles reach so much farther than evenly spread ones where many are missing.
-const WIDE: f64 = 1.5;
+const SPARSE_RATIO: f64 = 1.5;
 /// Most enlargements: 1.06⁴⁰ ≈ 10.
-const MOST_ENLARGEMENTS: u32 = 40;
+const MAX_ENLARGEMENTS: u32 = 40;
 /// Enlargements that one search looks ahead.
-const AHEAD: i32 = 3;
+const GROWTH_STEPS_AHEAD: i32 = 3;
 
 /// Radius, in spacings, of a ball that holds so many evenly distributed particles.
 #[must_use]
@@ -69,16 +69,16 @@ impl Neighborhood {
         neighbors: &mut Vec<Neighbor<D>>,
     ) -> Extent {
         match self {
-            Self::Radius { cutoff } => by_radius(cutoff, search, x, needed, spacing, admit, neighbors),
+            Self::Radius { cutoff } => collect_within_radius(cutoff, search, x, needed, spacing, admit, neighbors),
             Self::Nearest { count } => {
-                let extent = by_count(count.max(needed), search, x, spacing, admit, neighbors);
+                let extent = collect_nearest(count.max(needed), search, x, spacing, admit, neighbors);
                 Extent { enlargements: extent.enlargements + u32::from(count < needed), ..extent }
             }
         }
     }
 }
 
-fn by_radius<const D: usize>(
+fn collect_within_radius<const D: usize>(
     cutoff: f64,
     search: &impl NeighborSearch<D>,
     x: &Vector<D>,
@@ -89,7 +89,8 @@ fn by_radius<const D: usize>(
 ) -> Extent {
     let expected = spacing * radius_of_count::<D>(needed as f64);
     // One search serves the first steps of growth where growth is likely.
-    let mut seen = if cutoff < 1.2 * expected { cutoff.max(0.8 * expected) * GROWTH.powi(AHEAD) } else { cutoff };
+    let mut seen =
+        if cutoff < 1.2 * expected { cutoff.max(0.8 * expected) * GROWTH.powi(GROWTH_STEPS_AHEAD) } else { cutoff };
     gather(search, x, seen, admit, neighbors);
     let within = |neighbors: &[Neighbor<D>], radius: f64| {
         let limit = radius * radius;
@@ -104,11 +105,11 @@ fn by_radius<const D: usize>(
         radius = radius.max(0.8 * expected);
         found = within(neighbors, radius);
     }
-    while found < needed && enlargements < MOST_ENLARGEMENTS {
+    while found < needed && enlargements < MAX_ENLARGEMENTS {
         radius *= GROWTH;
         enlargements += 1;
         if radius > seen {
-            seen = radius * GROWTH.powi(AHEAD);
+            seen = radius * GROWTH.powi(GROWTH_STEPS_AHEAD);
             gather(search, x, seen, admit, neighbors);
         }
         found = within(neighbors, radius);
@@ -120,7 +121,7 @@ fn by_radius<const D: usize>(
     Extent { radius, enlargements }
 }
 
-fn by_count<const D: usize>(
+fn collect_nearest<const D: usize>(
     count: usize,
     search: &impl NeighborSearch<D>,
     x: &Vector<D>,
@@ -133,7 +134,7 @@ fn by_count<const D: usize>(
     let mut radius = 1.12 * expected;
     let mut tries = 0;
     gather(search, x, radius, admit, neighbors);
-    while neighbors.len() < count && tries < MOST_ENLARGEMENTS {
+    while neighbors.len() < count && tries < MAX_ENLARGEMENTS {
         radius *= 1.3;
         tries += 1;
         gather(search, x, radius, admit, neighbors);
@@ -145,6 +146,6 @@ fn by_count<const D: usize>(
         neighbors.sort_unstable_by_key(|n| n.index);
     }
     let farthest = neighbors.iter().map(|n| n.r2).fold(0.0, f64::max).sqrt();
-    // A neighbourhood far wider than an even one says that particles are missing.
-    Extent { radius: farthest.max(spacing * 1e-3), enlargements: u32::from(farthest > WIDE * expected) }
+    // A neighborhood far wider than an even one says that particles are missing.
+    Extent { radius: farthest.max(spacing * 1e-3), enlargements: u32::from(farthest > SPARSE_RATIO * expected) }
 }

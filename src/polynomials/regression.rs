@@ -1,5 +1,5 @@
 //! Local least-squares fits of scattered values (PCP paper, section 3.1, eqs. 7 and 8), with the fallbacks that keep
-//! a fit from being worse than none: the radius grows with the neighbour count, then the degree falls.
+//! a fit from being worse than none: the radius grows with the neighbor count, then the degree falls.
 
 use super::basis::{BasisKind, PolynomialBasis};
 use super::local_polynomial::LocalPolynomial;
@@ -30,7 +30,7 @@ pub struct Regression<const D: usize> {
     pub neighborhood: Neighborhood,
     /// k of the weight exp(−k r²/r_c²) on squared residuals; 0 weighs all the same.
     pub weight: f64,
-    /// Least n_n/n_c: the radius grows until there are so many neighbours per coefficient.
+    /// Least n_n/n_c: the radius grows until there are so many neighbors per coefficient.
     pub minimum_ratio: f64,
     /// A length of the order of the particle spacing, where searches by count begin.
     pub spacing: f64,
@@ -42,7 +42,7 @@ pub struct Regression<const D: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit<const D: usize> {
     /// Origin of the local coordinates.
-    pub centre: Vector<D>,
+    pub center: Vector<D>,
     /// Length of one local unit.
     pub scale: f64,
     /// Where the fit may be used: within `radius` of `middle`.
@@ -65,7 +65,7 @@ impl<const D: usize> Fit<D> {
     /// The fitted polynomial over coefficients that are laid out for `degree`.
     #[must_use]
     pub fn polynomial<'a>(&self, degree: usize, coefficients: &'a [f64]) -> LocalPolynomial<'a, D> {
-        LocalPolynomial { degree, coefficients, centre: self.centre, scale: self.scale }
+        LocalPolynomial { degree, coefficients, center: self.center, scale: self.scale }
     }
 }
 
@@ -96,7 +96,7 @@ pub struct FitData<'a, S, V, A> {
 /// Enlargements tried for a matrix of low rank before the degree falls.
 const RANK_ENLARGEMENTS: u32 = 8;
 /// Least pivot of the moments, as a share of its diagonal, that leaves enough digits.
-pub const LEAST_PIVOT: f64 = 1e-9;
+pub const MIN_PIVOT: f64 = 1e-9;
 
 impl<const D: usize> Regression<D> {
     /// Regressions of one method.
@@ -131,25 +131,25 @@ impl<const D: usize> Regression<D> {
         (self.minimum_ratio * self.terms() as f64).ceil() as usize
     }
 
-    /// Fits every quantity around up to [`LANES`] centres. Coefficients stand centre by centre, quantity by quantity, in
+    /// Fits every quantity around up to [`LANES`] centers. Coefficients stand center by center, quantity by quantity, in
     /// nested order.
     ///
-    /// 1. Collect the neighbours of each centre, with as many as the method asks.
+    /// 1. Collect the neighbors of each center, with as many as the method asks.
     /// 2. Solve all by moments, where the method says so.
-    /// 3. What has too few neighbours or too small a pivot, or all: [`Self::fit`].
+    /// 3. What has too few neighbors or too small a pivot, or all: [`Self::fit`].
     pub fn fit_lanes<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
         data: &FitData<S, V, A>,
-        centres: &[Vector<D>],
+        centers: &[Vector<D>],
         scratch: &mut RegressionScratch<D>,
         coefficients: &mut [f64],
     ) -> [Option<Fit<D>>; LANES] {
         let size = data.quantities * self.terms();
         let mut fits = [None; LANES];
         if let Some(moments) = &self.moments {
-            fits = self.fit_by_moments(moments, data, centres, scratch, coefficients);
+            fits = self.fit_by_moments(moments, data, centers, scratch, coefficients);
         }
-        for (lane, (x, coefficients)) in centres.iter().zip(coefficients.chunks_exact_mut(size)).enumerate() {
+        for (lane, (x, coefficients)) in centers.iter().zip(coefficients.chunks_exact_mut(size)).enumerate() {
             if fits[lane].is_none() {
                 let decomposed = self.moments.is_some();
                 let fit = self.fit(data, lane, x, scratch, coefficients);
@@ -163,7 +163,7 @@ impl<const D: usize> Regression<D> {
         &self,
         moments: &Moments<D>,
         data: &FitData<S, V, A>,
-        centres: &[Vector<D>],
+        centers: &[Vector<D>],
         scratch: &mut RegressionScratch<D>,
         coefficients: &mut [f64],
     ) -> [Option<Fit<D>>; LANES] {
@@ -171,7 +171,7 @@ impl<const D: usize> Regression<D> {
         let (terms, quantities) = (self.terms(), *quantities);
         let mut extents = [None; LANES];
         let mut rows = 0;
-        for (lane, x) in centres.iter().enumerate() {
+        for (lane, x) in centers.iter().enumerate() {
             let neighbors = &mut scratch.lanes[lane];
             let admit = |j: usize| admit(lane, j);
             extents[lane] = Some(self.neighborhood.collect(*search, x, self.needed(), self.spacing, &admit, neighbors));
@@ -189,22 +189,22 @@ impl<const D: usize> Regression<D> {
                 }
             }
         }
-        batch.weigh(self.weight);
+        batch.apply_weights(self.weight);
         let (least, solution) = moments.solve(batch, quantities);
         let least = least.to_array();
         let mut fits = [None; LANES];
-        for (lane, (x, extent)) in centres.iter().zip(extents).enumerate() {
+        for (lane, (x, extent)) in centers.iter().zip(extents).enumerate() {
             let Some(extent) = extent else { continue };
             let neighbors = scratch.lanes[lane].len();
             // Written so that a NaN is refused too.
-            let is_sound = neighbors >= terms && least[lane] >= LEAST_PIVOT;
+            let is_sound = neighbors >= terms && least[lane] >= MIN_PIVOT;
             let own = &mut coefficients[lane * quantities * terms..(lane + 1) * quantities * terms];
             for (c, lanes) in own.iter_mut().zip(solution) {
                 *c = lanes.as_array()[lane];
             }
             if is_sound && own.iter().all(|c| c.is_finite()) {
                 fits[lane] = Some(Fit {
-                    centre: *x,
+                    center: *x,
                     scale: extent.radius,
                     middle: *x,
                     radius: extent.radius,
@@ -219,10 +219,10 @@ impl<const D: usize> Regression<D> {
         fits
     }
 
-    /// Fits the values around `x`, the centre of a lane, by orthogonal decomposition and writes the coefficients in nested order (terms beyond
+    /// Fits the values around `x`, the center of a lane, by orthogonal decomposition and writes the coefficients in nested order (terms beyond
     /// a lowered degree are 0).
     ///
-    /// 1. Collect neighbours; grow the radius until n_n ≥ minimum_ratio · n_c.
+    /// 1. Collect neighbors; grow the radius until n_n ≥ minimum_ratio · n_c.
     /// 2. Solve; on a low rank grow further, then lower the degree one by one.
     ///
     /// None when not even a plane can be fitted.
@@ -245,7 +245,7 @@ impl<const D: usize> Regression<D> {
             if enough && let Some(condition) = self.solve(data, x, radius, degree, scratch, coefficients) {
                 let unscaled = self.basis.kind() == BasisKind::MonomialUnscaled;
                 return Some(Fit {
-                    centre: if unscaled { Vector::<D>::zeros() } else { *x },
+                    center: if unscaled { Vector::<D>::zeros() } else { *x },
                     scale: if unscaled { 1.0 } else { radius },
                     middle: *x,
                     radius,
@@ -270,7 +270,7 @@ impl<const D: usize> Regression<D> {
         }
     }
 
-    /// Least squares over the collected neighbours; None when the matrix is short of rank.
+    /// Least squares over the collected neighbors; None when the matrix is short of rank.
     fn solve<S, V: Fn(usize, usize) -> f64, A>(
         &self,
         data: &FitData<S, V, A>,
@@ -362,10 +362,10 @@ mod tests {
         let mut scratch = RegressionScratch::default();
         let middle: Vec<Vector<D>> = points.iter().filter(|x| x.norm() < 0.3).take(15).copied().collect();
         let data = FitData { search: &cells, values: |j, q: usize| values[q][j], quantities: 2, admit: |_, _| true };
-        for centres in middle.chunks(LANES) {
+        for centers in middle.chunks(LANES) {
             let mut ours = vec![0.0; LANES * 2 * terms];
-            let fits = fast.fit_lanes(&data, centres, &mut scratch, &mut ours);
-            for (lane, x) in centres.iter().enumerate() {
+            let fits = fast.fit_lanes(&data, centers, &mut scratch, &mut ours);
+            for (lane, x) in centers.iter().enumerate() {
                 let mut exact = vec![0.0; 2 * terms];
                 let reference = oracle.fit(&data, lane, x, &mut scratch, &mut exact).unwrap();
                 let fit = fits[lane].unwrap();
@@ -403,10 +403,10 @@ mod tests {
                 let at = Vector::<2>::new(0.21, -0.33);
                 let fit = fit(&regression, &cells, &at, &values, &mut coefficients).unwrap();
                 assert_eq!(fit.degree, 4);
-                assert!(fit.neighbors >= 23, "{} neighbours", fit.neighbors);
+                assert!(fit.neighbors >= 23, "{} neighbors", fit.neighbors);
                 let x = Vector::<2>::new(0.25, -0.3);
                 let exact = 1.0 + x[0] - 2.0 * x[1] * x[0] + x[1].powi(4) - x[0].powi(3);
-                let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.centre));
+                let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.center));
                 assert!((value - exact).abs() < 1e-11, "{kind:?}: {value} for {exact}");
             }
         }
@@ -434,7 +434,7 @@ mod tests {
         let fit = fit(&regression, &cells, &points[2], &values, &mut coefficients).unwrap();
         assert!(fit.degree <= 2 && fit.enlargements > 0);
         let x = Vector::<2>::new(-0.8, -0.9);
-        let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.centre));
+        let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.center));
         assert!((value + 2.6).abs() < 1e-10);
     }
 }

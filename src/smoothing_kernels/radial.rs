@@ -12,7 +12,7 @@ pub trait RadialKernel: Copy + Send + Sync + 'static {
     const SUPPORT: f64;
 
     /// σ_D: what makes w integrate to one over q in D dimensions.
-    fn normalisation(dimension: usize) -> f64;
+    fn normalization(dimension: usize) -> f64;
 
     /// w(q).
     fn value<T: Number>(q: T) -> T;
@@ -41,7 +41,7 @@ impl RadialKernel for WendlandC2Radial {
     const SUPPORT: f64 = 2.0;
     const SLOPE: f64 = -5.0;
 
-    fn normalisation(dimension: usize) -> f64 {
+    fn normalization(dimension: usize) -> f64 {
         if dimension == 2 { 7.0 / (4.0 * PI) } else { 21.0 / (16.0 * PI) }
     }
 
@@ -67,7 +67,7 @@ impl RadialKernel for WendlandC4Radial {
     const SUPPORT: f64 = 2.0;
     const SLOPE: f64 = -14.0 / 3.0;
 
-    fn normalisation(dimension: usize) -> f64 {
+    fn normalization(dimension: usize) -> f64 {
         if dimension == 2 { 9.0 / (4.0 * PI) } else { 495.0 / (256.0 * PI) }
     }
 
@@ -94,7 +94,7 @@ impl RadialKernel for CubicSplineRadial {
     const SUPPORT: f64 = 2.0;
     const SLOPE: f64 = 1.0;
 
-    fn normalisation(dimension: usize) -> f64 {
+    fn normalization(dimension: usize) -> f64 {
         if dimension == 2 { 10.0 / (7.0 * PI) } else { 1.0 / PI }
     }
 
@@ -119,7 +119,7 @@ impl RadialKernel for QuinticSplineRadial {
     const SUPPORT: f64 = 3.0;
     const SLOPE: f64 = 1.0;
 
-    fn normalisation(dimension: usize) -> f64 {
+    fn normalization(dimension: usize) -> f64 {
         if dimension == 2 { 7.0 / (478.0 * PI) } else { 1.0 / (120.0 * PI) }
     }
 
@@ -156,8 +156,8 @@ mod tests {
         let at = |k: i32| (f64::from(k) + 0.5) * dq;
         let circle: f64 = (0..steps).map(|k| K::value(at(k)) * 2.0 * PI * at(k)).sum();
         let sphere: f64 = (0..steps).map(|k| K::value(at(k)) * 4.0 * PI * at(k) * at(k)).sum();
-        assert!((circle * dq * K::normalisation(2) - 1.0).abs() < 1e-8);
-        assert!((sphere * dq * K::normalisation(3) - 1.0).abs() < 1e-8);
+        assert!((circle * dq * K::normalization(2) - 1.0).abs() < 1e-8);
+        assert!((sphere * dq * K::normalization(3) - 1.0).abs() < 1e-8);
         for k in 0..64 {
             let q = K::SUPPORT * f64::from(k) / 64.0 + 0.003;
             let difference = (K::value(q + 1e-5) - K::value(q - 1e-5)) / 2e-5;

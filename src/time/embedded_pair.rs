@@ -19,13 +19,13 @@ const ENTRIES: usize = 4096;
 
 impl EmbeddedPair {
     /// Forgets the last slope: the state was changed from outside.
-    pub fn forget(&mut self) {
+    pub fn discard_slope(&mut self) {
         self.is_slope_known = false;
     }
 
     /// Tries a step from `time` to `end` and leaves the result in [`Self::result`]. Returns the root mean square of the
     /// difference of both orders by 1 + |u|.
-    pub fn attempt(&mut self, u: &[f64], time: f64, end: f64, slope: &mut Slope<'_>) -> f64 {
+    pub fn try_step(&mut self, u: &[f64], time: f64, end: f64, slope: &mut Slope<'_>) -> f64 {
         let Self { slopes, stage, is_slope_known } = self;
         slopes.iter_mut().for_each(|slope| slope.resize(u.len(), 0.0));
         stage.resize(u.len(), 0.0);
@@ -84,7 +84,7 @@ mod tests {
             let (mut pair, mut u, mut told) = (EmbeddedPair::default(), vec![1.0], 0.0_f64);
             let h = 2.0 / f64::from(steps);
             for n in 0..steps {
-                told = told.max(pair.attempt(&u, f64::from(n) * h, f64::from(n + 1) * h, &mut slope));
+                told = told.max(pair.try_step(&u, f64::from(n) * h, f64::from(n + 1) * h, &mut slope));
                 pair.accept(&mut u);
             }
             ((u[0] - 2.0_f64.sin().exp()).abs(), told)

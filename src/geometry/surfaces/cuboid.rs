@@ -5,14 +5,14 @@ use super::{Surface, SurfacePoint, Vector, join, line_points};
 /// |x_i − c_i| ≤ size_i / 2.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cuboid<const D: usize> {
-    /// Centre c.
+    /// Center c.
     pub center: Vector<D>,
     /// Full edge lengths, positive.
     pub size: Vector<D>,
 }
 
 impl<const D: usize> Cuboid<D> {
-    /// The axis of the face nearest to an inner point (centred frame) and its signed distance ≤ 0.
+    /// The axis of the face nearest to an inner point (centerd frame) and its signed distance ≤ 0.
     pub(super) fn nearest_face(half: &Vector<D>, local: &Vector<D>) -> (usize, f64) {
         let mut axis = 0;
         for d in 1..D {
@@ -53,7 +53,7 @@ impl<const D: usize> Surface<D> for Cuboid<D> {
         (self.center - self.size * 0.5, self.center + self.size * 0.5)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         self.size.product()
     }
 

@@ -7,7 +7,7 @@ use super::profile::{Piece, nearest_of};
 use super::{Surface, SurfacePoint, Vector, arc_points, join, line_points};
 use std::f64::consts::PI;
 
-/// Balls of one radius whose centres lie `separation` apart, and a cylinder (strip in 2D) between them.
+/// Balls of one radius whose centers lie `separation` apart, and a cylinder (strip in 2D) between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dumbbell<const D: usize> {
     center: Vector<D>,
@@ -64,7 +64,7 @@ impl<const D: usize> Surface<D> for Dumbbell<D> {
         let in_balls = (plane[0].abs() - self.half_separation).hypot(plane[1]) < self.radius;
         let in_neck = plane[0].abs() < self.half_separation && plane[1] < self.neck_radius;
         let curvature =
-            if foot.bend > 0.0 { (D as f64 - 1.0) / self.radius } else { (D as f64 - 2.0) / self.neck_radius };
+            if foot.curvature > 0.0 { (D as f64 - 1.0) / self.radius } else { (D as f64 - 2.0) / self.neck_radius };
         SurfacePoint {
             distance: if in_balls || in_neck { -foot.distance } else { foot.distance },
             point: self.center + lift(&foot.point),
@@ -79,7 +79,7 @@ impl<const D: usize> Surface<D> for Dumbbell<D> {
         (self.center - half, self.center + half)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         let (r, a) = (self.radius, self.neck_radius);
         let depth = (r * r - a * a).sqrt();
         let neck = 2.0 * (self.half_separation - depth);

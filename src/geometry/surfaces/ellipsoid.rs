@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 /// Σ ((x_i − c_i) / e_i)² = 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ellipsoid<const D: usize> {
-    /// Centre c.
+    /// Center c.
     pub center: Vector<D>,
     /// Semi-axes e, positive.
     pub semi_axes: Vector<D>,
@@ -23,7 +23,7 @@ impl<const D: usize> Ellipsoid<D> {
         (x - self.center).component_div(&self.semi_axes).norm() - 1.0
     }
 
-    /// Unit normal and ∇·n = (tr A − nᵀ A n)/|A x|, A = diag(2/e²), at a point of the surface, taken from the centre.
+    /// Unit normal and ∇·n = (tr A − nᵀ A n)/|A x|, A = diag(2/e²), at a point of the surface, taken from the center.
     #[must_use]
     pub fn normal_and_curvature(&self, foot: &Vector<D>) -> (Vector<D>, f64) {
         let e = &self.semi_axes;
@@ -35,7 +35,7 @@ impl<const D: usize> Ellipsoid<D> {
         (normal, (trace - bent) / length)
     }
 
-    /// Gauss curvature at a point of the surface, taken from the centre: 1/(∏ e² (Σ x_i²/e_i⁴)²); 0 in the plane.
+    /// Gauss curvature at a point of the surface, taken from the center: 1/(∏ e² (Σ x_i²/e_i⁴)²); 0 in the plane.
     #[must_use]
     pub fn gauss_curvature(&self, foot: &Vector<D>) -> f64 {
         let e = &self.semi_axes;
@@ -43,7 +43,7 @@ impl<const D: usize> Ellipsoid<D> {
         if D == 3 { 1.0 / (e.product().powi(2) * sum * sum) } else { 0.0 }
     }
 
-    /// The closest point for a query in the first orthant of the centred frame.
+    /// The closest point for a query in the first orthant of the centerd frame.
     fn closest_in_first_orthant(&self, y: &Vector<D>) -> Vector<D> {
         let e = &self.semi_axes;
         let shortest = e.min();
@@ -53,7 +53,7 @@ impl<const D: usize> Ellipsoid<D> {
         // Reach of the query along the shortest axes: it bounds the root away from the pole.
         let reach = (0..D).filter(|&i| gap[i] == 0.0).map(|i| y[i] * y[i]).sum::<f64>().sqrt();
         if reach == 0.0 {
-            // No pull along the shortest axes: near the centre the closest point leaves the coordinate plane.
+            // No pull along the shortest axes: near the center the closest point leaves the coordinate plane.
             let mut x = Vector::<D>::from_fn(|i, _| if gap[i] > 0.0 { e[i] * e[i] * y[i] / gap[i] } else { 0.0 });
             let rest = 1.0 - x.component_div(e).norm_squared();
             if rest > 0.0 {
@@ -83,7 +83,7 @@ impl<const D: usize> Surface<D> for Ellipsoid<D> {
         let e = &self.semi_axes;
         let local = x - self.center;
         let foot = self.closest_in_first_orthant(&local.abs());
-        // Round-off of the root is removed by one normalisation onto the surface.
+        // Round-off of the root is removed by one normalization onto the surface.
         let foot = foot / foot.component_div(e).norm();
         let foot = Vector::<D>::from_fn(|i, _| foot[i].copysign(local[i]));
         let (normal, curvature) = self.normal_and_curvature(&foot);
@@ -101,13 +101,13 @@ impl<const D: usize> Surface<D> for Ellipsoid<D> {
         (self.center - self.semi_axes, self.center + self.semi_axes)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         let product = self.semi_axes.product();
         if D == 2 { PI * product } else { 4.0 / 3.0 * PI * product }
     }
 
     fn near_medial_axis(&self, x: &Vector<D>, tolerance: f64) -> bool {
-        // The medial axis lies in the plane through the centre across a shortest axis, within the focal reach.
+        // The medial axis lies in the plane through the center across a shortest axis, within the focal reach.
         let local = x - self.center;
         let shortest = self.semi_axes.min();
         let flat = (0..D).any(|i| self.semi_axes[i] <= shortest && local[i].abs() <= tolerance);

@@ -20,7 +20,7 @@ pub(super) struct PieceFoot {
     /// None at the ends of the piece, where another one begins.
     pub normal: Option<Vector<2>>,
     /// 1/radius on arcs, 0 on lines.
-    pub bend: f64,
+    pub curvature: f64,
 }
 
 impl Piece {
@@ -31,26 +31,26 @@ impl Piece {
                 let length = offset.norm();
                 let axis = Vector::<2>::new(middle.cos(), middle.sin());
                 let angle = if length > 0.0 { turn(offset[1].atan2(offset[0]) - middle) } else { 0.0 };
-                let bend = 1.0 / radius;
+                let curvature = 1.0 / radius;
                 if angle.abs() < *half_width {
                     let normal = if length > 0.0 { offset / length } else { axis };
                     return PieceFoot {
                         distance: (length - radius).abs(),
                         point: center + normal * *radius,
                         normal: Some(normal),
-                        bend,
+                        curvature,
                     };
                 }
                 let end = middle + half_width.copysign(angle);
                 let point = center + Vector::<2>::new(end.cos(), end.sin()) * *radius;
-                PieceFoot { distance: (x - point).norm(), point, normal: None, bend }
+                PieceFoot { distance: (x - point).norm(), point, normal: None, curvature }
             }
             Piece::Line { from, to, normal } => {
                 let along = to - from;
                 let s = (x - from).dot(&along) / along.norm_squared();
                 let point = from + along * s.clamp(0.0, 1.0);
                 let inner = s > 0.0 && s < 1.0;
-                PieceFoot { distance: (x - point).norm(), point, normal: inner.then_some(*normal), bend: 0.0 }
+                PieceFoot { distance: (x - point).norm(), point, normal: inner.then_some(*normal), curvature: 0.0 }
             }
         }
     }

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// The Minkowski sum of a box and a ball; `size` is the outer size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundedCuboid<const D: usize> {
-    /// Centre.
+    /// Center.
     pub center: Vector<D>,
     /// Outer edge lengths, each more than twice the corner radius.
     pub size: Vector<D>,
@@ -49,7 +49,7 @@ impl<const D: usize> Surface<D> for RoundedCuboid<D> {
         (self.center - self.size * 0.5, self.center + self.size * 0.5)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         // Steiner's formula for the inner box and a ball.
         let core = self.size.add_scalar(-2.0 * self.corner_radius);
         let r = self.corner_radius;

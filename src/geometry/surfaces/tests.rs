@@ -120,7 +120,7 @@ fn outlines_run_round_the_measure_with_the_inside_on_the_left() {
                 area += 0.5 * (a[0] * b[1] - a[1] * b[0]);
             }
         }
-        assert!((area - surface.measure()).abs() < 1e-5, "{name}: {area} for {}", surface.measure());
+        assert!((area - surface.area_or_volume()).abs() < 1e-5, "{name}: {area} for {}", surface.area_or_volume());
     }
 }
 
@@ -133,7 +133,7 @@ fn measures_agree_with_counting() {
     }
     for (name, surface) in solid_shapes() {
         // Four standard deviations of the count.
-        assert!((count(surface.as_ref()) - surface.measure()).abs() < 0.045, "{name}");
+        assert!((count(surface.as_ref()) - surface.area_or_volume()).abs() < 0.045, "{name}");
     }
 }
 

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 /// All points at distance `minor_radius` from the circle of radius `major_radius` in the plane z = c_z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Torus {
-    /// Centre.
+    /// Center.
     pub center: Vector<3>,
     /// Radius of the core circle.
     pub major_radius: f64,
@@ -49,7 +49,7 @@ impl Surface<3> for Torus {
         (self.center - half, self.center + half)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         2.0 * PI * PI * self.major_radius * self.minor_radius * self.minor_radius
     }
 

@@ -73,8 +73,8 @@ impl<const D: usize> Surface<D> for Union<D> {
         total
     }
 
-    fn measure(&self) -> f64 {
-        self.parts.iter().map(|part| part.measure()).sum()
+    fn area_or_volume(&self) -> f64 {
+        self.parts.iter().map(|part| part.area_or_volume()).sum()
     }
 
     fn near_medial_axis(&self, x: &Vector<D>, tolerance: f64) -> bool {

@@ -49,7 +49,7 @@ impl Surface<2> for ZalesakDisk {
             distance: if self.is_inside(x) { -foot.distance } else { foot.distance },
             point: foot.point,
             normal: foot.normal,
-            curvature: foot.normal.map(|_| foot.bend),
+            curvature: foot.normal.map(|_| foot.curvature),
         }
     }
 
@@ -57,7 +57,7 @@ impl Surface<2> for ZalesakDisk {
         (self.center.add_scalar(-self.radius), self.center.add_scalar(self.radius))
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         // Disk less the slot's rectangle above the mouth less the circular segment below it.
         let mouth = -(self.radius.powi(2) - self.half_width.powi(2)).sqrt();
         let segment = self.radius.powi(2) * (self.opening - self.opening.sin() * self.opening.cos());

@@ -4,7 +4,7 @@ use super::{Convergence, IncompleteFactors, LinearMap, Stopping, add, dot, norm}
 
 /// Vectors of a solution, to be used again.
 #[derive(Debug, Default)]
-pub struct Storage {
+pub struct Workspace {
     vectors: [Vec<f64>; 8],
 }
 
@@ -16,15 +16,15 @@ pub fn solve(
     b: &[f64],
     x: &mut [f64],
     stopping: Stopping,
-    storage: &mut Storage,
+    workspace: &mut Workspace,
 ) -> Convergence {
     let n = b.len();
-    storage.vectors.iter_mut().for_each(|vector| vector.resize(n, 0.0));
-    let [r, shadow, p, v, s, t, hat, room] = &mut storage.vectors;
+    workspace.vectors.iter_mut().for_each(|vector| vector.resize(n, 0.0));
+    let [r, shadow, p, v, s, t, hat, scratch] = &mut workspace.vectors;
     let goal = stopping.tolerance * norm(b);
     let mut iterations = 0;
     let mut last = f64::INFINITY;
-    while iterations < stopping.most_iterations && !map.is_given_up() {
+    while iterations < stopping.max_iterations && !map.is_interrupted() {
         map.apply(x, r);
         r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
         // Also where b is nothing.
@@ -35,7 +35,7 @@ pub fn solve(
         p.copy_from_slice(r);
         let mut rho = dot(shadow, r);
         let mut is_done = false;
-        while !is_done && iterations < stopping.most_iterations && !map.is_given_up() {
+        while !is_done && iterations < stopping.max_iterations && !map.is_interrupted() {
             iterations += 1;
             factors.solve(p, hat);
             map.apply(hat, v);
@@ -70,11 +70,11 @@ pub fn solve(
             }
         }
         if is_done {
-            let found = Convergence::of(map, b, x, iterations, room);
+            let found = Convergence::from_solution(map, b, x, iterations, scratch);
             if found.is_final(stopping, &mut last) {
                 return found;
             }
         }
     }
-    Convergence::of(map, b, x, iterations, room)
+    Convergence::from_solution(map, b, x, iterations, scratch)
 }

@@ -4,14 +4,14 @@ use super::{Convergence, IncompleteFactors, LinearMap, Stopping, add, dot, norm}
 
 /// Vectors of a solution, to be used again.
 #[derive(Debug, Default)]
-pub struct Storage {
+pub struct Workspace {
     basis: Vec<Vec<f64>>,
     /// Columns of the triangle that rotations make of the Hessenberg matrix.
     triangle: Vec<Vec<f64>>,
     rotations: Vec<(f64, f64)>,
     right: Vec<f64>,
     hat: Vec<f64>,
-    room: Vec<f64>,
+    scratch: Vec<f64>,
 }
 
 /// Goes on from `x` to the solution of A x = b, `restart` vectors at a time.
@@ -22,21 +22,21 @@ pub fn solve(
     x: &mut [f64],
     restart: usize,
     stopping: Stopping,
-    storage: &mut Storage,
+    workspace: &mut Workspace,
 ) -> Convergence {
     let n = b.len();
-    let Storage { basis, triangle, rotations, right, hat, room } = storage;
+    let Workspace { basis, triangle, rotations, right, hat, scratch } = workspace;
     basis.resize_with(restart + 1, Vec::new);
     // The others when they are needed: most solutions take fewer vectors than they may.
     basis[0].resize(n, 0.0);
     hat.resize(n, 0.0);
-    room.resize(n, 0.0);
+    scratch.resize(n, 0.0);
     let goal = stopping.tolerance * norm(b);
     let mut iterations = 0;
     let (mut is_done, mut last) = (false, f64::INFINITY);
     loop {
         if is_done {
-            let found = Convergence::of(map, b, x, iterations, room);
+            let found = Convergence::from_solution(map, b, x, iterations, scratch);
             if found.is_final(stopping, &mut last) {
                 return found;
             }
@@ -45,7 +45,7 @@ pub fn solve(
         map.apply(x, first);
         first.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
         let beta = norm(first);
-        if beta <= goal || !beta.is_finite() || iterations >= stopping.most_iterations || map.is_given_up() {
+        if beta <= goal || !beta.is_finite() || iterations >= stopping.max_iterations || map.is_interrupted() {
             break;
         }
         first.iter_mut().for_each(|r| *r /= beta);
@@ -81,7 +81,7 @@ pub fn solve(
             let rest = right[k];
             right[k] = c * rest;
             right.push(-s * rest);
-            let is_over = iterations >= stopping.most_iterations || map.is_given_up();
+            let is_over = iterations >= stopping.max_iterations || map.is_interrupted();
             is_done = right[k + 1].abs() <= goal || below == 0.0;
             if is_done || is_over {
                 break;
@@ -94,12 +94,12 @@ pub fn solve(
             let pivot = triangle[k][k];
             right[k] = if pivot.abs() > 0.0 { (right[k] - known) / pivot } else { 0.0 };
         }
-        room.fill(0.0);
+        scratch.fill(0.0);
         for (v, y) in basis.iter().zip(&right[..steps]) {
-            add(room, *y, v);
+            add(scratch, *y, v);
         }
-        factors.solve(room, hat);
+        factors.solve(scratch, hat);
         add(x, 1.0, hat);
     }
-    Convergence::of(map, b, x, iterations, room)
+    Convergence::from_solution(map, b, x, iterations, scratch)
 }

@@ -24,7 +24,7 @@ impl IncompleteFactors {
     ///
     /// # Errors
     /// [`NoPivot`].
-    pub fn of(a: &SparseRows) -> Result<Self, NoPivot> {
+    pub fn from_rows(a: &SparseRows) -> Result<Self, NoPivot> {
         let mut rows = a.clone();
         let n = rows.rows();
         let (mut left, mut inverse) = (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -97,7 +97,7 @@ mod tests {
         let exact = [1.0, -2.0, 3.0];
         let b: Vec<f64> = a.iter().map(|row| row.iter().zip(&exact).map(|(a, x)| a * x).sum()).collect();
         let mut x = [0.0; 3];
-        IncompleteFactors::of(&rows).unwrap().solve(&b, &mut x);
+        IncompleteFactors::from_rows(&rows).unwrap().solve(&b, &mut x);
         assert!(x.iter().zip(&exact).all(|(x, e): (&f64, &f64)| (x - e).abs() < 1e-12));
     }
 
@@ -106,6 +106,6 @@ mod tests {
         let mut rows = SparseRows::default();
         rows.push_row(&[0], &[1.0]);
         rows.push_row(&[0], &[1.0]);
-        assert_eq!(IncompleteFactors::of(&rows).unwrap_err(), NoPivot { row: 1 });
+        assert_eq!(IncompleteFactors::from_rows(&rows).unwrap_err(), NoPivot { row: 1 });
     }
 }

@@ -2,7 +2,7 @@
 //! All even slabs are summed at once, then all odd ones, so that nobody writes where another does, and the order of every
 //! sum is the same for any number of threads. The first slab stands once more behind the last, as what closes the ring.
 
-use super::{Near, Pencils, Slab};
+use super::{NeighborGroups, Pencils, Slab};
 use crate::parallel::{Interrupt, Interrupted};
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ impl<const D: usize> Pencils<D> {
         &self,
         mut sums: [&mut [f64]; N],
         interrupt: &Interrupt,
-        work: impl Fn(usize, &Near<'_, D>, &mut Window<'_, N>) + Sync,
+        work: impl Fn(usize, &NeighborGroups<'_, D>, &mut Window<'_, N>) + Sync,
     ) -> Result<(), Interrupted> {
         sums.iter_mut().for_each(|column| column.fill(0.0));
         for color in 0..2 {
@@ -43,14 +43,14 @@ impl<const D: usize> Pencils<D> {
         interrupt.check()
     }
 
-    /// Slabs of a colour, halved until one is left.
+    /// Slabs of a color, halved until one is left.
     fn sum_slabs<const N: usize>(
         &self,
         color: usize,
         numbers: Range<usize>,
         mut window: Window<'_, N>,
         interrupt: &Interrupt,
-        work: &(impl Fn(usize, &Near<'_, D>, &mut Window<'_, N>) + Sync),
+        work: &(impl Fn(usize, &NeighborGroups<'_, D>, &mut Window<'_, N>) + Sync),
     ) {
         if numbers.len() > 1 {
             let middle = numbers.start + numbers.len() / 2;
@@ -80,7 +80,7 @@ impl<const D: usize> Pencils<D> {
             let runs = &slab.runs[first..*end as usize];
             first = *end as usize;
             let Some(last) = runs.last() else { continue };
-            work(place, &Near { groups: &slab.groups, runs, begin, shifts: &self.shifts }, &mut window);
+            work(place, &NeighborGroups { groups: &slab.groups, runs, begin, shifts: &self.shifts }, &mut window);
             begin = last.end;
         }
     }

@@ -1,7 +1,7 @@
 //! Copies of the points of a surface along their normals, fitted in space: the paper's form of Surface DC-PSE (section 3,
 //! algorithms 1 and 2). The kernel values of the copies of a point are added up to the weight of that point.
 
-use super::{Chart, Functional, Heights, Node, in_space};
+use super::{Chart, Functional, Heights, Node, cartesian_terms};
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 
@@ -15,7 +15,7 @@ pub struct NormalCopies<'a, const D: usize> {
     cells: CellList<D>,
 }
 
-/// The mean L1 distance of the nodes from the centre by the width ε of the window (Surface DC-PSE paper, eq. 8; the value of
+/// The mean L1 distance of the nodes from the center by the width ε of the window (Surface DC-PSE paper, eq. 8; the value of
 /// the paper's programme).
 const SPACING_BY_WIDTH: f64 = 0.9;
 
@@ -39,19 +39,19 @@ impl<const D: usize> Chart<D> for NormalCopies<'_, D> {
         false
     }
 
-    fn gather(&self, i: usize, reach: f64, _is_last_resort: bool, near: &mut Vec<Node<D>>) {
+    fn gather(&self, i: usize, radius: f64, _is_last_resort: bool, near: &mut Vec<Node<D>>) {
         near.clear();
         let x = self.points[i];
-        let inverse = 1.0 / reach;
+        let inverse = 1.0 / radius;
         let mut spread = 0.0;
         let mut add = |j: usize, layer: i32| {
             let d = self.points[j] + self.normals[j] * (f64::from(layer) * self.spacing) - x;
-            if d.norm_squared() <= reach * reach {
+            if d.norm_squared() <= radius * radius {
                 spread += d.abs().sum() * inverse;
                 near.push(Node { index: j as u32, at: (d * inverse).into(), window: 0.0, height: 0.0 });
             }
         };
-        self.cells.for_each_within(&x, reach, |j, _, _| {
+        self.cells.for_each_within(&x, radius, |j, _, _| {
             if j != i {
                 (-self.layers..=self.layers).for_each(|layer| add(j, layer));
             }
@@ -71,6 +71,6 @@ impl<const D: usize> Chart<D> for NormalCopies<'_, D> {
         _heights: Option<&Heights<D>>,
         terms: &mut Vec<([u8; D], f64)>,
     ) {
-        in_space(functional, terms);
+        cartesian_terms(functional, terms);
     }
 }

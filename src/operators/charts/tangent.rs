@@ -1,7 +1,7 @@
 //! The tangent plane at a point of a surface: Surface DC-PSE in its intrinsic form (Surface DC-PSE paper, section 3, with the
 //! copies along normals eliminated).
 //!
-//! Extension along normals makes a field constant there, so that with coordinates (X, Y) of the neighbours on the tangent plane
+//! Extension along normals makes a field constant there, so that with coordinates (X, Y) of the neighbors on the tangent plane
 //! Δ_S f = f_XX + f_YY exactly: the plane touches the surface to second order, and the metric of the projection is
 //! the identity up to it. Where normals are not exact, the heights Z(X, Y) of the surface over the plane are fitted
 //! with the same weights, and g_ab = δ_ab + Z_a Z_b with its Christoffel symbols Γ^c_ab = Z_c Z_ab/(1 + |∇Z|²) takes the place
@@ -16,9 +16,9 @@ use crate::neighbors::{CellList, NeighborSearch};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Metric {
     /// Normals are exact.
-    OfNormals,
+    FromNormals,
     /// Heights over the plane are fitted.
-    OfHeights,
+    FromHeights,
 }
 
 /// Points of a surface with normals, M = D − 1.
@@ -80,16 +80,16 @@ impl<const D: usize, const M: usize> Chart<M> for TangentChart<'_, D> {
     }
 
     fn needs_heights(&self) -> bool {
-        self.metric == Metric::OfHeights
+        self.metric == Metric::FromHeights
     }
 
-    fn gather(&self, i: usize, reach: f64, is_last_resort: bool, near: &mut Vec<Node<M>>) {
+    fn gather(&self, i: usize, radius: f64, is_last_resort: bool, near: &mut Vec<Node<M>>) {
         near.clear();
         let least_cosine = if is_last_resort { SAME_SIDE } else { SAME_SHEET };
         let (x, n) = (self.points[i], self.normals[i]);
         let t = tangents::<D, M>(&n);
-        let inverse = 1.0 / reach;
-        self.cells.for_each_within(&x, reach, |j, _, square| {
+        let inverse = 1.0 / radius;
+        self.cells.for_each_within(&x, radius, |j, _, square| {
             if j != i && self.normals[j].dot(&n) > least_cosine {
                 let d = self.points[j] - x;
                 let rest = (1.0 - square * inverse * inverse).max(0.0);

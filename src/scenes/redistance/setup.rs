@@ -113,7 +113,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     }
     let band = written.band.unwrap_or(written.band_h.unwrap_or(12.0) * written.spacing);
     if let (Some(surface), Some(method)) = (&surface, &method) {
-        let reach = (0.5 * band).max(method.reach_h::<D>() * written.spacing);
+        let reach = (0.5 * band).max(method.fit_band_h::<D>() * written.spacing);
         violations.extend(check_extent(surface.as_ref(), reach, written.spacing));
         if initial == InitialLevel::Scaled && !is_scaling_positive(surface.as_ref(), reach) {
             let detail = "the factor 1 + 0.5 x + 0.3 y must be positive over the whole band";
@@ -193,7 +193,7 @@ impl<const D: usize> Scene for RedistanceScene<D> {
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
-        let reach = self.half_band.max(self.method.reach_h::<D>() * self.lattice.spacing) + beyond;
+        let reach = self.half_band.max(self.method.fit_band_h::<D>() * self.lattice.spacing) + beyond;
         let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
             shapes::surface::<D>(&self.shape, "/shape")
                 .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing))
@@ -215,7 +215,7 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
         let particles = particles as f64;
         let reach_h = self.half_band / self.lattice.spacing;
-        let reach_h = reach_h.max(self.method.reach_h::<D>());
+        let reach_h = reach_h.max(self.method.fit_band_h::<D>());
         let times = self.repeats as f64;
         let mut work =
             work_estimate::redistancing::<D>(&self.method, particles, reach_h, 1.0, times, Course::EveryStep);

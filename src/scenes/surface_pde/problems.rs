@@ -189,7 +189,7 @@ pub(super) fn understand(
             };
             ProblemChoice::Evolution { start: Start::Field(start), end_time, time_step, integrator }
         }
-        Some("curvature") => ProblemChoice::Curvature { of_heights: metric == Metric::OfHeights },
+        Some("curvature") => ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights },
         Some("reaction_diffusion") => {
             let manufactured =
                 if problem["manufactured"].is_null() { None } else { Some(field_of("manufactured", violations)?) };
@@ -217,7 +217,7 @@ pub(super) fn understand(
 fn solver(written: &Value) -> Solver {
     let stopping = Stopping {
         tolerance: written["tolerance"].as_f64().unwrap_or(1e-10),
-        most_iterations: written["max_iterations"].as_u64().unwrap_or(5000),
+        max_iterations: written["max_iterations"].as_u64().unwrap_or(5000),
     };
     match written["type"].as_str() {
         Some("gmres") => Solver::Gmres { restart: written["restart"].as_u64().unwrap_or(60) as usize, stopping },
@@ -345,9 +345,7 @@ impl ProblemChoice {
     pub fn fill(&self, entries: f64, points: f64) -> f64 {
         match self.solver() {
             Some(Solver::SparseLu) => 70.0 * entries * points.ln(),
-            Some(Solver::Gmres { restart, stopping }) => {
-                8.0 * (stopping.most_iterations.min(restart as u64) + 1) as f64
-            }
+            Some(Solver::Gmres { restart, stopping }) => 8.0 * (stopping.max_iterations.min(restart as u64) + 1) as f64,
             _ => 0.0,
         }
     }

@@ -155,9 +155,9 @@ pub(super) fn choices(
 ) -> (Option<Scheme>, Option<ProblemChoice>) {
     let normals = &resolved["normals"];
     let metric = match normals["type"].as_str() {
-        Some("exact") => Metric::OfNormals,
-        Some("perturbed" | "given") if normals["metric"] == "normals" => Metric::OfNormals,
-        _ => Metric::OfHeights,
+        Some("exact") => Metric::FromNormals,
+        Some("perturbed" | "given") if normals["metric"] == "normals" => Metric::FromNormals,
+        _ => Metric::FromHeights,
     };
     let scheme = scheme(written, shape, count, metric, sampling, resolved, violations);
     (scheme, problems::understand(written, shape, metric, resolved, violations))
@@ -259,7 +259,7 @@ fn scheme(
         let layers = method["layers"].as_u64().unwrap_or(if is_curve { 4 } else { 2 }) as u32;
         resolved["method"]["normal_spacing"] = json!(apart);
         resolved["method"]["layers"] = json!(layers);
-        if metric == Metric::OfHeights || matches!(shape, Shape::Bump(_) | Shape::Points(_)) {
+        if metric == Metric::FromHeights || matches!(shape, Shape::Bump(_) | Shape::Points(_)) {
             let detail = "copies along normals want exact normals and a closed surface";
             violations.push(Violation::new("/method/form", "conflict", detail, &json!("copies"), json!(["intrinsic"])));
         }

@@ -15,7 +15,7 @@ pub(in crate::time) const C: [f64; 6] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
 pub(in crate::time) const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
 /// Inner steps after which the path counts as lost (not a number), so that a wild field cannot hang a run.
-const MOST_STEPS: u32 = 100_000;
+const MAX_STEPS: u32 = 100_000;
 
 pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64, dt: f64, tolerance: f64) -> Vector<D> {
     if dt == 0.0 {
@@ -28,7 +28,7 @@ pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64,
     let mut h = whole.min(0.05);
     let mut k = [Vector::<D>::zeros(); 7];
     k[0] = flow.velocity(&x, t);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let remaining = whole - done;
         let last = h >= remaining * (1.0 - 1e-12);
         let step = direction * if last { remaining } else { h };

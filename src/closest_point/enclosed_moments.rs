@@ -1,8 +1,8 @@
-//! The area or volume inside the surface, its centre and second moments, by quadrature on the fitted polynomials.
+//! The area or volume inside the surface, its center and second moments, by quadrature on the fitted polynomials.
 //!
 //! A coarse grid of cells covers the samples. Cells away from the surface count whole or not at
 //! all; cells that it cuts are halved along every axis, and the smallest ones count the share that the
-//! tangent plane at the foot of their centre leaves inside, moved by the mean bend of the surface over the cell.
+//! tangent plane at the foot of their center leaves inside, moved by the mean bend of the surface over the cell.
 
 use super::level_surface::LevelSurface;
 use crate::geometry::Vector;
@@ -22,7 +22,7 @@ const COARSE_CELLS: f64 = 16.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnclosedMoments<const D: usize> {
     /// Area or volume.
-    pub measure: f64,
+    pub area_or_volume: f64,
     /// ∫ x.
     pub first: Vector<D>,
     /// ∫ x_d², axis by axis.
@@ -36,26 +36,26 @@ pub struct EnclosedMoments<const D: usize> {
 impl<const D: usize> EnclosedMoments<D> {
     fn nothing() -> Self {
         let zero = Vector::<D>::zeros();
-        Self { measure: 0.0, first: zero, second: zero, low: zero, high: zero }
+        Self { area_or_volume: 0.0, first: zero, second: zero, low: zero, high: zero }
     }
 
     fn add(&mut self, other: &Self) {
-        self.measure += other.measure;
+        self.area_or_volume += other.area_or_volume;
         self.first += other.first;
         self.second += other.second;
     }
 
     /// Where it is.
     #[must_use]
-    pub fn centre(&self) -> Vector<D> {
-        self.first / self.measure
+    pub fn center(&self) -> Vector<D> {
+        self.first / self.area_or_volume
     }
 
     /// Central second moments, axis by axis, by the measure.
     #[must_use]
     pub fn variance(&self) -> Vector<D> {
-        let centre = self.centre();
-        self.second / self.measure - centre.component_mul(&centre)
+        let center = self.center();
+        self.second / self.area_or_volume - center.component_mul(&center)
     }
 }
 
@@ -65,8 +65,11 @@ impl<const D: usize> EnclosedMoments<D> {
 ///
 /// # Errors
 /// [`Interrupted`] when somebody asked to stop.
-pub fn enclosed_measure<const D: usize>(surface: &LevelSurface<D>, interrupt: &Interrupt) -> Result<f64, Interrupted> {
-    enclosed_moments(surface, |x| *x, interrupt).map(|moments| moments.measure)
+pub fn enclosed_area_or_volume<const D: usize>(
+    surface: &LevelSurface<D>,
+    interrupt: &Interrupt,
+) -> Result<f64, Interrupted> {
+    enclosed_moments(surface, |x| *x, interrupt).map(|moments| moments.area_or_volume)
 }
 
 /// Measure and moments likewise. In a periodic space `unwrap` moves the points of the surface side by side again.
@@ -125,7 +128,7 @@ pub fn enclosed_moments<const D: usize>(
     Ok(moments)
 }
 
-/// Adds the inside part of one cubic cell; a cut one counts at its centre.
+/// Adds the inside part of one cubic cell; a cut one counts at its center.
 fn inside_of_cell<const D: usize>(
     surface: &LevelSurface<D>,
     corner: &Vector<D>,
@@ -134,16 +137,16 @@ fn inside_of_cell<const D: usize>(
     sum: &mut EnclosedMoments<D>,
 ) {
     let whole = edge.powi(D as i32);
-    let centre = corner.add_scalar(0.5 * edge);
+    let center = corner.add_scalar(0.5 * edge);
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();
-    let Some(foot) = surface.query(&centre, f64::INFINITY) else { return };
-    let mut add = |measure: f64| {
-        sum.measure += measure;
-        sum.first += centre * measure;
-        sum.second += centre.component_mul(&centre).add_scalar(edge * edge / 12.0) * measure;
+    let Some(foot) = surface.query(&center, f64::INFINITY) else { return };
+    let mut add = |area_or_volume: f64| {
+        sum.area_or_volume += area_or_volume;
+        sum.first += center * area_or_volume;
+        sum.second += center.component_mul(&center).add_scalar(edge * edge / 12.0) * area_or_volume;
     };
     if foot.distance >= half_diagonal {
-        if surface.is_inside(&centre, &foot) {
+        if surface.is_inside(&center, &foot) {
             add(whole);
         }
         return;
