@@ -2,7 +2,7 @@
 //!
 //! Monomials are the case p_j = 0. The minter basis (PCP paper, section 3.1) is the Lagrange basis of the unisolvent
 //! nodes, which is a triangular combination of Newton factors. Regressions use the values of the basis; what they
-//! find is expanded into monomials of the centerd, scaled coordinates, for which one fast evaluator serves all bases.
+//! find is expanded into monomials of the centered, scaled coordinates, for which one fast evaluator serves all bases.
 //! Because indices are graded, dropping the trailing terms gives the basis of lower degree.
 
 use super::horner::nested_indices;
@@ -16,9 +16,9 @@ use crate::geometry::Vector;
 pub enum BasisKind {
     /// Lagrange polynomials on Chebyshev–Lobatto unisolvent nodes of total degree, in Newton form.
     Minter,
-    /// Monomials of the centerd coordinates scaled by the radius of the neighborhood.
+    /// Monomials of the centered coordinates scaled by the radius of the neighborhood.
     Monomial,
-    /// Monomials of the raw coordinates, neither centerd nor scaled: for the comparison of PCP fig. 6.
+    /// Monomials of the raw coordinates, neither centered nor scaled: for the comparison of PCP fig. 6.
     MonomialUnscaled,
 }
 

@@ -6,9 +6,9 @@ use std::f64::consts::PI;
 /// All points at distance `radius` from `center`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ball<const D: usize> {
-    /// Center.
+    /// Center of the circle or sphere.
     pub center: Vector<D>,
-    /// Radius, positive.
+    /// Radius R > 0.
     pub radius: f64,
 }
 

@@ -1,13 +1,13 @@
 //! Dumbbell: two balls joined by a straight neck along x.
 //!
-//! The shape is a body of revolution about the x axis (mirror-symmetric in 2D), so the closest point lies in the
-//! half-plane through the axis and the query; there the boundary is two arcs and a line.
+//! The shape is a body of revolution about the x axis (mirror-symmetric in 2D). The closest point therefore lies in the half-plane through the
+//! axis and the query point. There the boundary consists of two arcs and a line.
 
 use super::profile::{Piece, nearest_of};
 use super::{Surface, SurfacePoint, Vector, arc_points, join, line_points};
 use std::f64::consts::PI;
 
-/// Balls of one radius whose centers lie `separation` apart, and a cylinder (strip in 2D) between them.
+/// Two balls of equal radius whose centers are `separation` apart, and a cylinder (strip in 2D) between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dumbbell<const D: usize> {
     center: Vector<D>,
@@ -18,7 +18,9 @@ pub struct Dumbbell<const D: usize> {
 }
 
 impl<const D: usize> Dumbbell<D> {
-    /// A dumbbell; the neck is thinner than the balls and longer than nothing.
+    /// A dumbbell with the given distance between the centers of its balls.
+    ///
+    /// The neck must be thinner than the balls, and the balls must not touch.
     #[must_use]
     pub fn new(center: Vector<D>, separation: f64, radius: f64, neck_radius: f64) -> Self {
         let half_separation = 0.5 * separation;
@@ -33,11 +35,12 @@ impl<const D: usize> Dumbbell<D> {
         Self { center, half_separation, radius, neck_radius, pieces }
     }
 
+    /// Half the angle (rad) under which the neck is seen from the center of a ball.
     fn opening(&self) -> f64 {
         (self.neck_radius / self.radius).asin()
     }
 
-    /// Axial coordinate, distance from the axis and the unit vector away from it.
+    /// Axial coordinate and distance from the axis, and the unit vector that points away from the axis.
     fn half_plane(&self, x: &Vector<D>) -> (Vector<2>, Vector<D>) {
         let mut radial = x - self.center;
         let axial = radial[0];

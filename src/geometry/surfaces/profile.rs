@@ -1,29 +1,32 @@
-//! Curves made of circular arcs and straight lines in a plane: the boundary of shapes that are glued together.
+//! Plane curves of circular arcs and straight lines, the boundaries of composed shapes.
 
 use super::Vector;
 use std::f64::consts::PI;
 
-/// One piece of a curve; normals point to the outside of the shape.
+/// One piece of a curve. Normals point out of the shape.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Piece {
-    /// Part of a circle about `center`, from angle `middle − half_width` to `middle + half_width`, outside away from it.
+    /// Arc of a circle from the angle `middle − half_width` to `middle + half_width` (rad), with the center inside the shape.
     Arc { center: Vector<2>, radius: f64, middle: f64, half_width: f64 },
     /// A straight line with its outward normal.
     Line { from: Vector<2>, to: Vector<2>, normal: Vector<2> },
 }
 
-/// The closest point of a piece.
+/// Closest point of a piece to a query point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PieceFoot {
+    /// Distance ≥ 0 from the query point.
     pub distance: f64,
+    /// The closest point.
     pub point: Vector<2>,
-    /// None at the ends of the piece, where another one begins.
+    /// Outward unit normal; None at the ends of the piece.
     pub normal: Option<Vector<2>>,
-    /// 1/radius on arcs, 0 on lines.
+    /// Curvature of the piece: 1/radius on arcs, 0 on lines.
     pub curvature: f64,
 }
 
 impl Piece {
+    /// The closest point of this piece to `x`.
     pub(super) fn nearest(&self, x: &Vector<2>) -> PieceFoot {
         match self {
             Piece::Arc { center, radius, middle, half_width } => {
@@ -56,7 +59,7 @@ impl Piece {
     }
 }
 
-/// The nearest and the second nearest distance over the pieces.
+/// The closest point over all pieces, and the distance to the nearest piece with another closest point.
 pub(super) fn nearest_of(pieces: &[Piece], x: &Vector<2>) -> (PieceFoot, f64) {
     let mut best = pieces[0].nearest(x);
     let mut second = f64::INFINITY;
@@ -74,7 +77,7 @@ pub(super) fn nearest_of(pieces: &[Piece], x: &Vector<2>) -> (PieceFoot, f64) {
     (best, second)
 }
 
-/// An angle brought into [−π, π].
+/// An angle (rad) moved into [−π, π].
 fn turn(angle: f64) -> f64 {
     angle - (angle / (2.0 * PI)).round() * 2.0 * PI
 }
