@@ -1,14 +1,14 @@
-//! Looking at every point: slow and obviously right, the oracle of the other searches.
+//! Search by looking at every point, the slow reference for the other searches.
 
 use super::NeighborSearch;
 use crate::geometry::{Domain, Vector};
 
-/// All points in the order given.
+/// A search that visits all points in their given order.
 #[derive(Debug, Clone)]
 pub struct BruteForce<'a, const D: usize> {
-    /// The domain, for periodic axes.
+    /// Domain, which gives displacements along periodic axes.
     pub domain: &'a Domain<D>,
-    /// The points.
+    /// Points to search.
     pub points: &'a [Vector<D>],
 }
 

@@ -1,8 +1,8 @@
 //! Regressions by moments, one in each vector lane.
 //!
-//! The Gram matrix of the weighted monomials holds nothing but moments, G_αβ = Σ_j w_j t_j^(α+β): 45 sums instead of
-//! 120 for degree 4 in the plane, 165 instead of 630 in space. Beyond [`REFINED_FROM`] one step of iterative refinement
-//! with the residuals of the data brings back the digits that squaring the condition costs.
+//! The entries of the Gram matrix of the weighted monomials are moments, G_αβ = Σ_j w_j t_j^(α+β). For degree 4 these are 45 sums instead of
+//! 120 in the plane, and 165 instead of 630 in space. From [`REFINEMENT_MIN_DEGREE`] on, one step of iterative refinement with the residuals
+//! of the data restores the digits that squaring the condition number costs.
 
 use super::MAX_DEGREE;
 use super::horner::nested_indices;
@@ -10,32 +10,33 @@ use super::multi_index::term_count;
 use crate::linear_algebra::normal_equations::{LaneSystems, packed_row};
 use crate::linear_algebra::number::{LANES, Lanes};
 
-/// The degree from which on solutions are refined.
+/// Smallest degree whose solutions are refined.
 pub const REFINEMENT_MIN_DEGREE: usize = 5;
 
-/// Neighbors that one pass over the sums takes together, so that a sum is loaded and stored once for all.
+/// Number of neighbors that one pass adds to the sums, so that each sum is loaded and stored once for all of them.
 const NEIGHBORS_PER_PASS: usize = 4;
 
-/// Powers t⁰ … t^(2 n) of the last coordinate of the neighbors of one pass.
+/// Powers t⁰ … t^(2n) of the last coordinate, for the neighbors of one pass.
 type Powers = [[Lanes; NEIGHBORS_PER_PASS]; 2 * MAX_DEGREE + 1];
 
-/// Regressions of one degree.
+/// Solver for regressions of one total degree.
 #[derive(Debug, Clone)]
 pub struct Moments<const D: usize> {
     degree: usize,
-    /// The place of the moment of each entry of the packed Gram matrix.
+    /// Index of the moment that each entry of the packed Gram matrix equals.
     gram: Vec<u16>,
 }
 
-/// Data of the regressions of one batch, and room to solve them.
+/// Data of a batch of regressions, one per lane, with the workspace of their solution.
 #[derive(Debug, Clone)]
 pub struct LaneBatch<const D: usize> {
-    /// Neighbors a lane; lanes with fewer are filled up with weight 0.
+    /// Number of neighbors per lane. Lanes with fewer are padded with rows of weight 0.
     rows: usize,
+    /// Local coordinates of the neighbors.
     coordinates: [Vec<[f64; LANES]>; D],
-    /// One for a neighbor, zero for a row that fills a lane up; then the weights.
+    /// Weights of the neighbors.
     weights: Vec<[f64; LANES]>,
-    /// Right-hand sides, quantity by quantity.
+    /// Values of the neighbors, quantity by quantity.
     values: Vec<[f64; LANES]>,
     moments: Vec<Lanes>,
     systems: LaneSystems,
@@ -63,7 +64,7 @@ impl<const D: usize> Default for LaneBatch<D> {
 }
 
 impl<const D: usize> LaneBatch<D> {
-    /// Forgets the last batch and makes room for `rows` neighbors a lane.
+    /// Starts a batch with up to `rows` neighbors per lane and the given number of quantities.
     pub fn reset(&mut self, rows: usize, quantities: usize) {
         let rows = rows.next_multiple_of(NEIGHBORS_PER_PASS);
         self.rows = rows;
@@ -78,7 +79,7 @@ impl<const D: usize> LaneBatch<D> {
         clear(&mut self.values, rows * quantities);
     }
 
-    /// Writes one neighbor: local coordinates and base weight. The values follow by [`Self::set_value`].
+    /// Writes the local coordinates `t` and the weight of a neighbor. Its values are written by [`Self::set_value`].
     #[inline(always)]
     pub fn set_row(&mut self, lane: usize, row: usize, t: &[f64; D], weight: f64) {
         for (axis, t) in self.coordinates.iter_mut().zip(t) {
@@ -87,13 +88,13 @@ impl<const D: usize> LaneBatch<D> {
         self.weights[row][lane] = weight;
     }
 
-    /// Writes a right-hand side.
+    /// Writes the value of a quantity at a neighbor.
     #[inline(always)]
     pub fn set_value(&mut self, lane: usize, row: usize, quantity: usize, value: f64) {
         self.values[quantity * self.rows + row][lane] = value;
     }
 
-    /// Multiplies every weight by exp(−k |t|²).
+    /// Multiplies every weight by exp(−k ‖t‖²).
     pub fn apply_weights(&mut self, k: f64) {
         if k == 0.0 {
             return;
@@ -110,7 +111,7 @@ impl<const D: usize> LaneBatch<D> {
 }
 
 impl<const D: usize> Moments<D> {
-    /// For polynomials of a total degree.
+    /// The solver for polynomials of a total degree.
     #[must_use]
     pub fn new(degree: usize) -> Self {
         let (terms, moments) = (nested_indices::<D>(degree), nested_indices::<D>(2 * degree));
@@ -124,8 +125,9 @@ impl<const D: usize> Moments<D> {
         Self { degree, gram }
     }
 
-    /// Fits every quantity of a batch. Coefficients (nested order) come quantity by quantity; with them, for each lane,
-    /// the least pivot as a share of its diagonal.
+    /// Fits all quantities of a batch.
+    ///
+    /// Returns the smallest pivot ratio of each lane, and the coefficients, quantity by quantity, in nested order.
     pub fn solve<'b>(&self, batch: &'b mut LaneBatch<D>, quantities: usize) -> (Lanes, &'b [Lanes]) {
         match self.degree {
             1 => self.solve_unrolled::<1>(batch, quantities),
@@ -139,6 +141,7 @@ impl<const D: usize> Moments<D> {
         }
     }
 
+    /// [`Self::solve`] for a degree N that is known to the compiler.
     fn solve_unrolled<'b, const N: usize>(
         &self,
         batch: &'b mut LaneBatch<D>,
@@ -201,7 +204,7 @@ impl<const D: usize> Moments<D> {
     }
 }
 
-/// Adds Σ_q scale_q t_q^α to the sums of all |α| ≤ N, or ≤ 2 N where `DOUBLE`, in nested order.
+/// Adds Σ_q scale_q t_q^α over the neighbors of one pass to the sums for all |α| ≤ N (|α| ≤ 2 N with `DOUBLE`), in nested order.
 #[inline(always)]
 fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
     coordinates: &[Vec<[f64; LANES]>; D],
@@ -249,7 +252,7 @@ fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
     }
 }
 
-/// p(t) with coefficients in nested order.
+/// Value p(t) of the polynomial with the given coefficients in nested order.
 #[inline(always)]
 fn value<const D: usize, const N: usize>(coefficients: &[Lanes], t: &[Lanes; D]) -> Lanes {
     let zero = Lanes::splat(0.0);
