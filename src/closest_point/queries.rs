@@ -1,8 +1,8 @@
 //! Closest points for many queries at once.
 //!
-//! 1. The nearest sample of every query, each search starting from the sample of the query before.
-//! 2. Queries sorted by sample, so that those of one sample stand side by side.
-//! 3. Newton's method on the sample's polynomial for several queries in vector lanes.
+//! 1. Find the nearest sample of every query; each search starts from the sample of the query before.
+//! 2. Sort the queries by sample.
+//! 3. Solve by Newton's method on the polynomial of a sample, for several queries in vector lanes.
 
 use super::redistancing::{ClosestPoint, QueryCounts, Redistancing};
 use crate::geometry::Vector;
@@ -10,19 +10,21 @@ use crate::linear_algebra::number::LANES;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
-/// Queries of one parallel task: enough to profit from the one before.
+/// Number of queries of a parallel task, large enough for searches to profit from the query before.
 pub(super) const QUERIES: usize = 256;
-/// Mark of a query without a sample in reach.
+/// Mark of a query without a sample within the cutoff.
 const NONE: usize = usize::MAX;
 
-/// The answers to the queries that have a sample in reach, in the order of samples.
+/// Closest points of the queries that have a sample within the cutoff, in the order of samples.
 #[derive(Debug)]
 pub struct ClosestPoints<const D: usize> {
-    /// Nearest sample and squared distance from it, query by query.
+    /// Nearest sample of each query, and the squared distance from it.
     nearest: Vec<(usize, f64)>,
-    /// First place of each sample in `queries`.
+    /// First slot of each sample in `queries`.
     starts: Vec<usize>,
+    /// Indices of the queries, sorted by sample.
     queries: Vec<usize>,
+    /// Closest points, in the order of `queries`.
     feet: Vec<Option<ClosestPoint<D>>>,
 }
 
@@ -33,12 +35,12 @@ impl<const D: usize> Default for ClosestPoints<D> {
 }
 
 impl<const D: usize> ClosestPoints<D> {
-    /// Queries and their answers, each query at most once.
+    /// Indices of the queries with their closest points, each query at most once.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &ClosestPoint<D>)> {
         self.queries.iter().zip(&self.feet).filter_map(|(query, foot)| Some((*query, foot.as_ref()?)))
     }
 
-    /// Room for one answer a query, in the order of queries.
+    /// One slot per query, in the order of queries, for writing closest points.
     pub(super) fn resize_to_queries(&mut self, queries: usize) -> &mut [Option<ClosestPoint<D>>] {
         self.queries.clear();
         self.queries.extend(0..queries);
@@ -46,6 +48,7 @@ impl<const D: usize> ClosestPoints<D> {
         &mut self.feet
     }
 
+    /// Sorts the queries by their nearest samples.
     fn sort_by_sample(&mut self, samples: usize) {
         self.starts.clear();
         self.starts.resize(samples + 1, 0);
@@ -66,19 +69,19 @@ impl<const D: usize> ClosestPoints<D> {
 }
 
 impl<const D: usize> Redistancing<D> {
-    /// [`Self::query`] for many points.
+    /// [`Self::query`] for many points at once.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn closest_points(
         &self,
         points: &[Vector<D>],
         cutoff: f64,
-        answers: &mut ClosestPoints<D>,
+        results: &mut ClosestPoints<D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
-        answers.nearest.resize(points.len(), (NONE, 0.0));
-        answers.nearest.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(nearest, points)| {
+        results.nearest.resize(points.len(), (NONE, 0.0));
+        results.nearest.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(nearest, points)| {
             let mut last = None;
             for (x, slot) in points.iter().zip(nearest) {
                 if interrupt.is_raised() {
@@ -88,8 +91,8 @@ impl<const D: usize> Redistancing<D> {
             }
         });
         interrupt.check()?;
-        answers.sort_by_sample(self.samples().len());
-        let ClosestPoints { nearest, queries, feet, .. } = answers;
+        results.sort_by_sample(self.samples().len());
+        let ClosestPoints { nearest, queries, feet, .. } = results;
         feet.resize(queries.len(), None);
         let nearest = &*nearest;
         feet.par_chunks_mut(QUERIES).zip(queries.par_chunks(QUERIES)).for_each(|(feet, queries)| {
@@ -103,9 +106,15 @@ impl<const D: usize> Redistancing<D> {
                 for lanes in same.chunks(LANES) {
                     let last = lanes.len() - 1;
                     let at: [Vector<D>; LANES] = std::array::from_fn(|lane| points[lanes[lane.min(last)]]);
-                    let away: [f64; LANES] = std::array::from_fn(|lane| nearest[lanes[lane.min(last)]].1.sqrt());
+                    let distances: [f64; LANES] = std::array::from_fn(|lane| nearest[lanes[lane.min(last)]].1.sqrt());
                     let count = lanes.len();
-                    self.solve(sample, &at[..count], &away[..count], &mut feet[done..done + count], &mut query_counts);
+                    self.solve(
+                        sample,
+                        &at[..count],
+                        &distances[..count],
+                        &mut feet[done..done + count],
+                        &mut query_counts,
+                    );
                     done += lanes.len();
                 }
             }

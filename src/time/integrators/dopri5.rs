@@ -5,7 +5,7 @@
 
 use crate::geometry::{Flow, Vector};
 
-/// Coefficients of the stages (Dormand 1980, table 2, RK5(4)7M). The last row is the solution of order 5.
+/// Coefficients of the stages (Dormand 1980, RK5(4)7M). The last row is the solution of order 5.
 pub(in crate::time) const A: [[f64; 6]; 6] = [
     [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
