@@ -1,7 +1,8 @@
 //! Closest-point redistancing on irregular particles (PCP, section 3).
 //!
-//! Particles next to the surface carry local polynomials of the level-set function. Their projections onto the zeros of the polynomials are sample
-//! points of the surface. A query starts at the nearest sample and solves for the closest point on the zero of the sample's polynomial.
+//! Particles next to the surface carry local polynomials of the level-set function. Their projections onto the zeros of
+//! the polynomials are sample points of the surface. A query starts at the nearest sample and solves for the closest
+//! point on the zero of the sample's polynomial.
 
 pub mod detection;
 pub mod enclosed_moments;

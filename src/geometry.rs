@@ -1,7 +1,7 @@
 //! Domains, exact surfaces, prescribed flows and seeded point lattices.
 //!
-//! Surfaces give the distance, closest point, normal and curvature of any query point, exact to round-off. Scenes start from them, and errors
-//! are measured against them.
+//! Surfaces give the distance, closest point, normal and curvature of any query point, exact to round-off. Scenes start
+//! from them, and errors are measured against them.
 
 pub mod domain;
 pub mod fibonacci;

@@ -1,7 +1,7 @@
 //! Neighbor searches.
 //!
-//! A [`CellList`] answers searches around any point. [`Pencils`] serve sums over all pairs of neighbors. [`BruteForce`] looks at every point and is
-//! the reference of both in tests.
+//! A [`CellList`] answers searches around any point. [`Pencils`] serve sums over all pairs of neighbors. [`BruteForce`]
+//! looks at every point and is the reference of both in tests.
 
 pub mod brute_force;
 pub mod cell_list;
@@ -35,6 +35,7 @@ pub trait NeighborSearch<const D: usize> {
         self.for_each_within(x, radius, |index, dx, r2| found.push(Neighbor { r2, index, dx: *dx }));
     }
 
-    /// Index and distance of the nearest point with `r ≤ cutoff`; of equally near points the one with the smallest index.
+    /// Index and distance of the nearest point with `r ≤ cutoff`; of equally near points the one with the smallest
+    /// index.
     fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)>;
 }

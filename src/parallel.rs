@@ -1,7 +1,7 @@
 //! Helpers of parallel loops: workspaces per thread that outlive a loop, and a flag that drops a running step.
 //!
-//! A loop computes each item from inputs that the loop does not change, and writes it once. Results therefore do not depend on the
-//! number of threads or on how they share the items.
+//! A loop computes each item from inputs that the loop does not change, and writes it once. Results therefore do not
+//! depend on the number of threads or on how they share the items.
 
 use rayon::iter::{IndexedParallelIterator, MaxLen};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,8 +12,8 @@ pub const BLOCK: usize = 32;
 
 /// Makes each block of a parallel loop a task of its own.
 ///
-/// By default rayon splits a loop into halves of halves. At the end of a loop the last of these keeps one thread busy while the others
-/// wait.
+/// By default rayon splits a loop into halves of halves. At the end of a loop the last of these keeps one thread busy
+/// while the others wait.
 pub fn one_by_one<I: IndexedParallelIterator>(blocks: I) -> MaxLen<I> {
     blocks.with_max_len(1)
 }
@@ -64,8 +64,8 @@ pub struct PerThread<T> {
     slots: Vec<Slot<T>>,
 }
 
-/// A value with cache lines of its own, so that threads do not wait for each other's writes. Processors fetch lines of 64 bytes in
-/// pairs, hence 128.
+/// A value with cache lines of its own, so that threads do not wait for each other's writes. Processors fetch lines of
+/// 64 bytes in pairs, hence 128.
 #[derive(Debug, Default)]
 #[repr(align(128))]
 struct Slot<T>(Mutex<T>);

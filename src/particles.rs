@@ -1,6 +1,7 @@
 //! Particles as a structure of arrays: positions, and named columns with one value per particle.
 //!
-//! A scheme adds the columns that it needs and keeps their typed keys. Checkpoints and frames go through the columns by name.
+//! A scheme adds the columns that it needs and keeps their typed keys. Checkpoints and frames go through the columns by
+//! name.
 
 use crate::geometry::Vector;
 

@@ -1,7 +1,8 @@
 //! Multivariate polynomials of bounded total degree, and their least-squares fits to scattered values.
 //!
-//! A fit collects a neighborhood, solves a weighted regression and gives a local polynomial with exact derivatives. Four fits are solved at once
-//! in vector lanes where their moments are well conditioned, and one by one by QR otherwise.
+//! A fit collects a neighborhood, solves a weighted regression and gives a local polynomial with exact derivatives.
+//! Four fits are solved at once in vector lanes where their moments are well conditioned, and one by one by QR
+//! otherwise.
 
 pub mod basis;
 pub mod horner;

@@ -1,7 +1,7 @@
 //! Smoothing kernels, one file per kernel.
 //!
-//! A [`SmoothingKernel`] spreads particle values over space. A [`RadialKernel`] is a function of the scaled distance q = r/ε for sums over pairs of
-//! particles, in one lane or several.
+//! A [`SmoothingKernel`] spreads particle values over space. A [`RadialKernel`] is a function of the scaled distance q
+//! = r/ε for sums over pairs of particles, in one lane or several.
 
 pub mod gaussian;
 pub mod lambda44;

@@ -66,7 +66,8 @@ impl<const D: usize> Detection<D> {
 
     /// Finds the particles next to the surface. A level of exactly zero counts as outside.
     ///
-    /// 1. Sort the particles into cells of edge ξ = `threshold`, and mark each cell with the signs in it and in the adjacent cells.
+    /// 1. Sort the particles into cells of edge ξ = `threshold`, and mark each cell with the signs in it and in the
+    ///    adjacent cells.
     /// 2. Look for a particle of the opposite sign within ξ, only for particles in cells with both marks.
     ///
     /// # Errors
@@ -116,8 +117,8 @@ impl<const D: usize> Detection<D> {
         Ok(())
     }
 
-    /// Whether the particle nearest to `x` has a negative level. This tells the side of a point away from the surface, also where the surface
-    /// has gaps.
+    /// Whether the particle nearest to `x` has a negative level. This tells the side of a point away from the surface,
+    /// also where the surface has gaps.
     #[must_use]
     pub fn is_nearest_inside(&self, x: &Vector<D>) -> bool {
         self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.is_inside[i])

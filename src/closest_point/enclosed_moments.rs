@@ -1,8 +1,8 @@
 //! Area or volume inside the surface with its center and second moments, by quadrature on the fitted polynomials.
 //!
-//! A coarse grid covers the samples. Cells away from the surface count completely or not at all. Cells that the surface cuts are halved along every
-//! axis. The smallest cells count the share below the tangent plane at the foot point of their center, corrected by the mean curvature
-//! of the surface over the cell.
+//! A coarse grid covers the samples. Cells away from the surface count completely or not at all. Cells that the surface
+//! cuts are halved along every axis. The smallest cells count the share below the tangent plane at the foot point of
+//! their center, corrected by the mean curvature of the surface over the cell.
 
 use super::level_surface::LevelSurface;
 use crate::geometry::Vector;
@@ -11,7 +11,8 @@ use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
 /// Number of times that a cut cell is halved.
 ///
-/// In 2D, 2⁴ parts leave an error below (h/16)² per length of the cut. In 3D there are fewer, since the number of cut cells grows with the square.
+/// In 2D, 2⁴ parts leave an error below (h/16)² per length of the cut. In 3D there are fewer, since the number of cut
+/// cells grows with the square.
 const fn halvings(dimension: usize) -> u32 {
     if dimension == 2 { 4 } else { 1 }
 }
@@ -158,7 +159,8 @@ fn inside_of_cell<const D: usize>(
     }
     if halvings == 0 {
         let signed = if foot.is_outside { foot.distance } else { -foot.distance };
-        // At the distance ρ the surface is κ ρ²/2 away from its tangent plane, on average κ edge²/24 over a section of the cell.
+        // At the distance ρ the surface is κ ρ²/2 away from its tangent plane, on average κ edge²/24 over a section of
+        // the cell.
         let mean_deviation = (foot.curvature * edge).clamp(-1.0, 1.0) / 24.0;
         add(whole * share_below_plane(&foot.normal, signed / edge + mean_deviation));
         return;
@@ -172,8 +174,8 @@ fn inside_of_cell<const D: usize>(
 
 /// Share of the unit cube, centered at the origin, with n·x + s < 0, where s = `signed`.
 ///
-/// Inclusion and exclusion over the corners c gives Σ ± max(0, −s − n·c)^D / (D! Π n_d) for positive components of the normal. Components near
-/// zero are raised to 1e-4 to keep the formula stable, which costs an error of that size.
+/// Inclusion and exclusion over the corners c gives Σ ± max(0, −s − n·c)^D / (D! Π n_d) for positive components of the
+/// normal. Components near zero are raised to 1e-4 to keep the formula stable, which costs an error of that size.
 fn share_below_plane<const D: usize>(normal: &Vector<D>, signed: f64) -> f64 {
     let n = normal.map(|c| c.abs().max(1e-4));
     let total: f64 = n.sum();

@@ -17,7 +17,8 @@ pub enum LevelSurface<const D: usize> {
     Material(Box<MaterialSurface<D>>),
 }
 
-/// Distance from the surface, in multiples of h, beyond which the nearest particle decides on which side a point lies, not the foot point.
+/// Distance from the surface, in multiples of h, beyond which the nearest particle decides on which side a point lies,
+/// not the foot point.
 const FAR: f64 = 2.0;
 
 macro_rules! each {
@@ -30,7 +31,8 @@ macro_rules! each {
 }
 
 impl<const D: usize> LevelSurface<D> {
-    /// First step of a rebuild: detection of the particles next to the surface. In material coordinates they never change.
+    /// First step of a rebuild: detection of the particles next to the surface. In material coordinates they never
+    /// change.
     ///
     /// # Errors
     /// [`Interrupted`] when the interrupt is raised.
@@ -98,9 +100,9 @@ impl<const D: usize> LevelSurface<D> {
 
     /// Whether the point `x` with the closest point `foot` lies inside.
     ///
-    /// Away from a surface with fits in space, the nearest particle decides, because a foot point at the rim of a gap has an arbitrary
-    /// normal. A surface in material coordinates has sample points wherever the flow has stretched it, while particles may be far apart.
-    /// There the foot point decides.
+    /// Away from a surface with fits in space, the nearest particle decides, because a foot point at the rim of a gap
+    /// has an arbitrary normal. A surface in material coordinates has sample points wherever the flow has stretched it,
+    /// while particles may be far apart. There the foot point decides.
     #[must_use]
     pub fn is_inside(&self, x: &Vector<D>, foot: &ClosestPoint<D>) -> bool {
         match self {

@@ -1,8 +1,8 @@
 //! The surface from fits in material coordinates, for particles whose levels were never overwritten.
 //!
-//! If a flow carries the particles and they keep their levels ψ, then ψ and the position x are smooth functions of the initial position X,
-//! however distorted the present distribution is. The neighbors in initial positions never change, and the two sheets of a filament remain
-//! separate. The chain rule gives the level set in space:
+//! If a flow carries the particles and they keep their levels ψ, then ψ and the position x are smooth functions of the
+//! initial position X, however distorted the present distribution is. The neighbors in initial positions never change,
+//! and the two sheets of a filament remain separate. The chain rule gives the level set in space:
 //!
 //! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹,
 //!
@@ -249,7 +249,8 @@ impl<const D: usize> MaterialSurface<D> {
         self.spot(patch, fit, &material).map(|spot| Seed { patch, material, spot })
     }
 
-    /// Finds the seeds of a patch: its projected center, and points along the surface every h where the flow has stretched it.
+    /// Finds the seeds of a patch: its projected center, and points along the surface every h where the flow has
+    /// stretched it.
     fn find_seeds(&self, patch: usize, seeds: &mut Vec<Seed<D>>) {
         seeds.clear();
         let Some(fit) = &self.fits[patch] else { return };
@@ -288,8 +289,9 @@ impl<const D: usize> MaterialSurface<D> {
 
     /// The closest point for a query whose nearest seed lies at the given distance.
     ///
-    /// Newton's method starts from the nearest seed. If it leaves the fit, it continues from the seed nearest to the iterate. If the foot point
-    /// is farther away than the nearest seed, or if there is none, the result is the seed itself.
+    /// Newton's method starts from the nearest seed. If it leaves the fit, it continues from the seed nearest to the
+    /// iterate. If the foot point is farther away than the nearest seed, or if there is none, the result is the seed
+    /// itself.
     fn solve(&self, nearest: usize, distance: f64, x: &Vector<D>, query_counts: &mut QueryCounts) -> ClosestPoint<D> {
         query_counts.queries += 1;
         let mut current = nearest;
@@ -315,7 +317,8 @@ impl<const D: usize> MaterialSurface<D> {
         closest_point(x, point, jet, true)
     }
 
-    /// The closest point on the fit of a seed. The error is the position where the iteration left the fit, or None where it did not converge.
+    /// The closest point on the fit of a seed. The error is the position where the iteration left the fit, or None
+    /// where it did not converge.
     fn newton(
         &self,
         seed: &Seed<D>,

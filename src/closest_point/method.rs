@@ -43,7 +43,8 @@ pub enum NeighborhoodChoice {
         /// Number n_n of particles.
         count: usize,
     },
-    /// The nearest `count` particles in initial positions, in which the fits are made. Levels must never have been overwritten.
+    /// The nearest `count` particles in initial positions, in which the fits are made. Levels must never have been
+    /// overwritten.
     Material {
         /// Number n_n of particles.
         count: usize,
@@ -77,20 +78,23 @@ impl PcpMethod {
         cutoff.max(radius_of_count::<D>(self.minimum_ratio * terms))
     }
 
-    /// Half width, in multiples of h, of the band of particles that take part in fits when particles are evenly distributed.
+    /// Half width, in multiples of h, of the band of particles that take part in fits when particles are evenly
+    /// distributed.
     #[must_use]
     pub fn even_fit_band_h<const D: usize>(&self) -> f64 {
         self.sample_threshold_h + self.even_cutoff_h::<D>()
     }
 
-    /// Half width, in multiples of h, of the band of particles that can take part in fits, growth of the radius included.
+    /// Half width, in multiples of h, of the band of particles that can take part in fits, growth of the radius
+    /// included.
     #[must_use]
     pub fn fit_band_h<const D: usize>(&self) -> f64 {
         // One and a half times the radius of an even distribution leaves room for the growth of a sparse neighborhood.
         self.sample_threshold_h + 1.5 * self.even_cutoff_h::<D>() + 1.0
     }
 
-    /// Length by which a foot point may seem farther than the sample point because of rounding and tolerance, for a query at `x`.
+    /// Length by which a foot point may seem farther than the sample point because of rounding and tolerance, for a
+    /// query at `x`.
     #[must_use]
     pub fn slack<const D: usize>(&self, x: &Vector<D>) -> f64 {
         self.tolerance.max(16.0 * f64::EPSILON * x.amax())

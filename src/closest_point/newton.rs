@@ -1,9 +1,10 @@
 //! The closest point on the zero of a local polynomial p by a safeguarded Newton method (PCP eqs. 10 to 14).
 //!
-//! The Newton system of the Lagrangian splits into a part along the normal n = ∇p/‖∇p‖ and one in the tangent plane. The normal step is −p/‖∇p‖. The
-//! tangential step has the reduced Hessian I + λ tᵢ·∇∇p·tⱼ with the least-squares multiplier λ (docs/errata.md, PCP 12). The pivots of the
-//! reduced Hessian stay above a floor, and a step is at most a fraction of the support, so that the iteration cannot diverge. Near the solution
-//! both bounds are inactive and convergence is quadratic.
+//! The Newton system of the Lagrangian splits into a part along the normal n = ∇p/‖∇p‖ and one in the tangent plane.
+//! The normal step is −p/‖∇p‖. The tangential step has the reduced Hessian I + λ tᵢ·∇∇p·tⱼ with the least-squares
+//! multiplier λ (docs/errata.md, PCP 12). The pivots of the reduced Hessian stay above a floor, and a step is at most a
+//! fraction of the support, so that the iteration cannot diverge. Near the solution both bounds are inactive and
+//! convergence is quadratic.
 
 use super::method::PcpMethod;
 use crate::geometry::Vector;
@@ -54,8 +55,8 @@ const PIVOT_FLOOR: f64 = 0.1;
 pub(super) const LONGEST_STEP: f64 = 0.4;
 /// A stalled iteration has converged when its last step is shorter than this fraction of the support's radius.
 pub(super) const ACCEPTED: f64 = 1e-7;
-/// A step is the last one when it is shorter than this fraction of the support's radius and than [`QUADRATIC_RATIO`] of the step before.
-/// Convergence is then quadratic, and the next step would be shorter than the square of this one.
+/// A step is the last one when it is shorter than this fraction of the support's radius and than [`QUADRATIC_RATIO`] of
+/// the step before. Convergence is then quadratic, and the next step would be shorter than the square of this one.
 const QUADRATIC: f64 = 3e-8;
 /// See [`QUADRATIC`].
 const QUADRATIC_RATIO: f64 = 1e-2;
@@ -210,7 +211,8 @@ impl<const D: usize> LaneIterations<D> {
         converged
     }
 
-    /// Stores the foot points of the converged lanes. They are one last step away from `x`, where the jet was evaluated.
+    /// Stores the foot points of the converged lanes. They are one last step away from `x`, where the jet was
+    /// evaluated.
     #[inline(always)]
     fn store(&mut self, converged: &[bool; LANES], x: &[Lanes; D], step: &[Lanes; D], jet: &Jet<Lanes, D>) {
         let jet = jet.translated(step);
@@ -255,8 +257,8 @@ fn largest_coordinates<const D: usize>(x: &[Lanes; D]) -> [f64; LANES] {
 
 /// The Newton step at a point for the offset `query − x`. It is not finite where the gradient vanishes.
 ///
-/// With the unit normal n and the multiplier λ = offset·n/‖∇p‖, the normal step is −p/‖∇p‖ n. The tangential step solves the
-/// reduced system with the matrix tᵢ·(I + λ∇∇p)·tⱼ, whose pivots are at least [`PIVOT_FLOOR`].
+/// With the unit normal n and the multiplier λ = offset·n/‖∇p‖, the normal step is −p/‖∇p‖ n. The tangential step
+/// solves the reduced system with the matrix tᵢ·(I + λ∇∇p)·tⱼ, whose pivots are at least [`PIVOT_FLOOR`].
 #[inline(always)]
 pub(super) fn newton_step<T: Number, const D: usize>(jet: &Jet<T, D>, offset: &[T; D]) -> [T; D] {
     let floor = T::splat(PIVOT_FLOOR);
@@ -286,8 +288,8 @@ pub(super) fn newton_step<T: Number, const D: usize>(jet: &Jet<T, D>, offset: &[
     add_scaled(&step, along_s, &s)
 }
 
-/// Unit vectors that span the tangent plane of the unit normal n, without branches (Duff 2017). The second one is zero in two
-/// dimensions.
+/// Unit vectors that span the tangent plane of the unit normal n, without branches (Duff 2017). The second one is zero
+/// in two dimensions.
 #[inline(always)]
 pub(super) fn tangents<T: Number, const D: usize>(n: &[T; D]) -> ([T; D], [T; D]) {
     let zero = T::splat(0.0);
@@ -336,7 +338,8 @@ mod tests {
 
     #[test]
     fn one_step_from_the_pole_of_a_paraboloid_is_newtons() {
-        // p = z + (a x² + b y²)/2 at the origin and the query (u, v, w) give the tangential steps u/(1 + w a) and v/(1 + w b).
+        // p = z + (a x² + b y²)/2 at the origin and the query (u, v, w) give the tangential steps u/(1 + w a) and v/(1
+        // + w b).
         let (a, b) = (0.7, -0.4);
         let jet =
             Jet { value: 0.0, gradient: [0.0, 0.0, 1.0], hessian: [[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, 0.0]] };

@@ -44,10 +44,11 @@ pub fn project<T, const D: usize>(
         }
         let mut step = gradient * (-value / slope);
         let length = step.norm();
-        // Round-off may keep the residual above the tolerance. The iteration also ends when tiny steps do not get shorter.
+        // Round-off may keep the residual above the tolerance. The iteration also ends when tiny steps do not get
+        // shorter.
         let is_stalled = length <= ACCEPTED * fit.radius && length >= 0.5 * last;
-        // Convergence is quadratic: the next step would be shorter than the square of this one. Nor can coordinates change by less than
-        // their last bit.
+        // Convergence is quadratic: the next step would be shorter than the square of this one. Nor can coordinates
+        // change by less than their last bit.
         let is_quadratic = length <= ACCEPTED * fit.radius && length <= 1e-2 * last;
         if length <= method.tolerance || is_stalled || is_quadratic || length <= f64::EPSILON * x.amax() {
             return Some(Projected { x, step, found });

@@ -31,8 +31,10 @@ pub struct ClosestPoint<const D: usize> {
 
 /// The zero of a level set on particles: sample points with their polynomials.
 ///
-/// 1. [`Self::detect`] and [`Self::fit_samples`] rebuild the surface: detection of near-surface particles, regression, projection.
-/// 2. [`Self::closest_points`](super::queries) or [`Self::query`] find closest points: nearest sample, Newton's method, fallbacks.
+/// 1. [`Self::detect`] and [`Self::fit_samples`] rebuild the surface: detection of near-surface particles, regression,
+///    projection.
+/// 2. [`Self::closest_points`](super::queries) or [`Self::query`] find closest points: nearest sample, Newton's method,
+///    fallbacks.
 ///
 /// All memory is reused. A rebuild allocates only when numbers of particles or samples grow.
 ///
@@ -175,10 +177,12 @@ impl<const D: usize> Redistancing<D> {
         self.detection.rebuild(positions, level, threshold, interrupt)
     }
 
-    /// Second step of a rebuild: fits polynomials around the near-surface particles and projects the particles onto the surface.
+    /// Second step of a rebuild: fits polynomials around the near-surface particles and projects the particles onto the
+    /// surface.
     ///
-    /// `normals` are those of the last redistancing, zero where they are unknown. With [`PcpMethod::same_branch`], only particles whose normals
-    /// agree with the normal of the fit's center take part in a fit. This separates the two sheets of a filament.
+    /// `normals` are those of the last redistancing, zero where they are unknown. With [`PcpMethod::same_branch`], only
+    /// particles whose normals agree with the normal of the fit's center take part in a fit. This separates the two
+    /// sheets of a filament.
     ///
     /// # Errors
     /// [`Interrupted`] when the interrupt is raised.
@@ -256,7 +260,8 @@ impl<const D: usize> Redistancing<D> {
         foot[0]
     }
 
-    /// The nearest sample within `cutoff` and its squared distance, for a sequence of queries. A search starts from the sample `last`.
+    /// The nearest sample within `cutoff` and its squared distance, for a sequence of queries. A search starts from the
+    /// sample `last`.
     pub(super) fn nearest_sample(&self, x: &Vector<D>, cutoff: f64, last: &mut Option<usize>) -> Option<(usize, f64)> {
         self.sample_cells.nearest_next(x, cutoff, last, |sample| self.samples[sample].point)
     }
@@ -274,7 +279,8 @@ impl<const D: usize> Redistancing<D> {
         point + self.domain.displacement(&point, x)
     }
 
-    /// Writes the closest points of up to [`LANES`] points to `feet`. All points have the same nearest sample, at the given distances.
+    /// Writes the closest points of up to [`LANES`] points to `feet`. All points have the same nearest sample, at the
+    /// given distances.
     pub(super) fn solve(
         &self,
         nearest: usize,
@@ -318,7 +324,8 @@ impl<const D: usize> Redistancing<D> {
         })
     }
 
-    /// Continues with the sample nearest to `at`, where the iterate left the support of a polynomial, up to [`MAX_SAMPLE_CHANGES`] times.
+    /// Continues with the sample nearest to `at`, where the iterate left the support of a polynomial, up to
+    /// [`MAX_SAMPLE_CHANGES`] times.
     fn continue_from_another_sample(
         &self,
         from: usize,
@@ -364,8 +371,8 @@ impl<const D: usize> Redistancing<D> {
         }
     }
 
-    /// Whether the particle nearest to `x` has a negative level. This tells the side of a point away from the surface, also where the surface
-    /// has gaps.
+    /// Whether the particle nearest to `x` has a negative level. This tells the side of a point away from the surface,
+    /// also where the surface has gaps.
     #[must_use]
     pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
         self.detection.is_nearest_inside(x)
@@ -381,7 +388,8 @@ impl<const D: usize> Redistancing<D> {
 /// Edge of the cells of the sample points, in multiples of h.
 const SAMPLE_CELL: f64 = 3.0;
 
-/// Counts of a block of queries. They are added to the total at once, so that threads do not compete for its cache lines.
+/// Counts of a block of queries. They are added to the total at once, so that threads do not compete for its cache
+/// lines.
 #[derive(Debug, Default)]
 pub(super) struct QueryCounts {
     pub(super) queries: u64,

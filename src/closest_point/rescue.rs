@@ -58,12 +58,13 @@ counters! {
     enlarged => "fits.larger_radius",
     /// Fits of a lower degree than the method's.
     lowered => "fits.lower_degree",
-    /// Fits by orthogonal decomposition in place of moments, because of too few neighbors, a small pivot or values that are not finite.
+    /// Fits by orthogonal decomposition in place of moments, because of too few neighbors, a small pivot or values that
+    /// are not finite.
     decomposed => "fits.orthogonal",
     /// Near-surface particles without a fit.
     unfitted => "fits.none",
-    /// Fits whose zero was not reached, so that there is no sample. In initial positions also points of a stretched patch that were not
-    /// reached or were too many.
+    /// Fits whose zero was not reached, so that there is no sample. In initial positions also points of a stretched
+    /// patch that were not reached or were too many.
     unprojected => "samples.not_projected",
     /// Number of queries.
     queries => "queries",

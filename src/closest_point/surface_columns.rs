@@ -1,6 +1,7 @@
 //! Columns of particles that describe the surface (PCP 3.3 and 3.4).
 //!
-//! These are the signed distance, the closest point, normal and curvature there, and whether a particle lies in the narrow band.
+//! These are the signed distance, the closest point, normal and curvature there, and whether a particle lies in the
+//! narrow band.
 
 use super::queries::ClosestPoints;
 use super::redistancing::ClosestPoint;
@@ -49,7 +50,8 @@ impl SurfaceColumns {
         .find_map(|(name, particle)| particle.map(|particle| (name, particle)))
     }
 
-    /// Writes the closest point of particle `i`. The sign of the distance is that of the particle's `level` (PCP eq. 15).
+    /// Writes the closest point of particle `i`. The sign of the distance is that of the particle's `level` (PCP eq.
+    /// 15).
     pub fn write<const D: usize>(
         &self,
         particles: &mut Particles<D>,
@@ -72,7 +74,8 @@ impl SurfaceColumns {
         results: &ClosestPoints<D>,
         half_band: f64,
     ) {
-        // A particle that leaves the band keeps its last normal. A stale normal separates branches better than none (measured).
+        // A particle that leaves the band keeps its last normal. A stale normal separates branches better than none
+        // (measured).
         particles.flag_mut(self.in_band).fill(0);
         for (i, closest) in results.iter().filter(|(_, a)| a.distance <= half_band) {
             particles.flag_mut(self.in_band)[i] = 1;

@@ -36,7 +36,8 @@ pub trait Flow<const D: usize>: Send + Sync {
     /// Velocity u(x, t).
     fn velocity(&self, x: &Vector<D>, time: f64) -> Vector<D>;
 
-    /// An upper bound of |u| at all times over the points that start in the box from `low` to `high`. It limits time steps.
+    /// An upper bound of |u| at all times over the points that start in the box from `low` to `high`. It limits time
+    /// steps.
     fn top_speed(&self, low: &Vector<D>, high: &Vector<D>) -> f64;
 
     /// Position that a rigid motion gives `x` after `duration`, by its formula; None where the motion is not rigid.

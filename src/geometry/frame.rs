@@ -1,7 +1,7 @@
 //! Orthonormal frames at a point of a surface or a curve.
 //!
-//! A frame splits space into tangents and normals. A surface of D − 1 dimensions has one normal. A curve in space has one tangent and two
-//! normals.
+//! A frame splits space into tangents and normals. A surface of D − 1 dimensions has one normal. A curve in space has
+//! one tangent and two normals.
 
 use super::Vector;
 

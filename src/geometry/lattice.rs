@@ -4,7 +4,8 @@ use super::Vector;
 use super::random::CounterRandom;
 use crate::parallel::Interrupt;
 
-/// The lattice `x_m = (m + offset) h + α h μ_m` with random numbers `μ_m ~ U[−1, 1]^D` that depend on the seed and m alone.
+/// The lattice `x_m = (m + offset) h + α h μ_m` with random numbers `μ_m ~ U[−1, 1]^D` that depend on the seed and m
+/// alone.
 ///
 /// ```
 /// use meniscus::{geometry::{Vector, lattice::Lattice}, parallel::Interrupt};
@@ -30,9 +31,9 @@ pub struct Lattice {
 impl Lattice {
     /// All lattice points within `cutoff` of the surface with the given `distance`, x running fastest.
     ///
-    /// The box from `low` to `high` must contain every node that can belong to the band. A distance function changes by no more than the
-    /// distance between two points, so nodes far from the band are skipped. An interrupt ends the search early, with the points
-    /// found so far.
+    /// The box from `low` to `high` must contain every node that can belong to the band. A distance function changes by
+    /// no more than the distance between two points, so nodes far from the band are skipped. An interrupt ends the
+    /// search early, with the points found so far.
     #[must_use]
     pub fn points_near<const D: usize>(
         &self,

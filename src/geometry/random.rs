@@ -1,7 +1,7 @@
 //! Random numbers by counter: a value depends on the seed and its counters alone.
 //!
-//! Neither the order of evaluation nor the number of threads can therefore change a scene. The mixing function is the finalizer of
-//! SplitMix64 (key "SplitMix64" of the bibliography).
+//! Neither the order of evaluation nor the number of threads can therefore change a scene. The mixing function is the
+//! finalizer of SplitMix64 (key "SplitMix64" of the bibliography).
 
 /// A keyed source of uniform random numbers without state.
 ///

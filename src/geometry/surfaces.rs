@@ -1,7 +1,7 @@
 //! Analytic surfaces with exact distance, closest point, normal and curvature, one file per shape.
 //!
-//! Scenes start from these surfaces, and errors are measured against them. Signed distances are positive outside, and normals point outward.
-//! The curvature is ∇·n: 1/R on a circle, 2/R on a sphere.
+//! Scenes start from these surfaces, and errors are measured against them. Signed distances are positive outside, and
+//! normals point outward. The curvature is ∇·n: 1/R on a circle, 2/R on a sphere.
 
 pub mod ball;
 pub mod cuboid;
@@ -72,7 +72,8 @@ pub trait Surface<const D: usize>: Send + Sync {
     }
 }
 
-/// Points at most `spacing` apart on an elliptic arc with the given semi-axes, from the angle `from` to the angle `to` (rad), both included.
+/// Points at most `spacing` apart on an elliptic arc with the given semi-axes, from the angle `from` to the angle `to`
+/// (rad), both included.
 pub(crate) fn arc_points<const D: usize>(
     center: &Vector<D>,
     semi_axes: [f64; 2],

@@ -1,6 +1,8 @@
-//! Iterative solution of large sparse systems A x = b with an incomplete factorization as preconditioner, one file per method.
+//! Iterative solution of large sparse systems A x = b with an incomplete factorization as preconditioner, one file per
+//! method.
 //!
-//! The methods judge themselves by the true residual. They start again from it when the residual of their recurrence was too optimistic.
+//! The methods judge themselves by the true residual. They start again from it when the residual of their recurrence
+//! was too optimistic.
 
 pub mod bicgstab;
 pub mod gmres;
@@ -115,8 +117,8 @@ pub struct Convergence {
 
 /// Residuals up to this multiple of ε ‖A‖∞ ‖x‖/‖b‖ count as rounding.
 ///
-/// Measured: direct and iterative solutions on lines and circles of 20,000 and 30,000 points end at 0.2 to 0.6 of that. A solution that
-/// only the recurrence took for converged was at 1,000.
+/// Measured: direct and iterative solutions on lines and circles of 20,000 and 30,000 points end at 0.2 to 0.6 of that.
+/// A solution that only the recurrence took for converged was at 1,000.
 const ROUNDING: f64 = 4.0;
 /// A restart stagnates when it leaves more than this share of the true residual of the restart before.
 const STAGNATION: f64 = 0.5;
@@ -124,8 +126,8 @@ const STAGNATION: f64 = 0.5;
 impl Convergence {
     /// Whether the tolerance is met.
     ///
-    /// A factor of ten allows for the difference between the residual of the recurrence and the true one. The floor allows for the rounding of
-    /// A x, below which no solver gets.
+    /// A factor of ten allows for the difference between the residual of the recurrence and the true one. The floor
+    /// allows for the rounding of A x, below which no solver gets.
     #[must_use]
     pub fn is_within(&self, stopping: Stopping) -> bool {
         self.residual <= 10.0 * stopping.tolerance + self.floor

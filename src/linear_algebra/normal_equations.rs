@@ -1,7 +1,7 @@
 //! Symmetric positive definite systems of equal size, one in each vector lane, by L D Lᵀ.
 //!
-//! Regressions with moderately conditioned matrices are solved this way at a fraction of the cost of an orthogonal decomposition. Normal
-//! equations square the condition number. The pivots show how many digits that costs.
+//! Regressions with moderately conditioned matrices are solved this way at a fraction of the cost of an orthogonal
+//! decomposition. Normal equations square the condition number. The pivots show how many digits that costs.
 
 use super::number::Lanes;
 
@@ -39,8 +39,8 @@ impl LaneSystems {
 
     /// Factorizes all matrices in place and returns the smallest pivot ratio d_i/G_ii of each lane.
     ///
-    /// The ratio measures how far a column is from a combination of the columns before it. A matrix with a ratio that is zero, negative
-    /// or NaN is rank-deficient.
+    /// The ratio measures how far a column is from a combination of the columns before it. A matrix with a ratio that
+    /// is zero, negative or NaN is rank-deficient.
     pub fn factorize(&mut self) -> Lanes {
         let n = self.size;
         let one = Lanes::splat(1.0);

@@ -1,6 +1,7 @@
 //! Numbers of hot loops: a single `f64`, or several side by side in a vector register.
 //!
-//! One implementation of a formula serves both. The result of a lane does not depend on its position or on the other lanes, to the last bit.
+//! One implementation of a formula serves both. The result of a lane does not depend on its position or on the other
+//! lanes, to the last bit.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

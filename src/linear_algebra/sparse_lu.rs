@@ -9,8 +9,8 @@ use faer::sparse::{SparseColMat, Triplet};
 
 /// The decomposition of A, or of A + α 1 1ᵀ/n for a matrix A that maps constants to zero.
 ///
-/// The second matrix is dense. Instead, A is decomposed with β added to its first diagonal entry, which makes it regular. Woodbury's formula then
-/// accounts for both changes of rank one.
+/// The second matrix is dense. Instead, A is decomposed with β added to its first diagonal entry, which makes it
+/// regular. Woodbury's formula then accounts for both changes of rank one.
 ///
 /// ```
 /// use meniscus::linear_algebra::{SparseRows, sparse_lu::SparseLu};

@@ -74,7 +74,8 @@ impl SparseRows {
         (&self.columns[row.clone()], &self.weights[row])
     }
 
-    /// The same matrix with the columns of every row in ascending order and each column once; repeated entries are added up.
+    /// The same matrix with the columns of every row in ascending order and each column once; repeated entries are
+    /// added up.
     #[must_use]
     pub fn sorted(&self) -> Self {
         let mut sorted = Self {

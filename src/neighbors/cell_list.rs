@@ -1,7 +1,8 @@
 //! Cell list: points sorted by their cell in a Cartesian grid (Quentrec 1973).
 //!
-//! The index x runs fastest, so that the points of adjacent cells in a row form one contiguous range. Along periodic axes the grid divides the
-//! period into whole cells, and rows wrap around. Along the other axes it covers the bounding box of the points. A rebuild reuses all memory.
+//! The index x runs fastest, so that the points of adjacent cells in a row form one contiguous range. Along periodic
+//! axes the grid divides the period into whole cells, and rows wrap around. Along the other axes it covers the bounding
+//! box of the points. A rebuild reuses all memory.
 
 use super::{Neighbor, NeighborSearch};
 use crate::geometry::domain::Axis;
@@ -233,7 +234,8 @@ impl<const D: usize> CellList<D> {
         }
     }
 
-    /// Calls `visit` with the ranges of sorted slots of a span of cells in a row: one, or two where the span wraps around.
+    /// Calls `visit` with the ranges of sorted slots of a span of cells in a row: one, or two where the span wraps
+    /// around.
     #[inline(always)]
     fn for_each_part(&self, base: usize, span: (i64, i64), mut visit: impl FnMut(usize, usize)) {
         if span.0 > span.1 {
@@ -349,7 +351,8 @@ impl<const D: usize> CellList<D> {
         &self.starts
     }
 
-    /// Whether any point within `radius` has a slot that fulfills the condition. The search ends at the first such point.
+    /// Whether any point within `radius` has a slot that fulfills the condition. The search ends at the first such
+    /// point.
     pub fn any_within(&self, x: &Vector<D>, radius: f64, condition: impl Fn(usize) -> bool) -> bool {
         let x = self.wrap(*x);
         let limit = radius * radius;
@@ -364,7 +367,8 @@ impl<const D: usize> CellList<D> {
         found
     }
 
-    /// Gives every cell the union (bitwise or) of its own marks and those of the adjacent cells. `before` is a scratch buffer.
+    /// Gives every cell the union (bitwise or) of its own marks and those of the adjacent cells. `before` is a scratch
+    /// buffer.
     pub fn spread_marks(&self, marks: &mut Vec<u8>, before: &mut Vec<u8>) {
         let mut stride = 1;
         for d in 0..D {
@@ -386,7 +390,8 @@ impl<const D: usize> CellList<D> {
 
     /// Index and squared distance of the nearest point, given a `known` point with its squared distance.
     ///
-    /// Rows and cells farther away than the best point so far are skipped. Of equally near points the one with the smallest index is returned.
+    /// Rows and cells farther away than the best point so far are skipped. Of equally near points the one with the
+    /// smallest index is returned.
     #[must_use]
     pub fn nearest_from(&self, x: &Vector<D>, known: (usize, f64)) -> (usize, f64) {
         let x = self.wrap(*x);

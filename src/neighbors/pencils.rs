@@ -1,12 +1,14 @@
 //! Lists of neighbor pairs for sums in vector lanes.
 //!
-//! The points of a periodic box are sorted into pencils along x (stripes in the plane), and by x within each pencil. The neighbors of a
-//! point are then a few contiguous ranges of slots, which are cut into groups of [`GROUP`] slots. Each pair is listed once, by the point
-//! that comes first in the order. The box is closed to a ring along its last axis. A sum adds to both points of a pair.
+//! The points of a periodic box are sorted into pencils along x (stripes in the plane), and by x within each pencil.
+//! The neighbors of a point are then a few contiguous ranges of slots, which are cut into groups of [`GROUP`] slots.
+//! Each pair is listed once, by the point that comes first in the order. The box is closed to a ring along its last
+//! axis. A sum adds to both points of a pair.
 //!
-//! A loop over groups needs no condition. The last group of a range may contain points beyond the cutoff, whose kernel is zero, or padding slots,
-//! with which every pencil ends. Periodic images are not copied: a group comes with the period by which its point must be shifted. A list is valid
-//! while no point has moved by more than half the skin. The order depends only on the positions from which it was built.
+//! A loop over groups needs no condition. The last group of a range may contain points beyond the cutoff, whose kernel
+//! is zero, or padding slots, with which every pencil ends. Periodic images are not copied: a group comes with the
+//! period by which its point must be shifted. A list is valid while no point has moved by more than half the skin. The
+//! order depends only on the positions from which it was built.
 
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
@@ -22,7 +24,8 @@ pub use slabs::Window;
 pub const GROUP: usize = 4;
 /// Index that marks a padding slot.
 const EMPTY_SLOT: u32 = u32::MAX;
-/// Number of pencils per cutoff radius. More pencils follow the round support more closely, fewer are longer. The values are measured.
+/// Number of pencils per cutoff radius. More pencils follow the round support more closely, fewer are longer. The
+/// values are measured.
 const fn pencils_per_cutoff(dimension: usize) -> f64 {
     if dimension == 2 { 3.0 } else { 2.0 }
 }
@@ -126,7 +129,8 @@ impl<const D: usize> Pencils<D> {
     /// Empty pencils in a box that is periodic along every axis, for neighbors within `cutoff`.
     ///
     /// # Errors
-    /// [`BoxTooSmall`] when a point could be a neighbor of two images of another point. An axis that is not periodic counts as length 0.
+    /// [`BoxTooSmall`] when a point could be a neighbor of two images of another point. An axis that is not periodic
+    /// counts as length 0.
     pub fn new(domain: &Domain<D>, cutoff: f64) -> Result<Self, BoxTooSmall> {
         let mut low = Vector::<D>::zeros();
         let mut lengths = Vector::<D>::zeros();
@@ -268,7 +272,8 @@ impl<const D: usize> Pencils<D> {
         let own: [i64; D] = std::array::from_fn(|d| {
             (((x[d] - self.low[d]) / self.edges[d]).max(0.0) as i64).min(self.counts[d] as i64 - 1)
         });
-        // First the rest of the slot's own pencil. Then those pencils whose offset is positive along the last axis where it is not zero.
+        // First the rest of the slot's own pencil. Then those pencils whose offset is positive along the last axis
+        // where it is not zero.
         let mut offset = [0; D];
         loop {
             self.add_pencil(slot, &own, &offset, first_run, found);
@@ -381,7 +386,8 @@ mod tests {
                 let i = points_in_slots[slot].unwrap();
                 for (shift, groups) in near.runs() {
                     let x = points[i] + shift;
-                    // A point that a group contains beyond its range is farther away than the cutoff. Otherwise it would be found twice.
+                    // A point that a group contains beyond its range is farther away than the cutoff. Otherwise it
+                    // would be found twice.
                     for other in groups.iter().flat_map(|first| *first as usize..*first as usize + GROUP) {
                         if let Some(j) = points_in_slots[other].filter(|j| (x - points[*j]).norm() <= cutoff) {
                             met.lock().unwrap().push((i.min(j), i.max(j)));

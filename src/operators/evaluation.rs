@@ -1,4 +1,4 @@
-//! Functionals of fields at once, without rows: for points that move, whose weights are used a single time.
+//! Evaluation of functionals without rows, for moving points, whose weights are used only once.
 
 use super::basis::Basis;
 use super::charts::{Chart, Functional, Node};
@@ -8,7 +8,7 @@ use crate::parallel::{Interrupt, Interrupted, PerThread};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
 use std::sync::{Mutex, PoisonError};
 
-/// Fits of one degree with the storage of all threads.
+/// Functionals with one support, and the workspaces of all threads.
 pub struct Evaluation<const M: usize> {
     basis: Basis<M>,
     support: Support,
@@ -16,27 +16,29 @@ pub struct Evaluation<const M: usize> {
     workspace: PerThread<(Workspace<M>, FitOutcome<M>)>,
 }
 
-/// Fields that are evaluated at a time, at most.
+/// Largest number of fields that are evaluated together.
 pub const MAX_FIELDS: usize = 4;
 
 impl<const M: usize> Evaluation<M> {
-    /// Of functionals.
+    /// The evaluation of functionals with fits of the given support.
     #[must_use]
     pub fn new(support: Support, functionals: Vec<Functional<M>>) -> Self {
         Self { basis: Basis::new(support.degree), support, functionals, workspace: PerThread::new() }
     }
 
-    /// Numbers of a point for so many fields.
+    /// Number of results per point for a number of fields.
     #[must_use]
     pub fn numbers(&self, fields: usize) -> usize {
         self.functionals.len() * fields
     }
 
-    /// Q_k f at every point of the chart: functional by functional, and in it field by field. Fields beyond
-    /// [`MOST_FIELDS`] are left out.
+    /// Writes the functionals of all fields at every point of the chart to `out`.
+    ///
+    /// The results of a point are ordered by functional, then by field. Fields beyond [`MAX_FIELDS`] are ignored.
+    /// Results of a point whose moment conditions cannot be met are NaN.
     ///
     /// # Errors
-    /// [`Interrupted`].
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn evaluate(
         &self,
         chart: &dyn Chart<M>,
@@ -47,16 +49,16 @@ impl<const M: usize> Evaluation<M> {
         let fields = &fields[..fields.len().min(MAX_FIELDS)];
         let numbers = self.numbers(fields.len());
         let fits = Fits { chart, basis: &self.basis, radius: self.support.radius, functionals: &self.functionals };
-        let fit_diagnostics = Mutex::new(SupportDiagnostics::none());
+        let fit_diagnostics = Mutex::new(SupportDiagnostics::default());
         out.par_chunks_mut(BLOCK * numbers).enumerate().with_min_len(1).for_each(|(block, out)| {
             self.workspace.with(|(workspace, outcome)| {
-                outcome.fit_diagnostics = SupportDiagnostics::none();
+                outcome.fit_diagnostics = SupportDiagnostics::default();
                 outcome.heights.clear();
                 let first = block * BLOCK;
                 let mut sums = Sums { first, fields, numbers, out };
                 let points = first..first + sums.out.len() / numbers;
                 fits.run(points, interrupt, workspace, &mut sums, outcome);
-                // Counts and a minimum: the order of adding does not matter.
+                // The order in which counts and a minimum are combined does not matter.
                 fit_diagnostics.lock().unwrap_or_else(PoisonError::into_inner).add(&outcome.fit_diagnostics);
             });
         });
@@ -65,7 +67,7 @@ impl<const M: usize> Evaluation<M> {
     }
 }
 
-/// Σ w_j (f_j − f_i) as weights come.
+/// Receives the weights of fits and writes the sums Σ_j w_j (f_j − f_i).
 struct Sums<'a> {
     first: usize,
     fields: &'a [&'a [f64]],
@@ -76,7 +78,7 @@ struct Sums<'a> {
 impl<const M: usize> RowSink<M> for Sums<'_> {
     fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>) {
         let count = self.fields.len();
-        // What is not known must not look like a number.
+        // An unknown value must not look like a number.
         let mut sums = [f64::NAN; MAX_FIELDS];
         if let Some((weights, lane)) = weights {
             let mut own = [0.0; MAX_FIELDS];

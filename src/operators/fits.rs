@@ -1,7 +1,8 @@
-//! The fits of a chart, four points side by side: what supports grow to, which solutions stand, and where their weights go.
+//! The fits of a chart, four points at once, with their fallbacks.
 //!
-//! Supports that do not hold enough grow; where that does not do, what lies on the same side is taken, and the moment
-//! conditions are solved by a rank-revealing decomposition: the weights stand if they hold. Everything is counted.
+//! A support with too few neighbors, or with a rank-deficient moment matrix, grows. If that does not help, all points
+//! on the same side are accepted, and the moment conditions are solved by a rank-revealing decomposition. The weights
+//! are used if the conditions hold. Every fallback is counted.
 
 use super::basis::Basis;
 use super::charts::{Chart, Functional, Heights, Node};
@@ -10,58 +11,59 @@ use crate::linear_algebra::number::{LANES, Lanes};
 use crate::parallel::Interrupt;
 use std::ops::Range;
 
-/// Degree of the polynomials and the support of a point.
+/// Degree of the polynomials and radius of the support of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Support {
-    /// Total degree: at most 7.
+    /// Total degree of the polynomials, at most 7.
     pub degree: usize,
-    /// Radius of the support, r_c.
+    /// Nominal radius r_c of the support, a length.
     pub radius: f64,
 }
 
-/// What became of points.
+/// Numbers of fallbacks and failures of fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SupportDiagnostics {
-    /// How often a support was enlarged.
+    /// Number of enlargements of supports.
     pub enlarged: u64,
     /// Points whose moment conditions were solved by the rank-revealing decomposition.
     pub low_rank: u64,
-    /// Points that had to take what lies beyond a turn of 60° of the normal: the surface is too coarse there.
+    /// Points with neighbors whose normals differ by more than 60°, because the surface is too coarse there.
     pub unresolved: u64,
-    /// Points whose moment conditions cannot be met: their rows give no number.
+    /// Points whose moment conditions cannot be met, so that their rows give NaN.
     pub failed: u64,
-    /// The first of them.
+    /// Index of the first failed point.
     pub first_failed: Option<usize>,
-    /// The least share of a pivot in its diagonal, of all points that were solved directly.
+    /// Smallest pivot ratio of the points that were solved directly.
     pub min_pivot: f64,
 }
 
-impl SupportDiagnostics {
-    /// Of no points.
-    #[must_use]
-    pub fn none() -> Self {
+impl Default for SupportDiagnostics {
+    /// The diagnostics before any fit.
+    fn default() -> Self {
         Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, first_failed: None, min_pivot: 1.0 }
     }
+}
 
-    /// Supports that were rescued, in one way or another.
+impl SupportDiagnostics {
+    /// Number of fallbacks of any kind that gave a result.
     #[must_use]
     pub fn rescued(&self) -> u64 {
         self.enlarged + self.low_rank + self.unresolved
     }
 
-    /// What a checkpoint keeps: the counts in their order, and the least pivot.
+    /// The numbers that a checkpoint keeps: the counts in their order, and the smallest pivot ratio.
     #[must_use]
     pub fn to_numbers(&self) -> ([u64; 4], f64) {
         ([self.enlarged, self.low_rank, self.unresolved, self.failed], self.min_pivot)
     }
 
-    /// Takes it back; which point failed first is not kept.
+    /// Restores the numbers of [`Self::to_numbers`]. The index of the first failed point is not kept.
     #[must_use]
     pub fn from_numbers([enlarged, low_rank, unresolved, failed]: [u64; 4], min_pivot: f64) -> Self {
         Self { enlarged, low_rank, unresolved, failed, first_failed: None, min_pivot }
     }
 
-    /// With others.
+    /// Adds the diagnostics of other fits.
     pub fn add(&mut self, other: &Self) {
         self.enlarged += other.enlarged;
         self.low_rank += other.low_rank;
@@ -72,26 +74,28 @@ impl SupportDiagnostics {
     }
 }
 
-/// Neighbors for a function at least: fewer make the fit an interpolation of noise.
+/// Smallest number of neighbors per basis function. With fewer, a fit interpolates noise.
 const NEIGHBORS_PER_FUNCTION: f64 = 1.4;
-/// How a support grows that is not enough, and how far.
+/// Factor of one enlargement of a support.
 const GROWTH: f64 = 1.2;
-/// The largest support by r_c.
+/// Largest support radius, in multiples of the nominal radius.
 pub const MAX_GROWTH: f64 = 2.5;
-/// Below this share of a pivot in its diagonal the moment conditions do not hold to the digits that are wanted.
+/// Smallest pivot ratio with which the moment conditions hold to enough digits.
 const MIN_PIVOT: f64 = 1e-9;
-/// Moment conditions that a rank-revealing solution may leave open, by the largest.
-const OPEN_MOMENTS: f64 = 1e-6;
-/// Points of a parallel task; a multiple of the lanes.
+/// Largest violation of the moment conditions by a rank-revealing solution, relative to the largest value of the
+/// functional.
+const MAX_MOMENT_VIOLATION: f64 = 1e-6;
+/// Number of points of a parallel task, a multiple of the lanes.
 pub(super) const BLOCK: usize = 64;
 
-/// Where the weights of points go.
+/// Receiver of the weights of fits.
 pub(super) trait RowSink<const M: usize> {
-    /// The nodes of point i and, in a lane, their weights for a functional; none where the moment conditions are not met.
+    /// Takes the nodes of point i and their weights for a functional, in the given lane; None where the moment
+    /// conditions are not met.
     fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>);
 }
 
-/// What comes of a range of points beside the weights.
+/// Results of the fits of a range of points, beside the weights.
 pub(super) struct FitOutcome<const M: usize> {
     pub heights: Vec<Heights<M>>,
     pub fit_diagnostics: SupportDiagnostics,
@@ -99,21 +103,21 @@ pub(super) struct FitOutcome<const M: usize> {
 
 impl<const M: usize> Default for FitOutcome<M> {
     fn default() -> Self {
-        Self { heights: Vec::new(), fit_diagnostics: SupportDiagnostics::none() }
+        Self { heights: Vec::new(), fit_diagnostics: SupportDiagnostics::default() }
     }
 }
 
-/// Storage of a thread.
+/// Workspace of a thread.
 #[derive(Default)]
 pub(super) struct Workspace<const M: usize> {
     fit: MomentFit<M>,
     terms: Vec<([u8; M], f64)>,
     functional: Vec<f64>,
-    /// Values of the functional in hand on the functions, lane by lane.
+    /// Values of the present functional for the basis functions, in each lane.
     values: Vec<[f64; LANES]>,
 }
 
-/// What is fitted.
+/// The chart, basis and functionals of fits.
 pub(super) struct Fits<'a, const M: usize> {
     pub chart: &'a dyn Chart<M>,
     pub basis: &'a Basis<M>,
@@ -122,7 +126,7 @@ pub(super) struct Fits<'a, const M: usize> {
 }
 
 impl<const M: usize> Fits<'_, M> {
-    /// A range of points, in their order; ends early when interrupted.
+    /// Fits a range of points in their order. An interrupt ends the fits early.
     pub fn run(
         &self,
         points: Range<usize>,
@@ -140,7 +144,11 @@ impl<const M: usize> Fits<'_, M> {
         }
     }
 
-    /// The rows of up to four points, one a lane.
+    /// Fits up to four points, one per lane.
+    ///
+    /// 1. Collect the neighbors, and enlarge supports with too few of them.
+    /// 2. Factorize the moment matrices, and enlarge rank-deficient supports until all are sound or at their limit.
+    /// 3. Solve for all functionals.
     fn rows_of(
         &self,
         points: Range<usize>,
@@ -167,7 +175,7 @@ impl<const M: usize> Fits<'_, M> {
             }
         }
         for lane in points.len()..LANES {
-            // Spare lanes repeat the first.
+            // Spare lanes repeat the first one.
             let (first, rest) = workspace.fit.near.split_at_mut(1);
             rest[lane - 1].clone_from(&first[0]);
             radius[lane] = radius[0];
@@ -202,7 +210,7 @@ impl<const M: usize> Fits<'_, M> {
         }
     }
 
-    /// Solutions for every functional, with the supports and the factorization as they stand.
+    /// Solves for all functionals with the present supports and factorization, and passes the weights to the sink.
     fn finish(
         &self,
         points: &Range<usize>,
@@ -213,7 +221,7 @@ impl<const M: usize> Fits<'_, M> {
         outcome: &mut FitOutcome<M>,
     ) {
         let heights = self.chart.needs_heights().then(|| self.heights(radius, sound, workspace));
-        // Where the moments are singular, so are those of the heights: a metric of what comes out would be a metric of nothing.
+        // Where the moments are singular, the heights are undefined, and with them the metric.
         let mut holds = sound.map(|is_sound| is_sound || heights.is_none());
         for (k, functional) in self.functionals.iter().enumerate() {
             workspace.values.clear();
@@ -221,10 +229,10 @@ impl<const M: usize> Fits<'_, M> {
             for lane in 0..LANES {
                 let i = points.start + lane.min(points.len().saturating_sub(1));
                 workspace.terms.clear();
-                let of_lane = heights.as_ref().map(|heights| &heights[lane]);
-                self.chart.terms(*functional, i, of_lane, &mut workspace.terms);
+                let lane_heights = heights.as_ref().map(|heights| &heights[lane]);
+                self.chart.terms(*functional, i, lane_heights, &mut workspace.terms);
                 for (alpha, coefficient) in &workspace.terms {
-                    // Functions are of coordinates by the reach.
+                    // The basis functions depend on coordinates divided by the radius.
                     let order: u8 = alpha.iter().sum();
                     let scale = coefficient * radius[lane].powi(-i32::from(order));
                     if let Some(values) = self.basis.derivative(alpha) {
@@ -241,7 +249,7 @@ impl<const M: usize> Fits<'_, M> {
                 if !sound[lane] && holds[lane] {
                     workspace.functional.clear();
                     workspace.functional.extend(workspace.values.iter().map(|values| values[lane]));
-                    holds[lane] = workspace.fit.solve_low_rank(lane, &workspace.functional) <= OPEN_MOMENTS;
+                    holds[lane] = workspace.fit.solve_low_rank(lane, &workspace.functional) <= MAX_MOMENT_VIOLATION;
                 }
                 let weights = holds[lane].then_some((workspace.fit.weights.as_slice(), lane));
                 sink.take(k, i, &workspace.fit.near[lane], weights);
@@ -261,7 +269,7 @@ impl<const M: usize> Fits<'_, M> {
         }
     }
 
-    /// Slopes and second derivatives of the surface over the plane of each lane, no numbers where it is not sound.
+    /// Slopes and second derivatives of the surface over the plane of each lane; NaN in lanes that are not sound.
     fn heights(&self, radius: [f64; LANES], sound: [bool; LANES], workspace: &mut Workspace<M>) -> [Heights<M>; LANES] {
         workspace.fit.solve_heights(self.basis.size());
         let derivative = |alpha: [u8; M], lane: usize| -> f64 {

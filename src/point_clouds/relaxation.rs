@@ -1,4 +1,4 @@
-//! Points spread at random over a surface, and relaxed: each is pushed away from its neighbors until they are about equally far.
+//! Random points on a surface, and their relaxation: neighbors repel each other until they are about equally far apart.
 
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Domain, Surface, Vector};
@@ -6,9 +6,10 @@ use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::Interrupt;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
-/// Points of a surface in space that are uniform by its area, to a good approximation: uniform points of a thin shell about it,
-/// moved to their closest points; `layer` is the half width of the shell, well below the radii of curvature. Ends with fewer
-/// when interrupted.
+/// `count` random points on a surface in space, approximately uniform over its area.
+///
+/// Uniform points in a thin shell around the surface are moved to their closest points. `layer` is the half width of
+/// the shell, which must be well below the radii of curvature. An interrupt ends the search with fewer points.
 #[must_use]
 pub fn random_points(
     surface: &dyn Surface<3>,
@@ -36,15 +37,17 @@ pub fn random_points(
     found
 }
 
-/// Rounds of pushing.
+/// Number of rounds of repulsion.
 const ROUNDS: usize = 80;
-/// Reach of the push, by the mean spacing.
-const REACH: f64 = 1.8;
-/// Length of a move, by the mean spacing, for a neighbor at no distance.
+/// Cutoff radius of the repulsion, in mean spacings.
+const CUTOFF: f64 = 1.8;
+/// Displacement per neighbor at zero distance, in mean spacings.
 const PUSH: f64 = 0.25;
 
-/// Pushes points along their surface, ρ = 1.8 δn, by PUSH δn Σ (1 − r/ρ)² (x_i − x_j)/r a round, and back onto it. Ends early when
-/// interrupted.
+/// Relaxes points with the mean spacing δ_n = `spacing`, and projects them back onto their surface with `onto`.
+///
+/// A round moves point i by about [`PUSH`] δ_n Σ_j (1 − r/ρ)² (x_i − x_j)/r over its neighbors within ρ = 1.8 δ_n. An
+/// interrupt ends the relaxation early.
 pub fn relax(
     points: &mut Vec<Vector<3>>,
     spacing: f64,
@@ -52,14 +55,14 @@ pub fn relax(
     interrupt: &Interrupt,
 ) {
     let mut cells = CellList::new(Domain::unbounded());
-    let cutoff = REACH * spacing;
+    let cutoff = CUTOFF * spacing;
     let mut moved = points.clone();
     for round in 0..ROUNDS {
         if interrupt.is_raised() {
             return;
         }
         cells.rebuild(points.iter().copied(), cutoff);
-        // Moves become smaller toward the end, so that points come to rest.
+        // Displacements decrease toward the end, so that points come to rest.
         let push = PUSH * spacing * (1.0 - 0.8 * round as f64 / ROUNDS as f64);
         moved.par_iter_mut().with_min_len(64).enumerate().for_each(|(i, moved)| {
             let x = points[i];

@@ -1,8 +1,9 @@
 //! Polynomial bases as products of one-dimensional Newton factors u_k(x) = ∏_{j<k} (x − p_j).
 //!
-//! Monomials are the case p_j = 0. The minter basis (PCP 3.1; Hecht 2020) is the Lagrange basis of the unisolvent nodes, a triangular
-//! combination of Newton factors. A regression uses the values of its basis. Its result is expanded into monomials of the centered and
-//! scaled coordinates, so that one fast evaluation serves all bases. Since indices are graded, the leading terms form the basis of lower degree.
+//! Monomials are the case p_j = 0. The minter basis (PCP 3.1; Hecht 2020) is the Lagrange basis of the unisolvent
+//! nodes, a triangular combination of Newton factors. A regression uses the values of its basis. Its result is expanded
+//! into monomials of the centered and scaled coordinates, so that one fast evaluation serves all bases. Since indices
+//! are graded, the leading terms form the basis of lower degree.
 
 use super::horner::nested_indices;
 use super::multi_index::MultiIndexSet;
@@ -97,7 +98,8 @@ impl<const D: usize> PolynomialBasis<D> {
         u
     }
 
-    /// Writes the values of the first `row.len()` basis functions at the local coordinates `x`, one row of a regression.
+    /// Writes the values of the first `row.len()` basis functions at the local coordinates `x`, one row of a
+    /// regression.
     ///
     /// `degree` is the total degree that belongs to `row.len()` terms.
     pub fn row(&self, x: &Vector<D>, degree: usize, row: &mut [f64]) {
@@ -143,7 +145,8 @@ impl<const D: usize> PolynomialBasis<D> {
     }
 }
 
-/// Matrix, by rows, that expands the Newton factors ∏_d ∏_{j < β_d} (x_d − p_j) in monomials. It is lower triangular for graded indices.
+/// Matrix, by rows, that expands the Newton factors ∏_d ∏_{j < β_d} (x_d − p_j) in monomials. It is lower triangular
+/// for graded indices.
 fn newton_factors_in_monomials<const D: usize>(set: &MultiIndexSet<D>, nodes: &[f64; MAX_DEGREE]) -> Vec<f64> {
     // One-dimensional factors: u_{k+1} = (x − p_k) u_k.
     let mut factors = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];

@@ -1,7 +1,7 @@
 //! Values and derivatives of polynomials by Horner's scheme, for single numbers and for lanes.
 //!
-//! The coefficients of t^α are in nested order: the exponent of the last axis runs fastest, and each exponent runs up to what the total
-//! degree leaves. An evaluation passes through them once, from the last to the first.
+//! The coefficients of t^α are in nested order: the exponent of the last axis runs fastest, and each exponent runs up
+//! to what the total degree leaves. An evaluation passes through them once, from the last to the first.
 
 use super::MAX_DEGREE;
 use crate::linear_algebra::number::Number;
@@ -38,8 +38,8 @@ pub fn nested_indices<const D: usize>(degree: usize) -> Vec<[u8; D]> {
     indices
 }
 
-/// Value, gradient and Hessian at `t` of the polynomial of the given degree, whose coefficient at position a of the nested order is
-/// `coefficient(a)`.
+/// Value, gradient and Hessian at `t` of the polynomial of the given degree, whose coefficient at position a of the
+/// nested order is `coefficient(a)`.
 #[inline(always)]
 pub fn derivatives<T: Number, const D: usize>(
     degree: usize,
@@ -70,7 +70,8 @@ fn unrolled<T: Number, const D: usize, const N: usize>(
     let (y, z) = (t[D - 2], t[D - 1]);
     let outer = if D == 3 { N } else { 0 };
     let mut place = super::multi_index::term_count::<D>(N);
-    // Suffixes name the axes, of which x is the outermost of three. `vxx`, `vyy` and `vzz` are halves of second derivatives.
+    // Suffixes name the axes, of which x is the outermost of three. `vxx`, `vyy` and `vzz` are halves of second
+    // derivatives.
     let [mut v, mut vx, mut vy, mut vz] = [zero; 4];
     let [mut vxx, mut vxy, mut vxz, mut vyy, mut vyz, mut vzz] = [zero; 6];
     for i in (0..=outer).rev() {

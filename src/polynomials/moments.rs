@@ -1,8 +1,9 @@
 //! Regressions by moments, one in each vector lane.
 //!
-//! The entries of the Gram matrix of the weighted monomials are moments, G_αβ = Σ_j w_j t_j^(α+β). For degree 4 these are 45 sums instead of
-//! 120 in the plane, and 165 instead of 630 in space. From [`REFINEMENT_MIN_DEGREE`] on, one step of iterative refinement with the residuals
-//! of the data restores the digits that squaring the condition number costs.
+//! The entries of the Gram matrix of the weighted monomials are moments, G_αβ = Σ_j w_j t_j^(α+β). For degree 4 these
+//! are 45 sums instead of 120 in the plane, and 165 instead of 630 in space. From [`REFINEMENT_MIN_DEGREE`] on, one
+//! step of iterative refinement with the residuals of the data restores the digits that squaring the condition number
+//! costs.
 
 use super::MAX_DEGREE;
 use super::horner::nested_indices;
@@ -204,7 +205,8 @@ impl<const D: usize> Moments<D> {
     }
 }
 
-/// Adds Σ_q scale_q t_q^α over the neighbors of one pass to the sums for all |α| ≤ N (|α| ≤ 2 N with `DOUBLE`), in nested order.
+/// Adds Σ_q scale_q t_q^α over the neighbors of one pass to the sums for all |α| ≤ N (|α| ≤ 2 N with `DOUBLE`), in
+/// nested order.
 #[inline(always)]
 fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
     coordinates: &[Vec<[f64; LANES]>; D],

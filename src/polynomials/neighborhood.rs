@@ -1,6 +1,7 @@
 //! Choice of the particles that take part in a fit.
 //!
-//! The radius grows until there are enough neighbors. A fit breaks down when it has hardly more neighbors than coefficients.
+//! The radius grows until there are enough neighbors. A fit breaks down when it has hardly more neighbors than
+//! coefficients.
 
 use crate::geometry::Vector;
 use crate::neighbors::{Neighbor, NeighborSearch};
@@ -31,7 +32,8 @@ pub struct Extent {
 
 /// Factor by which one enlargement multiplies the radius.
 pub const GROWTH: f64 = 1.06;
-/// A neighborhood by count whose radius exceeds that of evenly spread particles by this factor is counted as enlarged: particles are missing.
+/// A neighborhood by count whose radius exceeds that of evenly spread particles by this factor is counted as enlarged:
+/// particles are missing.
 const SPARSE_RATIO: f64 = 1.5;
 /// Largest number of enlargements, 1.06⁴⁰ ≈ 10.
 const MAX_ENLARGEMENTS: u32 = 40;

@@ -1,6 +1,7 @@
 //! Local weighted least-squares fits of scattered values (PCP 3.1, eqs. 7 and 8) and their fallbacks.
 //!
-//! Where there are too few neighbors, or where they lie badly, the radius grows. If that does not help, the degree is lowered.
+//! Where there are too few neighbors, or where they lie badly, the radius grows. If that does not help, the degree is
+//! lowered.
 
 use super::basis::{BasisKind, PolynomialBasis};
 use super::local_polynomial::LocalPolynomial;
@@ -15,8 +16,8 @@ use crate::neighbors::{Neighbor, NeighborSearch};
 /// The method by which a regression is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Solver {
-    /// By the moments of scaled monomials, several fits at once. Fits with a pivot ratio below [`MIN_PIVOT`] are solved by orthogonal
-    /// decomposition in the basis. The polynomial is the same in every basis.
+    /// By the moments of scaled monomials, several fits at once. Fits with a pivot ratio below [`MIN_PIVOT`] are solved
+    /// by orthogonal decomposition in the basis. The polynomial is the same in every basis.
     Moments,
     /// By orthogonal decomposition in the basis, one fit at a time.
     Orthogonal,
@@ -135,11 +136,13 @@ impl<const D: usize> Regression<D> {
 
     /// Fits every quantity around up to [`LANES`] centers.
     ///
-    /// Coefficients are written center by center, quantity by quantity, in nested order. A fit is None where not even a plane can be fitted.
+    /// Coefficients are written center by center, quantity by quantity, in nested order. A fit is None where not even a
+    /// plane can be fitted.
     ///
     /// 1. Collect the neighbors of each center.
     /// 2. With [`Solver::Moments`], solve all fits at once.
-    /// 3. Solve the fits that have too few neighbors or a small pivot, or all fits with [`Solver::Orthogonal`], by [`Self::fit`].
+    /// 3. Solve the fits that have too few neighbors or a small pivot, or all fits with [`Solver::Orthogonal`], by
+    ///    [`Self::fit`].
     pub fn fit_lanes<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
         data: &FitData<S, V, A>,
@@ -275,7 +278,8 @@ impl<const D: usize> Regression<D> {
         }
     }
 
-    /// Solves the least-squares problem of the collected neighbors. Returns its condition number, or None when the matrix is rank-deficient.
+    /// Solves the least-squares problem of the collected neighbors. Returns its condition number, or None when the
+    /// matrix is rank-deficient.
     fn solve<S, V: Fn(usize, usize) -> f64, A>(
         &self,
         data: &FitData<S, V, A>,

@@ -37,7 +37,8 @@ pub fn leja_ordered_chebyshev_lobatto(degree: usize) -> Vec<f64> {
 
 /// The matrix C with L_α = Σ_β C_{αβ} N_β, which gives the Lagrange polynomials of the unisolvent nodes in Newton form.
 ///
-/// C is the inverse transpose of N_β(q_α) and upper triangular for graded indices. It is stored by rows, `terms × terms`.
+/// C is the inverse transpose of N_β(q_α) and upper triangular for graded indices. It is stored by rows, `terms ×
+/// terms`.
 #[must_use]
 pub fn lagrange_in_newton_form<const D: usize>(set: &MultiIndexSet<D>, nodes: &[f64]) -> Vec<f64> {
     let indices = set.indices();

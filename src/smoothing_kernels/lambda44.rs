@@ -14,7 +14,8 @@ pub struct Lambda44 {
 
 /// Coefficients of the three pieces in ascending powers of q.
 ///
-/// The cubic term of the second piece is 28425/4 (docs/errata.md, PCP A). With the printed 28425/8 the kernel is not continuous.
+/// The cubic term of the second piece is 28425/4 (docs/errata.md, PCP A). With the printed 28425/8 the kernel is not
+/// continuous.
 const PIECES: [[f64; 10]; 3] = [
     [1.0, 0.0, -5.0 / 4.0, 0.0, 1.0 / 4.0, -100.0 / 3.0, 455.0 / 4.0, -295.0 / 2.0, 345.0 / 4.0, -115.0 / 6.0],
     [

@@ -1,6 +1,7 @@
 //! Kernels of the distance alone, for sums over pairs of particles.
 //!
-//! Value and slope are polynomials of q = r/ε for one number or several lanes: W(r) = σ_D/ε^D w(q) and (∂W/∂r)/r = σ_D/ε^(D+2) w'(q)/q.
+//! Value and slope are polynomials of q = r/ε for one number or several lanes: W(r) = σ_D/ε^D w(q) and (∂W/∂r)/r =
+//! σ_D/ε^(D+2) w'(q)/q.
 
 use crate::linear_algebra::number::Number;
 use std::f64::consts::PI;
@@ -117,7 +118,8 @@ impl RadialKernel for CubicSplineRadial {
     }
 }
 
-/// The quintic spline w = (3 − q)⁵ − 6 (2 − q)⁵ + 15 (1 − q)⁵, each power only where its base is positive (Morris 1996).
+/// The quintic spline w = (3 − q)⁵ − 6 (2 − q)⁵ + 15 (1 − q)⁵, each power only where its base is positive (Morris
+/// 1996).
 #[derive(Debug, Clone, Copy)]
 pub struct QuinticSplineRadial;
 

@@ -1,4 +1,5 @@
-//! The embedded Runge–Kutta pair of order 5(4) of Dormand 1980 for large systems du/dt = f(u, t), in fixed or controlled steps.
+//! The embedded Runge–Kutta pair of order 5(4) of Dormand 1980 for large systems du/dt = f(u, t), in fixed or
+//! controlled steps.
 
 use super::integrators::dopri5::{A, C, E};
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};

@@ -3,7 +3,8 @@
 use super::{Flow, Vector};
 use std::f64::consts::PI;
 
-/// The flow u = 2 cos(π t/T) (−sin²(πx) sin(πy) cos(πy), sin²(πy) sin(πx) cos(πx)). Without a period the first cosine is 1.
+/// The flow u = 2 cos(π t/T) (−sin²(πx) sin(πy) cos(πy), sin²(πy) sin(πx) cos(πx)). Without a period the first cosine
+/// is 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SingleVortex {
     /// Period T: the flow reverses at T/2 and has returned every point at T. With None it never reverses.

@@ -1,7 +1,7 @@
 //! Dumbbell: two balls joined by a straight neck along x.
 //!
-//! The shape is a body of revolution about the x axis (mirror-symmetric in 2D). The closest point therefore lies in the half-plane through the
-//! axis and the query point. There the boundary consists of two arcs and a line.
+//! The shape is a body of revolution about the x axis (mirror-symmetric in 2D). The closest point therefore lies in the
+//! half-plane through the axis and the query point. There the boundary consists of two arcs and a line.
 
 use super::profile::{Piece, nearest_of};
 use super::{Surface, SurfacePoint, Vector, arc_points, join, line_points};

@@ -1,8 +1,8 @@
 //! Ellipse and ellipsoid with axes along the coordinates.
 //!
-//! The closest point to y is x_i = e_i² y_i / (t + e_i²), where t is the largest root of Σ (e_i y_i / (t + e_i²))² = 1 (Eberly 2011). The
-//! sum is convex and decreasing for t > −e_min². Newton's method therefore rises monotonically from the left end of the bracket
-//! to the root.
+//! The closest point to y is x_i = e_i² y_i / (t + e_i²), where t is the largest root of Σ (e_i y_i / (t + e_i²))² = 1
+//! (Eberly 2011). The sum is convex and decreasing for t > −e_min². Newton's method therefore rises monotonically from
+//! the left end of the bracket to the root.
 
 use super::{Surface, SurfacePoint, Vector, arc_points};
 use std::f64::consts::PI;
@@ -17,7 +17,8 @@ pub struct Ellipsoid<const D: usize> {
 }
 
 impl<const D: usize> Ellipsoid<D> {
-    /// √(Σ ((x_i − c_i)/e_i)²) − 1: a level-set function of this surface that is not a distance (PCP eq. 21 with the opposite sign).
+    /// √(Σ ((x_i − c_i)/e_i)²) − 1: a level-set function of this surface that is not a distance (PCP eq. 21 with the
+    /// opposite sign).
     #[must_use]
     pub fn quadric(&self, x: &Vector<D>) -> f64 {
         (x - self.center).component_div(&self.semi_axes).norm() - 1.0
@@ -55,7 +56,8 @@ impl<const D: usize> Ellipsoid<D> {
         // Distance of the query along the shortest axes. It keeps the root away from the pole.
         let offset = (0..D).filter(|&i| gap[i] == 0.0).map(|i| y[i] * y[i]).sum::<f64>().sqrt();
         if offset == 0.0 {
-            // The query lies in the plane across the shortest axes. Near the center the closest point leaves that plane.
+            // The query lies in the plane across the shortest axes. Near the center the closest point leaves that
+            // plane.
             let mut x = Vector::<D>::from_fn(|i, _| if gap[i] > 0.0 { e[i] * e[i] * y[i] / gap[i] } else { 0.0 });
             let rest = 1.0 - x.component_div(e).norm_squared();
             if rest > 0.0 {

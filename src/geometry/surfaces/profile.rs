@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 /// One piece of a curve. Normals point out of the shape.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Piece {
-    /// Arc of a circle from the angle `middle − half_width` to `middle + half_width` (rad), with the center inside the shape.
+    /// Arc of a circle from the angle `middle − half_width` to `middle + half_width` (rad), with the center inside the
+    /// shape.
     Arc { center: Vector<2>, radius: f64, middle: f64, half_width: f64 },
     /// A straight line with its outward normal.
     Line { from: Vector<2>, to: Vector<2>, normal: Vector<2> },

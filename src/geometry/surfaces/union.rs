@@ -21,8 +21,8 @@ impl<const D: usize> Union<D> {
     /// The union of at least one part.
     ///
     /// # Errors
-    /// [`Overlap`] when two parts contain the same point of a lattice of 48 points per side over their common bounding box. Thinner overlaps
-    /// are not detected.
+    /// [`Overlap`] when two parts contain the same point of a lattice of 48 points per side over their common bounding
+    /// box. Thinner overlaps are not detected.
     pub fn new(parts: Vec<Box<dyn Surface<D>>>) -> Result<Self, Overlap> {
         for second in 1..parts.len() {
             for first in 0..second {

@@ -10,8 +10,8 @@ pub struct Workspace {
 
 /// Improves `x` until it solves A x = b, the matrix A being `map` and its preconditioner `factors`.
 ///
-/// The recurrence starts again from the true residual after a breakdown (a scalar that vanishes). It also does so when its own residual is
-/// small and the true one is not, as long as that helps.
+/// The recurrence starts again from the true residual after a breakdown (a scalar that vanishes). It also does so when
+/// its own residual is small and the true one is not, as long as that helps.
 pub fn solve(
     map: &dyn LinearMap,
     factors: &IncompleteFactors,

@@ -20,8 +20,8 @@ pub struct Workspace {
 
 /// Improves `x` until it solves A x = b, the matrix A being `map` and its preconditioner `factors`.
 ///
-/// A cycle builds up to `restart` vectors of the Krylov space of the true residual and minimizes the residual over them. The next cycle starts from
-/// the new residual.
+/// A cycle builds up to `restart` vectors of the Krylov space of the true residual and minimizes the residual over
+/// them. The next cycle starts from the new residual.
 pub fn solve(
     map: &dyn LinearMap,
     factors: &IncompleteFactors,

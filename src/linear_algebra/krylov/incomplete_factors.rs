@@ -2,7 +2,8 @@
 
 use crate::linear_algebra::SparseRows;
 
-/// The factors L and U in the pattern of A. The unit diagonal of L is not stored, and the diagonal of U is stored inverted.
+/// The factors L and U in the pattern of A. The unit diagonal of L is not stored, and the diagonal of U is stored
+/// inverted.
 #[derive(Debug)]
 pub struct IncompleteFactors {
     rows: SparseRows,

@@ -1,8 +1,9 @@
 //! Sums over pairs in parallel, slab by slab in two colors.
 //!
-//! A slab is a layer of pencils across the last axis, at least as thick as the cutoff. Its points have neighbors in the slab itself and in the next
-//! one only. All even slabs are summed in parallel, then all odd ones, so that no two threads write to the same slot. The order of every sum is
-//! the same for any number of threads. The first slab is repeated after the last one, which closes the ring.
+//! A slab is a layer of pencils across the last axis, at least as thick as the cutoff. Its points have neighbors in the
+//! slab itself and in the next one only. All even slabs are summed in parallel, then all odd ones, so that no two
+//! threads write to the same slot. The order of every sum is the same for any number of threads. The first slab is
+//! repeated after the last one, which closes the ring.
 
 use super::{NeighborGroups, Pencils, Slab};
 use crate::parallel::{Interrupt, Interrupted};
@@ -20,8 +21,8 @@ pub struct Window<'a, const N: usize> {
 impl<const D: usize> Pencils<D> {
     /// Sets `sums`, columns with one number per slot, to what `work` adds to them.
     ///
-    /// `work` is called in parallel for every slot with neighbors. It gets the slot, its neighbors and the window of its slab. Repeated slots
-    /// of the first slab get equal sums.
+    /// `work` is called in parallel for every slot with neighbors. It gets the slot, its neighbors and the window of
+    /// its slab. Repeated slots of the first slab get equal sums.
     ///
     /// # Errors
     /// [`Interrupted`] when the interrupt is raised.
@@ -89,7 +90,8 @@ impl<const D: usize> Pencils<D> {
         }
     }
 
-    /// Cuts the slots into slabs of as many layers of pencils as the cutoff can span. The last slab takes the remaining layers.
+    /// Cuts the slots into slabs of as many layers of pencils as the cutoff can span. The last slab takes the remaining
+    /// layers.
     pub(super) fn cut(&self, slabs: &mut Vec<Slab>) {
         let (layers, thickness) = (self.counts[D - 1], self.spans[D - 1].max(1) as usize);
         let layer = self.starts.len().saturating_sub(1) / layers;

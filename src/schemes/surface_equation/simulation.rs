@@ -60,7 +60,7 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
         interrupt: Interrupt,
         cpu_clock: CpuClock,
     ) -> Self {
-        let fit_diagnostics = SupportDiagnostics::none();
+        let fit_diagnostics = SupportDiagnostics::default();
         let phases = Phases::new(cpu_clock);
         Self {
             cloud,

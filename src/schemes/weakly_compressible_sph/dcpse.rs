@@ -37,7 +37,7 @@ impl<const D: usize> DcpseFlow<D> {
             found: vec![0.0; count * evaluation.numbers(D + 1)],
             evaluation,
             velocity: std::array::from_fn(|_| vec![0.0; count]),
-            fit_diagnostics: SupportDiagnostics::none(),
+            fit_diagnostics: SupportDiagnostics::default(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The embedded Runge–Kutta pair of order 5(4) of Dormand 1980 with local error control.
 //!
-//! The step h is accepted when the difference of both orders is at most the tolerance. The next step is 0.9 h (tolerance/error)^(1/5), between h/5 and
-//! 5 h.
+//! The step h is accepted when the difference of both orders is at most the tolerance. The next step is 0.9 h
+//! (tolerance/error)^(1/5), between h/5 and 5 h.
 
 use crate::geometry::{Flow, Vector};
 
