@@ -6,7 +6,7 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use meniscus::closest_point::method::NeighborhoodChoice;
-use meniscus::closest_point::{Answers, PcpMethod, Redistancing};
+use meniscus::closest_point::{ClosestPoints, PcpMethod, Redistancing};
 use meniscus::geometry::lattice::Lattice;
 use meniscus::geometry::surfaces::Ellipsoid;
 use meniscus::geometry::{Domain, Surface, Vector};
@@ -52,7 +52,7 @@ fn redistancing<const D: usize>(c: &mut Criterion, name: &str, setup: &Setup<D>)
     let Setup { positions, level, spacing, method } = setup;
     let never = Interrupt::default();
     let mut surface = Redistancing::<D>::new(method.clone(), Domain::unbounded(), *spacing);
-    let mut answers = Answers::default();
+    let mut answers = ClosestPoints::default();
     // Every part finds what the parts before it leave, also when it is run alone.
     assert!(surface.detect(positions, level, &never).is_ok());
     assert!(surface.fit_samples(positions, level, None, &never).is_ok());

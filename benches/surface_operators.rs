@@ -14,7 +14,7 @@ fn applications(c: &mut Criterion) {
     for (count, degree, cutoff) in [(16_000, 3, 2.6), (64_000, 5, 3.3)] {
         let points: Vec<Vector<3>> = fibonacci::sphere(count);
         let radius = cutoff * (4.0 * PI / count as f64).sqrt();
-        let chart = TangentChart::new(&points, &points, Metric::OfNormals, radius);
+        let chart = TangentChart::new(&points, &points, Metric::FromNormals, radius);
         let support = Support { degree, radius };
         let Ok(built) = construct::<2>(&chart, support, &[Functional::LaplaceBeltrami], &Interrupt::default()) else {
             continue;

@@ -1,11 +1,11 @@
-//! Closest-point redistancing on irregular particles (PCP paper, section 3).
+//! Closest-point redistancing on irregular particles (PCP, section 3).
 //!
-//! Particles near the surface carry local polynomials of the level-set function; projecting the particles onto the
-//! zeros gives sample particles; queries start at the nearest sample and solve for the closest point of its
-//! polynomial's zero.
+//! Particles next to the surface carry local polynomials of the level-set function. Their projections onto the zeros of
+//! the polynomials are sample points of the surface. A query starts at the nearest sample and solves for the closest
+//! point on the zero of the sample's polynomial.
 
 pub mod detection;
-pub mod enclosed_measure;
+pub mod enclosed_moments;
 pub mod level_surface;
 pub mod material;
 pub mod method;
@@ -19,7 +19,7 @@ pub mod surface_columns;
 pub use level_surface::LevelSurface;
 pub use material::MaterialSurface;
 pub use method::PcpMethod;
-pub use queries::Answers;
+pub use queries::ClosestPoints;
 pub use redistancing::{ClosestPoint, Redistancing};
-pub use rescue::{RescueCounts, Soundness};
+pub use rescue::{FitDiagnostics, RescueCounts};
 pub use surface_columns::SurfaceColumns;

@@ -1,4 +1,7 @@
-//! Where things are: the domain, exact surfaces, prescribed flows and seeded point lattices.
+//! Domains, exact surfaces, prescribed flows and seeded point lattices.
+//!
+//! Surfaces give the distance, closest point, normal and curvature of any query point, exact to round-off. Scenes start
+//! from them, and errors are measured against them.
 
 pub mod domain;
 pub mod fibonacci;
@@ -12,5 +15,5 @@ pub use domain::Domain;
 pub use flows::Flow;
 pub use surfaces::{Surface, SurfacePoint};
 
-/// A point or a vector of `D` components, dimensionless as everything in a scene.
+/// A point or a vector of `D` components. All quantities of a scene are dimensionless.
 pub type Vector<const D: usize> = nalgebra::SVector<f64, D>;

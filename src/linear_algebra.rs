@@ -1,5 +1,6 @@
-//! Algebra: numbers in vector lanes, dense least squares, normal equations of many small problems at once, sparse rows and
-//! their iterative solution.
+//! Linear algebra: dense least squares, many small systems at once in vector lanes, and large sparse systems.
+//!
+//! Formulas are written once for single numbers and for vector lanes. All sums run in a fixed order.
 
 pub mod krylov;
 pub mod least_squares;

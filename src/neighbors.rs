@@ -1,4 +1,7 @@
-//! Which points are near a point: a cell list, pencils for loops over pairs, and brute force as the oracle of both.
+//! Neighbor searches.
+//!
+//! A [`CellList`] answers searches around any point. [`Pencils`] serve sums over all pairs of neighbors. [`BruteForce`]
+//! looks at every point and is the reference of both in tests.
 
 pub mod brute_force;
 pub mod cell_list;
@@ -10,28 +13,29 @@ pub use pencils::Pencils;
 
 use crate::geometry::Vector;
 
-/// A point found near another.
+/// A point that a search found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbor<const D: usize> {
-    /// r².
+    /// Squared distance r².
     pub r2: f64,
-    /// Which point.
+    /// Index j of the point.
     pub index: usize,
-    /// x_j − x by the shortest way.
+    /// Displacement x_j − x, the shortest one in a periodic domain.
     pub dx: Vector<D>,
 }
 
-/// Search over a fixed set of points; the order of visits depends on the points alone.
+/// Search over a fixed set of points. The order of visits depends on the points alone.
 pub trait NeighborSearch<const D: usize> {
-    /// Calls `visit(j, dx, r²)` for every point j with `r ≤ radius`, `dx = x_j − x` by the shortest way.
+    /// Calls `visit(j, dx, r²)` for every point j with `r ≤ radius`, where `dx = x_j − x` is the shortest displacement.
     fn for_each_within(&self, x: &Vector<D>, radius: f64, visit: impl FnMut(usize, &Vector<D>, f64));
 
-    /// Replaces `found` by every point with `r ≤ radius`, in the order of [`Self::for_each_within`].
+    /// Replaces `found` by all points with `r ≤ radius`, in the order of [`Self::for_each_within`].
     fn gather(&self, x: &Vector<D>, radius: f64, found: &mut Vec<Neighbor<D>>) {
         found.clear();
         self.for_each_within(x, radius, |index, dx, r2| found.push(Neighbor { r2, index, dx: *dx }));
     }
 
-    /// The nearest point not farther than `reach`, as (index, distance); among equals the least index.
-    fn nearest(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)>;
+    /// Index and distance of the nearest point with `r ≤ cutoff`; of equally near points the one with the smallest
+    /// index.
+    fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)>;
 }

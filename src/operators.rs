@@ -1,9 +1,8 @@
-//! Differential operators on scattered points, as sparse rows.
+//! Differential operators on scattered points in space and on surfaces (DC-PSE and Surface DC-PSE).
 //!
-//! One kind of fit ([`fits`]) serves all: a chart says which points lie about a point and what their
-//! coordinates are ([`charts`]), polynomials of these ([`basis`]) are fitted with one factorization a point
-//! ([`moment_fit`]), and every functional asked for is one more
-//! right-hand side. Weights become rows ([`construction`]), or are used at once ([`evaluation`]).
+//! A chart ([`charts`]) gives the neighbors of a point and their coordinates. A fit ([`fits`]) solves the moment
+//! conditions of a point with one factorization, and every operator is one more right-hand side. The weights become
+//! sparse rows ([`construction`]) or are applied at once ([`evaluation`]).
 
 mod basis;
 pub mod charts;
@@ -17,4 +16,4 @@ pub use charts::{Chart, FlatChart, Functional, NormalCopies, TangentChart};
 pub use construction::{Construction, construct};
 pub use derivative_tensor::{Tensor, derivative_tensor, divergence, sum_of_minors};
 pub use evaluation::Evaluation;
-pub use fits::{Soundness, Support};
+pub use fits::{Support, SupportDiagnostics};

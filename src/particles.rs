@@ -1,31 +1,43 @@
-//! All per-particle arrays of a simulation: positions and named columns, each an array of its own.
+//! Particles as a structure of arrays: positions, and named columns with one value per particle.
+//!
+//! A scheme adds the columns that it needs and keeps their typed keys. Checkpoints and frames go through the columns by
+//! name.
 
 use crate::geometry::Vector;
 
-/// Positions and columns of equal length. A column is reached by the key that adding it returned.
+/// Positions and columns of equal length. Adding a column returns the key by which it is read and written.
+///
+/// ```
+/// use meniscus::{geometry::Vector, particles::Particles};
+///
+/// let mut particles = Particles::new(vec![Vector::<2>::new(0.0, 0.0), Vector::<2>::new(1.0, 0.0)]);
+/// let density = particles.add_scalar("density", 1.0);
+/// particles.scalar_mut(density)[1] = 2.0;
+/// assert_eq!(particles.scalar(density), [1.0, 2.0]);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Particles<const D: usize> {
     positions: Vec<Vector<D>>,
     columns: Vec<Column<D>>,
 }
 
-/// A named per-particle array.
+/// A named array with one value per particle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column<const D: usize> {
-    /// Name as it stands in states, checkpoints and frames.
+    /// Name in states, checkpoints and frames.
     pub name: &'static str,
-    /// The values.
+    /// One value per particle, in the order of the positions.
     pub values: ColumnValues<D>,
 }
 
-/// The values of a column, by kind.
+/// The values of a column, by their type.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColumnValues<const D: usize> {
-    /// One number a particle.
+    /// One number per particle.
     Scalar(Vec<f64>),
-    /// One vector a particle.
+    /// One vector per particle.
     Vector(Vec<Vector<D>>),
-    /// One small whole number a particle.
+    /// One small integer per particle.
     Flag(Vec<u8>),
 }
 
@@ -42,31 +54,31 @@ pub struct VectorKey(usize);
 pub struct FlagKey(usize);
 
 impl<const D: usize> Particles<D> {
-    /// Particles at the given places, without columns.
+    /// Particles at the given positions, without columns.
     #[must_use]
     pub fn new(positions: Vec<Vector<D>>) -> Self {
         Self { positions, columns: Vec::new() }
     }
 
-    /// How many there are.
+    /// Number of particles.
     #[must_use]
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Whether there are none.
+    /// Whether there is no particle.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// Where they are.
+    /// Positions of all particles.
     #[must_use]
     pub fn positions(&self) -> &[Vector<D>] {
         &self.positions
     }
 
-    /// Where they are, to move them.
+    /// Positions of all particles, for moving them.
     pub fn positions_mut(&mut self) -> &mut [Vector<D>] {
         &mut self.positions
     }
@@ -92,7 +104,7 @@ impl<const D: usize> Particles<D> {
         FlagKey(self.columns.len() - 1)
     }
 
-    /// A scalar column.
+    /// The values of a scalar column.
     #[must_use]
     pub fn scalar(&self, key: ScalarKey) -> &[f64] {
         match &self.columns[key.0].values {
@@ -101,7 +113,7 @@ impl<const D: usize> Particles<D> {
         }
     }
 
-    /// A scalar column, to write.
+    /// The values of a scalar column, for writing.
     pub fn scalar_mut(&mut self, key: ScalarKey) -> &mut [f64] {
         match &mut self.columns[key.0].values {
             ColumnValues::Scalar(values) => values,
@@ -109,7 +121,7 @@ impl<const D: usize> Particles<D> {
         }
     }
 
-    /// A vector column.
+    /// The values of a vector column.
     #[must_use]
     pub fn vector(&self, key: VectorKey) -> &[Vector<D>] {
         match &self.columns[key.0].values {
@@ -118,7 +130,7 @@ impl<const D: usize> Particles<D> {
         }
     }
 
-    /// A vector column, to write.
+    /// The values of a vector column, for writing.
     pub fn vector_mut(&mut self, key: VectorKey) -> &mut [Vector<D>] {
         match &mut self.columns[key.0].values {
             ColumnValues::Vector(values) => values,
@@ -126,7 +138,7 @@ impl<const D: usize> Particles<D> {
         }
     }
 
-    /// A flag column.
+    /// The values of a flag column.
     #[must_use]
     pub fn flag(&self, key: FlagKey) -> &[u8] {
         match &self.columns[key.0].values {
@@ -135,7 +147,7 @@ impl<const D: usize> Particles<D> {
         }
     }
 
-    /// A flag column, to write.
+    /// The values of a flag column, for writing.
     pub fn flag_mut(&mut self, key: FlagKey) -> &mut [u8] {
         match &mut self.columns[key.0].values {
             ColumnValues::Flag(values) => values,
@@ -143,13 +155,13 @@ impl<const D: usize> Particles<D> {
         }
     }
 
-    /// Every column in the order of adding.
+    /// All columns, in the order in which they were added.
     #[must_use]
     pub fn columns(&self) -> &[Column<D>] {
         &self.columns
     }
 
-    /// Every column, to write (restoring a state).
+    /// All columns, for restoring a state.
     pub fn columns_mut(&mut self) -> &mut [Column<D>] {
         &mut self.columns
     }

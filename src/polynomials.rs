@@ -1,4 +1,8 @@
-//! Multivariate polynomials of bounded total degree and their least-squares fits to scattered values.
+//! Multivariate polynomials of bounded total degree, and their least-squares fits to scattered values.
+//!
+//! A fit collects a neighborhood, solves a weighted regression and gives a local polynomial with exact derivatives.
+//! Four fits are solved at once in vector lanes where their moments are well conditioned, and one by one by QR
+//! otherwise.
 
 pub mod basis;
 pub mod horner;
@@ -15,8 +19,8 @@ pub use multi_index::MultiIndexSet;
 pub use neighborhood::Neighborhood;
 pub use regression::{Fit, FitData, Regression, RegressionScratch, Solver};
 
-/// The largest total degree that a basis can have.
+/// Largest total degree of a basis.
 pub const MAX_DEGREE: usize = 8;
 
-/// The largest number of basis terms: C(8 + 3, 3).
+/// Largest number of basis terms, C(8 + 3, 3).
 pub const MAX_TERMS: usize = 165;

@@ -1,4 +1,7 @@
-//! Kernels that spread particle values over space. One file a kernel.
+//! Smoothing kernels, one file per kernel.
+//!
+//! A [`SmoothingKernel`] spreads particle values over space. A [`RadialKernel`] is a function of the scaled distance q
+//! = r/ε for sums over pairs of particles, in one lane or several.
 
 pub mod gaussian;
 pub mod lambda44;
@@ -12,12 +15,19 @@ pub use wendland_c2::WendlandC2;
 
 use crate::geometry::Vector;
 
-/// A kernel of bounded support.
+/// A kernel W with bounded support and ∫ W dx = 1.
+///
+/// ```
+/// use meniscus::{geometry::Vector, smoothing_kernels::{SmoothingKernel, WendlandC2}};
+///
+/// let kernel = WendlandC2 { smoothing_length: 0.1 };
+/// assert_eq!(kernel.value(&Vector::<2>::new(0.2, 0.0)), 0.0);
+/// ```
 pub trait SmoothingKernel<const D: usize>: Send + Sync {
-    /// W(dx), in 1/length^D.
+    /// Kernel value W(dx), with the dimension 1/length^D.
     fn value(&self, dx: &Vector<D>) -> f64;
 
-    /// A distance beyond which W vanishes.
+    /// Radius beyond which W vanishes.
     fn support(&self) -> f64;
 }
 
@@ -48,7 +58,7 @@ mod tests {
         close(integral::<3>(&WendlandC2 { smoothing_length: 0.3 }, 0.02), 1e-4);
         close(integral::<2>(&Lambda44 { spacing: 0.1 }, 0.01), 1e-6);
         close(integral::<3>(&Lambda44 { spacing: 0.1 }, 0.02), 1e-4);
-        // The cut at three smoothing lengths leaves out exp(−9).
+        // The cut at three smoothing lengths drops exp(−9).
         close(integral::<2>(&Gaussian { smoothing_length: 0.3 }, 0.01), 2e-4);
         close(integral::<3>(&Gaussian { smoothing_length: 0.3 }, 0.03), 1e-3);
     }

@@ -1,31 +1,37 @@
-//! Which particles lie next to the surface: those with another of the opposite sign within ξ (PCP paper, section 3.1).
+//! Detection of the particles next to the surface: those with a particle of the opposite sign within ξ (PCP 3.1).
 
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
-/// Particles in cells of edge ξ, their signs, and the near-surface ones in the order of cells.
+/// Particles sorted into cells of edge ξ, their signs, and the near-surface particles.
 #[derive(Debug)]
 pub struct Detection<const D: usize> {
     cells: CellList<D>,
+    /// Whether each particle has a negative level.
     is_inside: Vec<bool>,
-    /// The same in the order of cells.
+    /// `is_inside` in the order of cells.
     signs: Vec<bool>,
+    /// Signs that occur in each cell and the adjacent ones.
     marks: Vec<u8>,
+    /// Scratch buffer for the marks.
     before: Vec<u8>,
-    /// Places (in cell order) of particles with both signs in the cells round them.
+    /// Slots in cell order of the particles whose cell has both marks.
     candidates: Vec<usize>,
+    /// Whether each candidate lies next to the surface.
     is_near: Vec<bool>,
+    /// Indices of the near-surface particles, in the order of cells.
     near: Vec<usize>,
 }
 
-/// Marks of a cell.
+/// Mark of a cell with a particle of negative level in it or in an adjacent cell.
 const INSIDE: u8 = 1;
+/// Mark of a cell with a particle of another level in it or in an adjacent cell.
 const OUTSIDE: u8 = 2;
 
 impl<const D: usize> Detection<D> {
-    /// Nobody yet.
+    /// A detection without particles.
     #[must_use]
     pub fn new(domain: Domain<D>) -> Self {
         Self {
@@ -40,7 +46,7 @@ impl<const D: usize> Detection<D> {
         }
     }
 
-    /// The particles in cells.
+    /// The cell list of all particles.
     #[must_use]
     pub fn cells(&self) -> &CellList<D> {
         &self.cells
@@ -52,19 +58,20 @@ impl<const D: usize> Detection<D> {
         &self.is_inside
     }
 
-    /// The particles next to the surface.
+    /// Indices of the particles next to the surface.
     #[must_use]
     pub fn near(&self) -> &[usize] {
         &self.near
     }
 
-    /// Finds them anew. A level of exactly zero counts as outside.
+    /// Finds the particles next to the surface. A level of exactly zero counts as outside.
     ///
-    /// 1. Cells of edge ξ; a cell is marked with the signs in it and in the cells round it.
-    /// 2. Only in cells with both marks are pairs looked at.
+    /// 1. Sort the particles into cells of edge ξ = `threshold`, and mark each cell with the signs in it and in the
+    ///    adjacent cells.
+    /// 2. Look for a particle of the opposite sign within ξ, only for particles in cells with both marks.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn rebuild(
         &mut self,
         positions: &[Vector<D>],
@@ -76,7 +83,7 @@ impl<const D: usize> Detection<D> {
         self.is_inside.clear();
         self.is_inside.extend(level.iter().map(|l| *l < 0.0));
         let (cells, is_inside) = (&self.cells, &self.is_inside);
-        let (starts, order) = (cells.starts(), cells.order());
+        let (starts, order) = (cells.starts(), cells.permutation());
         self.signs.clear();
         self.signs.extend(order.iter().map(|i| is_inside[*i]));
         let signs = &self.signs;
@@ -85,7 +92,7 @@ impl<const D: usize> Detection<D> {
             let mark = |inside: &bool| if *inside { INSIDE } else { OUTSIDE };
             signs[range[0]..range[1]].iter().map(mark).fold(0, |all, mark| all | mark)
         }));
-        cells.spread(&mut self.marks, &mut self.before);
+        cells.spread_marks(&mut self.marks, &mut self.before);
         self.candidates.clear();
         for (cell, mark) in self.marks.iter().enumerate() {
             if *mark == INSIDE | OUTSIDE {
@@ -110,8 +117,8 @@ impl<const D: usize> Detection<D> {
         Ok(())
     }
 
-    /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
-    /// the surface has gaps.
+    /// Whether the particle nearest to `x` has a negative level. This tells the side of a point away from the surface,
+    /// also where the surface has gaps.
     #[must_use]
     pub fn is_nearest_inside(&self, x: &Vector<D>) -> bool {
         self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.is_inside[i])

@@ -1,23 +1,24 @@
-//! A surface of particles, by whichever fits: in space or in material coordinates.
+//! The zero of a level set that particles carry, from fits in space or in material coordinates.
 
 use super::material::MaterialSurface;
-use super::queries::Answers;
+use super::queries::ClosestPoints;
 use super::redistancing::{ClosestPoint, Redistancing};
-use super::rescue::Soundness;
+use super::rescue::FitDiagnostics;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
-/// The zero of a level set carried by particles.
+/// The zero of a level set that particles carry.
 #[derive(Debug)]
 pub enum LevelSurface<const D: usize> {
-    /// Fits over neighbours in space.
+    /// Fits over neighbors in space.
     Spatial(Box<Redistancing<D>>),
-    /// Fits over neighbours in the initial positions.
+    /// Fits over neighbors in initial positions.
     Material(Box<MaterialSurface<D>>),
 }
 
-/// Distance from the surface, in spacings, beyond which the nearest particle tells the side and not the nearest foot.
+/// Distance from the surface, in multiples of h, beyond which the nearest particle decides on which side a point lies,
+/// not the foot point.
 const FAR: f64 = 2.0;
 
 macro_rules! each {
@@ -30,10 +31,11 @@ macro_rules! each {
 }
 
 impl<const D: usize> LevelSurface<D> {
-    /// Step one of a rebuild: which particles lie next to the surface. In material coordinates they stay the same.
+    /// First step of a rebuild: detection of the particles next to the surface. In material coordinates they never
+    /// change.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn detect(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
         match self {
             Self::Spatial(surface) => surface.detect(positions, level, interrupt),
@@ -41,10 +43,10 @@ impl<const D: usize> LevelSurface<D> {
         }
     }
 
-    /// Step two of a rebuild: fits and points of the surface.
+    /// Second step of a rebuild: fits and sample points of the surface.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn fit_samples(
         &mut self,
         positions: &[Vector<D>],
@@ -58,47 +60,49 @@ impl<const D: usize> LevelSurface<D> {
         }
     }
 
-    /// The closest point of the surface for any point with a point of the surface within `reach`.
+    /// The closest point of the surface to `x`; None without a sample point within `cutoff`.
     #[must_use]
-    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
-        each!(self, surface => surface.query(x, reach))
+    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
+        each!(self, surface => surface.query(x, cutoff))
     }
 
-    /// [`Self::query`] for many points.
+    /// [`Self::query`] for many points at once.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn closest_points(
         &self,
         points: &[Vector<D>],
-        reach: f64,
-        answers: &mut Answers<D>,
+        cutoff: f64,
+        results: &mut ClosestPoints<D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
-        each!(self, surface => surface.closest_points(points, reach, answers, interrupt))
+        each!(self, surface => surface.closest_points(points, cutoff, results, interrupt))
     }
 
-    /// h.
+    /// Spacing h of the particles.
     #[must_use]
     pub fn spacing(&self) -> f64 {
         each!(self, surface => surface.spacing())
     }
 
-    /// Points of the surface, in a fixed order.
+    /// Sample points of the surface, in a fixed order.
     #[must_use]
     pub fn sample_points(&self) -> Vec<Vector<D>> {
         each!(self, surface => surface.sample_points().collect())
     }
 
-    /// Whether the surface has no point at all.
+    /// Whether the surface has no sample point.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         each!(self, surface => surface.is_lost())
     }
 
-    /// Whether a point lies inside, given its closest point. Away from a surface in space the nearest particle tells it:
-    /// of a surface with gaps, a foot at the rim of a gap faces nowhere in particular. In material coordinates there are
-    /// points wherever the flow has stretched the surface, and particles may lie far apart instead.
+    /// Whether the point `x` with the closest point `foot` lies inside.
+    ///
+    /// Away from a surface with fits in space, the nearest particle decides, because a foot point at the rim of a gap
+    /// has an arbitrary normal. A surface in material coordinates has sample points wherever the flow has stretched it,
+    /// while particles may be far apart. There the foot point decides.
     #[must_use]
     pub fn is_inside(&self, x: &Vector<D>, foot: &ClosestPoint<D>) -> bool {
         match self {
@@ -107,23 +111,23 @@ impl<const D: usize> LevelSurface<D> {
         }
     }
 
-    /// How sound fits and queries have been so far.
+    /// Fallbacks and condition of all fits and queries so far.
     #[must_use]
-    pub fn soundness(&self) -> &Soundness {
-        each!(self, surface => surface.soundness())
+    pub fn fit_diagnostics(&self) -> &FitDiagnostics {
+        each!(self, surface => surface.fit_diagnostics())
     }
 
-    /// The same, to take over that of an earlier part of the run or of a copy.
-    pub fn soundness_mut(&mut self) -> &mut Soundness {
-        each!(self, surface => surface.soundness_mut())
+    /// The fit diagnostics, for adding those of an earlier part of the run or of a copy.
+    pub fn fit_diagnostics_mut(&mut self) -> &mut FitDiagnostics {
+        each!(self, surface => surface.fit_diagnostics_mut())
     }
 
-    /// Mean and maximum of a measure over the points of the surface, in their order; (0, 0) without any.
-    pub fn over_samples(&self, measure: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
-        let values: Vec<f64> = self.sample_points().par_iter().map(&measure).collect();
-        // A NaN must not be lost in the maximum.
-        let is_broken = values.iter().any(|v| v.is_nan());
-        let most = if is_broken { f64::NAN } else { values.iter().copied().fold(0.0, f64::max) };
-        (values.iter().sum::<f64>() / values.len().max(1) as f64, most)
+    /// Mean and maximum of a non-negative function over the sample points; (0, 0) without sample points.
+    pub fn mean_and_max(&self, function: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
+        let values: Vec<f64> = self.sample_points().par_iter().map(&function).collect();
+        // `f64::max` would drop a NaN.
+        let has_nan = values.iter().any(|v| v.is_nan());
+        let max = if has_nan { f64::NAN } else { values.iter().copied().fold(0.0, f64::max) };
+        (values.iter().sum::<f64>() / values.len().max(1) as f64, max)
     }
 }

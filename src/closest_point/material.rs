@@ -1,21 +1,20 @@
-//! The surface by fits in material coordinates, for particles with unbroken histories.
+//! The surface from fits in material coordinates, for particles whose levels were never overwritten.
 //!
-//! Where particles are carried by a flow and keep their level ψ, both ψ and the position x are smooth functions of the
-//! particle's initial position X, however distorted the particles lie now. Fits of ψ(X) and x(X) over neighbours in the
-//! *initial* positions keep two sheets of a filament apart by themselves, and the neighbours never change. The chain rule
-//! gives the level set in space:
+//! If a flow carries the particles and they keep their levels ψ, then ψ and the position x are smooth functions of the
+//! initial position X, however distorted the present distribution is. The neighbors in initial positions never change,
+//! and the two sheets of a filament remain separate. The chain rule gives the level set in space:
 //!
 //! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹,
 //!
-//! so that closest points are found by the same Newton steps as in space; a step s moves X by J⁻¹ s.
+//! Closest points are therefore found by the same Newton steps as in space, where a step s changes X by J⁻¹ s.
 
 use super::detection::Detection;
 use super::method::PcpMethod;
 use super::newton::{ACCEPTED, LONGEST_STEP, Progress, is_last_step, newton_step, tangents};
 use super::projection::{Projected, project};
-use super::queries::{Answers, QUERIES};
-use super::redistancing::{ClosestPoint, Tally};
-use super::rescue::{Soundness, add};
+use super::queries::{ClosestPoints, QUERIES};
+use super::redistancing::{ClosestPoint, QueryCounts};
+use super::rescue::{FitDiagnostics, add};
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
@@ -26,11 +25,14 @@ use nalgebra::SMatrix;
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 use std::sync::Arc;
 
-/// Particles as they were at the start: what never changes.
+/// The particles at the start, which never change.
 #[derive(Debug)]
 struct Origin<const D: usize> {
+    /// Initial positions X.
     positions: Vec<Vector<D>>,
+    /// Levels ψ.
     level: Vec<f64>,
+    /// Particles that started next to the surface.
     detection: Detection<D>,
 }
 
@@ -43,44 +45,50 @@ pub struct MaterialSurface<const D: usize> {
     origin: Arc<Origin<D>>,
     fits: Vec<Option<Fit<D>>>,
     coefficients: Vec<f64>,
-    /// Points of the surface, several a fit where the flow has stretched it.
+    /// Points of the surface, several per fit where the flow has stretched it.
     seeds: Vec<Seed<D>>,
+    /// The seeds of each fit.
     found: Vec<Vec<Seed<D>>>,
     seed_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
-    soundness: Soundness,
+    fit_diagnostics: FitDiagnostics,
 }
 
-/// A point of the surface.
+/// A point of the surface with the fit by which it was found.
 #[derive(Debug, Clone, Copy)]
 struct Seed<const D: usize> {
+    /// Index of the fit.
     patch: usize,
+    /// Material coordinates X of the point.
     material: Vector<D>,
+    /// Results of the fit at the point.
     spot: Spot<D>,
 }
 
-/// What the fits say at a material point.
+/// Results of the fits at a material point X.
 #[derive(Debug, Clone, Copy)]
 struct Spot<const D: usize> {
+    /// Position x(X) in space.
     point: Vector<D>,
-    /// The level set in space.
+    /// Value, gradient and Hessian of the level set in space.
     jet: Jet<f64, D>,
-    /// ∂ψ in initial positions.
-    rise: Vector<D>,
-    /// J⁻¹.
+    /// Gradient ∂ψ/∂X of the level in material coordinates.
+    material_gradient: Vector<D>,
+    /// The inverse J⁻¹ of the deformation gradient.
     inverse: SMatrix<f64, D, D>,
 }
 
-/// Share of a spacing, in initial positions, that a patch's seeds reach along the surface.
-const SEED_REACH: f64 = 0.8;
-/// Most seeds to either side along one direction: a stretch beyond that leaves gaps between them.
-const MOST_SEEDS: i32 = 64;
-/// Rounds of moving on to another seed's fit before the seed itself is taken.
-const MOST_HOPS: usize = 4;
+/// Extent along the surface of the seeds of a patch, in material coordinates and multiples of h.
+const SEED_EXTENT: f64 = 0.8;
+/// Largest number of seeds to either side along one direction. A larger stretch leaves gaps.
+const MAX_SEEDS: i32 = 64;
+/// Largest number of changes to another seed's fit before the nearest seed itself is the result.
+const MAX_SAMPLE_CHANGES: usize = 4;
 
 impl<const D: usize> MaterialSurface<D> {
-    /// For particles at their initial positions with the level that they keep. An interrupt leaves a surface without
-    /// points: whoever asked ends the run before its first step.
+    /// The surface of particles at their initial positions, with the levels that they keep.
+    ///
+    /// An interrupt leaves a surface without points. The run then ends before its first step.
     #[must_use]
     pub fn new(method: PcpMethod, spacing: f64, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Self {
         let mut detection = Detection::new(Domain::unbounded());
@@ -88,10 +96,11 @@ impl<const D: usize> MaterialSurface<D> {
             detection = Detection::new(Domain::unbounded());
         }
         let origin = Origin { positions: positions.to_vec(), level: level.to_vec(), detection };
-        Self::over(method, spacing, Arc::new(origin))
+        Self::from_origin(method, spacing, Arc::new(origin))
     }
 
-    fn over(method: PcpMethod, spacing: f64, origin: Arc<Origin<D>>) -> Self {
+    /// A surface without points, for particles with the given start.
+    fn from_origin(method: PcpMethod, spacing: f64, origin: Arc<Origin<D>>) -> Self {
         Self {
             regression: method.regression(spacing),
             method,
@@ -103,48 +112,48 @@ impl<const D: usize> MaterialSurface<D> {
             found: Vec::new(),
             seed_cells: CellList::new(Domain::unbounded()),
             scratch: PerThread::new(),
-            soundness: Soundness::default(),
+            fit_diagnostics: FitDiagnostics::default(),
         }
     }
 
-    /// A surface of the same particles that knows nothing of their present positions yet.
+    /// A surface of the same particles, not yet fitted to present positions.
     #[must_use]
     pub fn fresh(&self) -> Self {
-        Self::over(self.method.clone(), self.spacing, Arc::clone(&self.origin))
+        Self::from_origin(self.method.clone(), self.spacing, Arc::clone(&self.origin))
     }
 
-    /// h.
+    /// Spacing h of the particles at the start.
     #[must_use]
     pub fn spacing(&self) -> f64 {
         self.spacing
     }
 
-    /// How sound fits and queries have been so far.
+    /// Fallbacks and condition of all fits and queries so far.
     #[must_use]
-    pub fn soundness(&self) -> &Soundness {
-        &self.soundness
+    pub fn fit_diagnostics(&self) -> &FitDiagnostics {
+        &self.fit_diagnostics
     }
 
-    /// The same, to take over that of an earlier part of the run.
-    pub fn soundness_mut(&mut self) -> &mut Soundness {
-        &mut self.soundness
+    /// The fit diagnostics, for adding those of an earlier part of the run.
+    pub fn fit_diagnostics_mut(&mut self) -> &mut FitDiagnostics {
+        &mut self.fit_diagnostics
     }
 
-    /// Points of the surface.
+    /// Seeds of the surface, as points in space.
     pub fn sample_points(&self) -> impl ExactSizeIterator<Item = Vector<D>> + '_ {
         self.seeds.iter().map(|seed| seed.spot.point)
     }
 
-    /// Whether the surface has no point at all.
+    /// Whether the surface has no point.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.seeds.is_empty()
     }
 
-    /// Fits ψ(X) and x(X) about the particles that started next to the surface, and seeds.
+    /// Fits ψ(X) and x(X) around the particles that started next to the surface, and finds the seeds of all fits.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn fit(&mut self, positions: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
         let quantities = 1 + D;
         let size = quantities * self.regression.terms();
@@ -162,34 +171,35 @@ impl<const D: usize> MaterialSurface<D> {
                     return;
                 }
                 let last = near.len() - 1;
-                let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
+                let centers: [Vector<D>; LANES] = std::array::from_fn(|lane| origin.positions[near[lane.min(last)]]);
                 let values = |j: usize, q: usize| if q == 0 { origin.level[j] } else { positions[j][q - 1] };
                 let data =
                     FitData { search: origin.detection.cells(), values, quantities, admit: |_: usize, _: usize| true };
                 scratch.with(|scratch| {
-                    let found = regression.fit_lanes(&data, &centres[..near.len()], scratch, coefficients);
+                    let found = regression.fit_lanes(&data, &centers[..near.len()], scratch, coefficients);
                     fits.copy_from_slice(&found[..near.len()]);
                 });
             });
         interrupt.check()?;
         for fit in &self.fits {
-            self.soundness.counts.take_fit(fit.as_ref(), self.regression.degree());
-            self.soundness.worst_condition =
-                fit.map_or(self.soundness.worst_condition, |fit| self.soundness.worst_condition.max(fit.condition));
+            self.fit_diagnostics.counts.count_fit(fit.as_ref(), self.regression.degree());
+            self.fit_diagnostics.worst_condition = fit.map_or(self.fit_diagnostics.worst_condition, |fit| {
+                self.fit_diagnostics.worst_condition.max(fit.condition)
+            });
         }
         let mut found = std::mem::take(&mut self.found);
         found.resize_with(near.len(), Vec::new);
         found.par_chunks_mut(BLOCK).enumerate().for_each(|(block, lists)| {
             if !interrupt.is_raised() {
                 for (k, list) in lists.iter_mut().enumerate() {
-                    self.seed(block * BLOCK + k, list);
+                    self.find_seeds(block * BLOCK + k, list);
                 }
             }
         });
         interrupt.check()?;
         self.seeds.clear();
         for (list, fit) in found.iter().zip(&self.fits) {
-            add(&self.soundness.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
+            add(&self.fit_diagnostics.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
             self.seeds.extend(list);
         }
         self.found = found;
@@ -197,96 +207,101 @@ impl<const D: usize> MaterialSurface<D> {
         Ok(())
     }
 
-    /// What the fits of a patch say at a material point.
+    /// Results of the fits of a patch at a material point; None where the deformation gradient is singular.
     #[inline]
     fn spot(&self, patch: usize, fit: &Fit<D>, material: &Vector<D>) -> Option<Spot<D>> {
         let terms = self.regression.terms();
         let degree = self.regression.degree();
         let coefficients = &self.coefficients[patch * (1 + D) * terms..(patch + 1) * (1 + D) * terms];
         let scale = 1.0 / fit.scale;
-        let t: [f64; D] = ((material - fit.centre) * scale).into();
-        let of = |quantity: usize| {
+        let t: [f64; D] = ((material - fit.center) * scale).into();
+        let jet_of = |quantity: usize| {
             let own = &coefficients[quantity * terms..(quantity + 1) * terms];
             Jet::from_local(&derivatives(degree, |place| own[place], &t), scale)
         };
-        let level = of(0);
-        let map: [Jet<f64, D>; D] = std::array::from_fn(|d| of(1 + d));
+        let level = jet_of(0);
+        let map: [Jet<f64, D>; D] = std::array::from_fn(|d| jet_of(1 + d));
         let jacobian = SMatrix::<f64, D, D>::from_fn(|d, a| map[d].gradient[a]);
         let inverse = jacobian.try_inverse()?;
         let gradient = inverse.transpose() * Vector::<D>::from(level.gradient);
-        let bent = SMatrix::<f64, D, D>::from_fn(|a, b| {
+        let material_hessian = SMatrix::<f64, D, D>::from_fn(|a, b| {
             level.hessian[a][b] - (0..D).map(|d| gradient[d] * map[d].hessian[a][b]).sum::<f64>()
         });
-        let hessian = inverse.transpose() * bent * inverse;
+        let hessian = inverse.transpose() * material_hessian * inverse;
         let point = Vector::<D>::from_fn(|d, _| map[d].value);
         let jet = Jet {
             value: level.value,
             gradient: gradient.into(),
             hessian: std::array::from_fn(|d| std::array::from_fn(|e| hessian[(d, e)])),
         };
-        Some(Spot { point, jet, rise: Vector::<D>::from(level.gradient), inverse })
+        Some(Spot { point, jet, material_gradient: Vector::<D>::from(level.gradient), inverse })
     }
 
-    /// Moves a material point onto ψ = 0 along ∂ψ: the shortest way in initial positions, where the gradient in space may
-    /// lead far along the surface.
+    /// Projects a material point onto ψ = 0 along ∂ψ/∂X.
+    ///
+    /// This is the shortest way in material coordinates. The gradient in space may lead far along the surface.
     fn project(&self, patch: usize, fit: &Fit<D>, start: &Vector<D>) -> Option<Seed<D>> {
         let Projected { x, step, .. } = project(&self.method, fit, start, |x| {
             let spot = self.spot(patch, fit, x)?;
-            Some((spot.jet.value, spot.rise, ()))
+            Some((spot.jet.value, spot.material_gradient, ()))
         })?;
         let material = x + step;
         self.spot(patch, fit, &material).map(|spot| Seed { patch, material, spot })
     }
 
-    /// The seeds of a patch: its projected centre, and points along the surface every h where it has been stretched.
-    fn seed(&self, patch: usize, seeds: &mut Vec<Seed<D>>) {
+    /// Finds the seeds of a patch: its projected center, and points along the surface every h where the flow has
+    /// stretched it.
+    fn find_seeds(&self, patch: usize, seeds: &mut Vec<Seed<D>>) {
         seeds.clear();
         let Some(fit) = &self.fits[patch] else { return };
         let Some(first) = self.project(patch, fit, &fit.middle) else { return };
         seeds.push(first);
         let (s, t) = tangents(&first.spot.jet.normal());
-        let along = first.spot.inverse * Vector::<D>::from(s) * self.spacing;
-        let across = first.spot.inverse * Vector::<D>::from(t) * self.spacing;
-        let reach = SEED_REACH * self.spacing;
-        let most = |way: &Vector<D>| {
-            let wanted = reach / way.norm();
-            // A stretch beyond what seeds can cover leaves gaps.
-            add(&self.soundness.counts.unprojected, u64::from(wanted > f64::from(MOST_SEEDS)));
-            (wanted as i32).min(MOST_SEEDS)
+        let along_s = first.spot.inverse * Vector::<D>::from(s) * self.spacing;
+        let along_t = first.spot.inverse * Vector::<D>::from(t) * self.spacing;
+        let extent = SEED_EXTENT * self.spacing;
+        let seeds_along = |direction: &Vector<D>| {
+            let wanted = extent / direction.norm();
+            // Seeds cannot cover a larger stretch.
+            add(&self.fit_diagnostics.counts.unprojected, u64::from(wanted > f64::from(MAX_SEEDS)));
+            (wanted as i32).min(MAX_SEEDS)
         };
-        let (i_most, j_most) = (most(&along), if D == 3 { most(&across) } else { 0 });
-        for j in -j_most..=j_most {
-            for i in -i_most..=i_most {
+        let (last_i, last_j) = (seeds_along(&along_s), if D == 3 { seeds_along(&along_t) } else { 0 });
+        for j in -last_j..=last_j {
+            for i in -last_i..=last_i {
                 if i != 0 || j != 0 {
-                    let start = first.material + along * f64::from(i) + across * f64::from(j);
+                    let start = first.material + along_s * f64::from(i) + along_t * f64::from(j);
                     match self.project(patch, fit, &start) {
                         Some(seed) => seeds.push(seed),
-                        None => add(&self.soundness.counts.unprojected, 1),
+                        None => add(&self.fit_diagnostics.counts.unprojected, 1),
                     }
                 }
             }
         }
     }
 
-    /// The closest point of the surface for any point whose nearest seed lies within `reach`; None if none does.
+    /// The closest point of the surface to `x`; None without a seed within `cutoff`.
     #[must_use]
-    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
-        let (nearest, distance) = self.seed_cells.nearest(x, reach)?;
-        Some(self.solve(nearest, distance, x, &mut Tally::default()))
+    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
+        let (nearest, distance) = self.seed_cells.nearest(x, cutoff)?;
+        Some(self.solve(nearest, distance, x, &mut QueryCounts::default()))
     }
 
-    /// Newton from the nearest seed; where it leaves the fit, on from the seed nearest to there; a foot farther than the
-    /// seed, or none: the seed itself (counted).
-    fn solve(&self, nearest: usize, distance: f64, x: &Vector<D>, tally: &mut Tally) -> ClosestPoint<D> {
-        tally.queries += 1;
+    /// The closest point for a query whose nearest seed lies at the given distance.
+    ///
+    /// Newton's method starts from the nearest seed. If it leaves the fit, it continues from the seed nearest to the
+    /// iterate. If the foot point is farther away than the nearest seed, or if there is none, the result is the seed
+    /// itself.
+    fn solve(&self, nearest: usize, distance: f64, x: &Vector<D>, query_counts: &mut QueryCounts) -> ClosestPoint<D> {
+        query_counts.queries += 1;
         let mut current = nearest;
-        for hop in 0..=MOST_HOPS {
-            match self.newton(&self.seeds[current], x, tally) {
-                Ok(answer) => {
+        for changes in 0..=MAX_SAMPLE_CHANGES {
+            match self.newton(&self.seeds[current], x, query_counts) {
+                Ok(closest) => {
                     let slack = self.method.slack(x);
-                    if answer.distance <= distance * (1.0 + 1e-9) + slack {
-                        tally.hopped += u64::from(hop > 0);
-                        return answer;
+                    if closest.distance <= distance * (1.0 + 1e-9) + slack {
+                        query_counts.other_sample += u64::from(changes > 0);
+                        return closest;
                     }
                     break;
                 }
@@ -297,13 +312,19 @@ impl<const D: usize> MaterialSurface<D> {
                 Err(None) => break,
             }
         }
-        tally.sample_distance += 1;
+        query_counts.sample_distance += 1;
         let Spot { point, jet, .. } = &self.seeds[nearest].spot;
-        answer(x, point, jet, true)
+        closest_point(x, point, jet, true)
     }
 
-    /// The foot, or where the iteration left the fit, if it did.
-    fn newton(&self, seed: &Seed<D>, x: &Vector<D>, tally: &mut Tally) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
+    /// The closest point on the fit of a seed. The error is the position where the iteration left the fit, or None
+    /// where it did not converge.
+    fn newton(
+        &self,
+        seed: &Seed<D>,
+        x: &Vector<D>,
+        query_counts: &mut QueryCounts,
+    ) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
         let fit = self.fits[seed.patch].as_ref().ok_or(None)?;
         let mut material = seed.material;
         let mut spot = seed.spot;
@@ -311,7 +332,7 @@ impl<const D: usize> MaterialSurface<D> {
         let mut left = false;
         let mut progress = Progress::default();
         for _ in 0..self.method.max_iterations {
-            tally.iterations += 1;
+            query_counts.iterations += 1;
             let offset: [f64; D] = (x - spot.point).into();
             let step = newton_step(&spot.jet, &offset);
             let mut shift = spot.inverse * Vector::<D>::from(step);
@@ -321,17 +342,17 @@ impl<const D: usize> MaterialSurface<D> {
             }
             if is_last_step(&self.method, length, last, fit.radius, material.amax()) {
                 let foot = spot.point + Vector::<D>::from(step);
-                return Ok(answer(x, &foot, &spot.jet.moved(&step), false));
+                return Ok(closest_point(x, &foot, &spot.jet.translated(&step), false));
             }
             if progress.is_stuck(length) {
                 return Err(None);
             }
-            let most = LONGEST_STEP * fit.radius;
-            if length > most {
-                shift *= most / length;
+            let longest = LONGEST_STEP * fit.radius;
+            if length > longest {
+                shift *= longest / length;
             }
             material += shift;
-            // Once outside, an iteration may come back; staying there it has nothing to say.
+            // An iteration may leave the support once and come back. It ends when it stays outside.
             let outside = (material - fit.middle).norm_squared() > fit.radius * fit.radius;
             spot = self.spot(seed.patch, fit, &material).ok_or(None)?;
             if outside && (left || length <= ACCEPTED * fit.radius) {
@@ -343,35 +364,41 @@ impl<const D: usize> MaterialSurface<D> {
         Err(None)
     }
 
-    /// [`Self::query`] for many points.
+    /// [`Self::query`] for many points at once.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn closest_points(
         &self,
         points: &[Vector<D>],
-        reach: f64,
-        answers: &mut Answers<D>,
+        cutoff: f64,
+        results: &mut ClosestPoints<D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
-        let feet = answers.one_a_query(points.len());
+        let feet = results.resize_to_queries(points.len());
         feet.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(feet, points)| {
             if interrupt.is_raised() {
                 return;
             }
-            let mut tally = Tally::default();
+            let mut query_counts = QueryCounts::default();
             let mut last = None;
             for (foot, x) in feet.iter_mut().zip(points) {
-                let nearest = self.seed_cells.nearest_next(x, reach, &mut last, |seed| self.seeds[seed].spot.point);
-                *foot = nearest.map(|(seed, r2)| self.solve(seed, r2.sqrt(), x, &mut tally));
+                let nearest = self.seed_cells.nearest_next(x, cutoff, &mut last, |seed| self.seeds[seed].spot.point);
+                *foot = nearest.map(|(seed, r2)| self.solve(seed, r2.sqrt(), x, &mut query_counts));
             }
-            tally.book(&self.soundness.counts);
+            query_counts.add_to(&self.fit_diagnostics.counts);
         });
         interrupt.check()
     }
 }
 
-fn answer<const D: usize>(x: &Vector<D>, foot: &Vector<D>, jet: &Jet<f64, D>, is_sample: bool) -> ClosestPoint<D> {
+/// The closest point `foot` to `x` with the geometry of the level set there.
+fn closest_point<const D: usize>(
+    x: &Vector<D>,
+    foot: &Vector<D>,
+    jet: &Jet<f64, D>,
+    is_sample: bool,
+) -> ClosestPoint<D> {
     let offset = x - foot;
     let normal = Vector::<D>::from(jet.normal());
     ClosestPoint {

@@ -1,51 +1,52 @@
-//! The parameters of a closest-point level set, as understood.
+//! Parameters of the particle closest-point method.
 
 use crate::geometry::Vector;
 use crate::polynomials::multi_index::term_count;
 use crate::polynomials::neighborhood::radius_of_count;
 use crate::polynomials::{BasisKind, Neighborhood, PolynomialBasis, Regression, Solver};
 
-/// How particles are redistanced. Lengths are in multiples of the spacing h.
+/// Parameters of the particle closest-point method (PCP).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PcpMethod {
     /// Total degree of the local polynomials.
     pub degree: usize,
-    /// Basis of the regression.
+    /// Polynomial basis of the regression.
     pub basis: BasisKind,
-    /// Which particles take part in a fit.
+    /// Rule by which particles take part in a fit.
     pub neighborhood: NeighborhoodChoice,
-    /// How regressions are solved.
+    /// Solver of the regressions.
     pub solver: Solver,
-    /// Whether only particles take part whose last normals agree with that of the fit's centre.
+    /// Whether only particles take part in a fit whose last normals agree with the normal of the fit's center.
     pub same_branch: bool,
-    /// k of the weight exp(−k r²/r_c²).
+    /// Exponent k of the weight exp(−k r²/r_c²).
     pub weight: f64,
-    /// Least number of neighbours per coefficient.
+    /// Smallest number of neighbors per coefficient.
     pub minimum_ratio: f64,
-    /// ξ/h: particles with the other sign within ξ become sample particles.
+    /// Threshold ξ/h: a particle with a particle of the opposite sign within ξ becomes a sample particle.
     pub sample_threshold_h: f64,
-    /// ε: iterations end when the error of the foot falls below it.
+    /// Tolerance ε of foot points, an absolute length.
     pub tolerance: f64,
-    /// k_max of the iterations.
+    /// Largest number k_max of iterations.
     pub max_iterations: u32,
 }
 
-/// A neighbourhood in multiples of the spacing.
+/// The rule by which particles take part in a fit, with lengths in multiples of h.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NeighborhoodChoice {
-    /// All within `cutoff_h` spacings.
+    /// All particles within `cutoff_h` spacings.
     Radius {
-        /// r_c/h.
+        /// Cutoff radius r_c/h.
         cutoff_h: f64,
     },
     /// The nearest `count` particles.
     Nearest {
-        /// n_n.
+        /// Number n_n of particles.
         count: usize,
     },
-    /// The nearest `count` particles of the initial positions, in which fits are made: for unbroken histories.
+    /// The nearest `count` particles in initial positions, in which the fits are made. Levels must never have been
+    /// overwritten.
     Material {
-        /// n_n.
+        /// Number n_n of particles.
         count: usize,
     },
 }
@@ -64,7 +65,7 @@ impl PcpMethod {
         Regression::new(basis, neighborhood, self.weight, self.minimum_ratio, spacing, self.solver)
     }
 
-    /// r_c/h of evenly filled neighbourhoods.
+    /// Cutoff radius r_c/h of a neighborhood of evenly distributed particles.
     #[must_use]
     pub fn even_cutoff_h<const D: usize>(&self) -> f64 {
         let cutoff = match self.neighborhood {
@@ -77,20 +78,23 @@ impl PcpMethod {
         cutoff.max(radius_of_count::<D>(self.minimum_ratio * terms))
     }
 
-    /// How far from the surface the particles of evenly filled neighbourhoods lie, in multiples of h.
+    /// Half width, in multiples of h, of the band of particles that take part in fits when particles are evenly
+    /// distributed.
     #[must_use]
-    pub fn even_reach_h<const D: usize>(&self) -> f64 {
+    pub fn even_fit_band_h<const D: usize>(&self) -> f64 {
         self.sample_threshold_h + self.even_cutoff_h::<D>()
     }
 
-    /// How far from the surface particles take part in fits, in multiples of h, growth of the radius included.
+    /// Half width, in multiples of h, of the band of particles that can take part in fits, growth of the radius
+    /// included.
     #[must_use]
-    pub fn reach_h<const D: usize>(&self) -> f64 {
-        // Half again over what an even distribution needs leaves room for the growth of a starved neighbourhood.
+    pub fn fit_band_h<const D: usize>(&self) -> f64 {
+        // One and a half times the radius of an even distribution leaves room for the growth of a sparse neighborhood.
         self.sample_threshold_h + 1.5 * self.even_cutoff_h::<D>() + 1.0
     }
 
-    /// How much farther than the sample a foot may seem from rounding and an early end, for a query at `x`.
+    /// Length by which a foot point may seem farther than the sample point because of rounding and tolerance, for a
+    /// query at `x`.
     #[must_use]
     pub fn slack<const D: usize>(&self, x: &Vector<D>) -> f64 {
         self.tolerance.max(16.0 * f64::EPSILON * x.amax())

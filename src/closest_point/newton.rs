@@ -1,69 +1,72 @@
-//! The closest point on the zero of a local polynomial by a safeguarded Newton method (PCP eqs. 10 to 14).
+//! The closest point on the zero of a local polynomial p by a safeguarded Newton method (PCP eqs. 10 to 14).
 //!
-//! Splitting the Newton system of the Lagrangian into the normal n = ∇p/|∇p| and the tangent plane gives a normal
-//! step −p/|∇p| and a tangential step with the reduced Hessian I + λ tᵢ·∇∇p·tⱼ, λ the least-squares multiplier. The
-//! reduced Hessian's pivots are held above a floor and the step's length below a share of the support, so the
-//! iteration cannot run off; near the solution both bounds are inactive and convergence is quadratic.
+//! The Newton system of the Lagrangian splits into a part along the normal n = ∇p/‖∇p‖ and one in the tangent plane.
+//! The normal step is −p/‖∇p‖. The tangential step has the reduced Hessian I + λ tᵢ·∇∇p·tⱼ with the least-squares
+//! multiplier λ (docs/errata.md, PCP 12). The pivots of the reduced Hessian stay above a floor, and a step is at most a
+//! fraction of the support, so that the iteration cannot diverge. Near the solution both bounds are inactive and
+//! convergence is quadratic.
 
 use super::method::PcpMethod;
 use crate::geometry::Vector;
-use crate::linear_algebra::number::{LANES, Lanes, Number, add_scaled, difference, dot, times};
+use crate::linear_algebra::number::{LANES, Lanes, Number, add_scaled, difference, dot, multiply_symmetric};
 use crate::polynomials::horner::derivatives;
 use crate::polynomials::{Fit, Jet};
 
-/// A local polynomial of the level set with the point of its zero where iterations start.
+/// A local polynomial of the level set with the point of its zero from which iterations start.
 #[derive(Debug, Clone, Copy)]
 pub struct Patch<'a, const D: usize> {
     /// Geometry of the fit.
     pub fit: &'a Fit<D>,
     /// Total degree that the coefficients are laid out for.
     pub degree: usize,
-    /// Coefficients of monomials in nested order.
+    /// Coefficients of the monomials in nested order.
     pub coefficients: &'a [f64],
-    /// A point with p = 0.
+    /// A point with p = 0, where iterations start.
     pub start: &'a Vector<D>,
-    /// p, ∇p, ∇∇p there.
+    /// Value, gradient and Hessian at the start.
     pub jet: &'a Jet<f64, D>,
 }
 
-/// How an iteration ended.
+/// Result of a Newton iteration.
 #[derive(Debug, Clone, Copy)]
 pub enum NewtonEnd<const D: usize> {
-    /// A stationary point of the distance on p = 0.
-    Converged(Foot<D>),
-    /// The iterate left the support of the fit; another sample may know more there.
+    /// A stationary point of the distance on p = 0 was found.
+    Converged(FootPoint<D>),
+    /// The iterate left the support of the fit at this position, where another sample's polynomial is valid.
     LeftSupport(Vector<D>),
-    /// The iteration did not settle.
+    /// The iteration did not converge.
     Stuck,
 }
 
-/// A closest point with what the polynomial says there.
+/// A closest point on p = 0 with the geometry there.
 #[derive(Debug, Clone, Copy)]
-pub struct Foot<const D: usize> {
-    /// The point.
+pub struct FootPoint<const D: usize> {
+    /// The closest point.
     pub point: Vector<D>,
-    /// ∇p/|∇p|.
+    /// Unit normal ∇p/‖∇p‖.
     pub normal: Vector<D>,
-    /// ∇·n.
+    /// Curvature ∇·n.
     pub curvature: f64,
 }
 
-/// Least pivot of the reduced Hessian; 1 is a plane, 0 the centre of curvature.
+/// Smallest pivot of the reduced Hessian, which is 1 for a plane and 0 at a center of curvature.
 const PIVOT_FLOOR: f64 = 0.1;
-/// Longest step as a share of the support's radius.
+/// Longest step, as a fraction of the support's radius.
 pub(super) const LONGEST_STEP: f64 = 0.4;
-/// A stalled end is accepted when the last step is shorter than this share of the support.
+/// A stalled iteration has converged when its last step is shorter than this fraction of the support's radius.
 pub(super) const ACCEPTED: f64 = 1e-7;
-/// A step shorter than this share of the support, and than a hundredth of the one before, is the last: convergence is
-/// quadratic, so the next would be shorter than its square.
+/// A step is the last one when it is shorter than this fraction of the support's radius and than [`QUADRATIC_RATIO`] of
+/// the step before. Convergence is then quadratic, and the next step would be shorter than the square of this one.
 const QUADRATIC: f64 = 3e-8;
 /// See [`QUADRATIC`].
 const QUADRATIC_RATIO: f64 = 1e-2;
 
-/// Watches whether steps still become shorter: an iteration that runs in a circle would burn all that are allowed.
+/// Watches whether steps still get shorter. An iteration that cycles would otherwise use up all allowed iterations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Progress {
+    /// Length of the shortest step so far.
     shortest: f64,
+    /// Number of steps since then.
     since: u32,
 }
 
@@ -73,11 +76,11 @@ impl Default for Progress {
     }
 }
 
-/// Iterations without a shorter step than before that are too many.
+/// Largest number of iterations without a step that is shorter than all before it.
 const STAGNANT: u32 = 30;
 
 impl Progress {
-    /// Takes the length of a step into account.
+    /// Takes the length of a step into account, and returns whether the iteration no longer makes progress.
     #[inline(always)]
     pub(super) fn is_stuck(&mut self, length: f64) -> bool {
         self.since = if length < self.shortest { 0 } else { self.since + 1 };
@@ -86,17 +89,25 @@ impl Progress {
     }
 }
 
-/// Whether the iteration ends with a step of this length.
+/// Whether the iteration has converged with a step of the given length.
+///
+/// - `last`: length of the step before.
+/// - `radius`: radius of the support.
+/// - `largest_coordinate`: largest coordinate of the point, in magnitude.
 #[inline(always)]
 pub(super) fn is_last_step(method: &PcpMethod, length: f64, last: f64, radius: f64, largest_coordinate: f64) -> bool {
     let is_quadratic = length <= QUADRATIC * radius && length <= QUADRATIC_RATIO * last;
     let is_stalled = length <= ACCEPTED * radius && length >= 0.5 * last;
-    // Coordinates cannot move by less than their own last bit.
+    // Coordinates cannot change by less than their last bit.
     length <= method.tolerance || is_quadratic || is_stalled || length <= f64::EPSILON * largest_coordinate
 }
 
-/// Finds the points of p = 0 nearest to up to [`LANES`] queries, all beginning at the patch's start. Returns the end of
-/// each and the iterations made.
+/// Finds the points of p = 0 that are nearest to up to [`LANES`] queries, one query per lane.
+///
+/// - `patch`: the polynomial and the point where all iterations start.
+/// - `queries`: at least one query, in the frame of the patch.
+///
+/// Returns the result of each query and the number of iterations of all of them.
 #[must_use]
 #[inline]
 pub fn closest_points<const D: usize>(
@@ -105,96 +116,149 @@ pub fn closest_points<const D: usize>(
     queries: &[Vector<D>],
 ) -> ([NewtonEnd<D>; LANES], u64) {
     let fit = patch.fit;
-    let mut ends = [NewtonEnd::Stuck; LANES];
-    let live = queries.len().min(LANES);
-    let mut active = [false; LANES];
-    active[..live].fill(true);
-    let zero = Lanes::splat(0.0);
-    let (mut query, mut x, mut middle, mut centre) = ([zero; D], [zero; D], [zero; D], [zero; D]);
-    for d in 0..D {
-        let mut lanes = [queries[0][d]; LANES];
-        for lane in 1..live {
-            lanes[lane] = queries[lane][d];
-        }
-        query[d] = Lanes::new(lanes);
-        x[d] = Lanes::splat(patch.start[d]);
-        middle[d] = Lanes::splat(fit.middle[d]);
-        centre[d] = Lanes::splat(fit.centre[d]);
-    }
+    let query = transpose(queries);
+    let [mut x, middle, center] = [patch.start, &fit.middle, &fit.center].map(splat);
     let mut jet = Jet {
         value: Lanes::splat(patch.jet.value),
         gradient: patch.jet.gradient.map(Lanes::splat),
         hessian: patch.jet.hessian.map(|row| row.map(Lanes::splat)),
     };
     let inverse_scale = 1.0 / fit.scale;
-    let most = Lanes::splat(LONGEST_STEP * fit.radius);
-    let limit = fit.radius * fit.radius;
-    let mut last = [f64::INFINITY; LANES];
-    let mut progress = [Progress::default(); LANES];
-    let mut iterations = 0;
+    let longest = Lanes::splat(LONGEST_STEP * fit.radius);
+    let mut iterations = LaneIterations::new(queries.len());
     for iteration in 1..=method.max_iterations {
-        let offset = difference(&query, &x);
-        let step = newton_step(&jet, &offset);
+        let step = newton_step(&jet, &difference(&query, &x));
         let length = dot(&step, &step).sqrt();
-        let lengths = length.to_array();
-        let mut largest = x[0].abs();
-        for component in &x[1..] {
-            largest = largest.max(component.abs());
-        }
-        let largest = largest.to_array();
-        let factor = most / Number::max(length, most);
-        let next = add_scaled(&x, factor, &step);
+        let next = add_scaled(&x, longest / Number::max(length, longest), &step);
         let from_middle = difference(&next, &middle);
-        let away = dot(&from_middle, &from_middle).to_array();
-        let mut done = [false; LANES];
-        let mut any_done = false;
-        let mut any_active = false;
-        for lane in 0..LANES {
-            if !active[lane] {
-                continue;
-            }
-            iterations += 1;
-            if !lengths[lane].is_finite() {
-                // The gradient vanished or numbers ran over: the end stays `Stuck`.
-                active[lane] = false;
-            } else if is_last_step(method, lengths[lane], last[lane], fit.radius, largest[lane]) {
-                done[lane] = true;
-                any_done = true;
-                active[lane] = false;
-            } else if progress[lane].is_stuck(lengths[lane]) {
-                active[lane] = false;
-            } else if away[lane] > limit {
-                ends[lane] = NewtonEnd::LeftSupport(Vector::<D>::from_fn(|d, _| next[d].to_array()[lane]));
-                active[lane] = false;
-            }
-            any_active |= active[lane];
+        let lengths = length.to_array();
+        let squares = dot(&from_middle, &from_middle).to_array();
+        let converged = iterations.judge(method, fit, &lengths, &largest_coordinates(&x), (&next, &squares));
+        if converged.contains(&true) {
+            iterations.store(&converged, &x, &step, &jet);
         }
-        if any_done {
-            // The jet is at most one last step away: its quadratic part tells the normal there.
-            let jet = jet.moved(&step);
-            let foot = add_scaled(&x, Lanes::splat(1.0), &step);
-            let (normal, curvature) = (jet.normal(), jet.curvature().to_array());
-            for lane in (0..LANES).filter(|lane| done[*lane]) {
-                ends[lane] = NewtonEnd::Converged(Foot {
-                    point: Vector::<D>::from_fn(|d, _| foot[d].to_array()[lane]),
-                    normal: Vector::<D>::from_fn(|d, _| normal[d].to_array()[lane]),
-                    curvature: curvature[lane],
-                });
-            }
-        }
-        if !any_active || iteration == method.max_iterations {
+        if !iterations.is_active.contains(&true) || iteration == method.max_iterations {
             break;
         }
         x = next;
-        last = lengths;
-        let t = difference(&x, &centre).map(|c| c * Lanes::splat(inverse_scale));
+        iterations.last = lengths;
+        let t = difference(&x, &center).map(|c| c * Lanes::splat(inverse_scale));
         let local = derivatives(patch.degree, |place| Lanes::splat(patch.coefficients[place]), &t);
         jet = Jet::from_local(&local, Lanes::splat(inverse_scale));
     }
-    (ends, iterations)
+    (iterations.ends, iterations.count)
 }
 
-/// One step for the offset `query − x`; not finite where the gradient vanishes.
+/// State of the iterations of all lanes.
+struct LaneIterations<const D: usize> {
+    /// Results of the lanes whose iterations have ended.
+    ends: [NewtonEnd<D>; LANES],
+    /// Whether the iteration of a lane goes on.
+    is_active: [bool; LANES],
+    /// Length of the last step of each lane.
+    last: [f64; LANES],
+    progress: [Progress; LANES],
+    /// Number of iterations of all lanes.
+    count: u64,
+}
+
+impl<const D: usize> LaneIterations<D> {
+    #[inline(always)]
+    fn new(queries: usize) -> Self {
+        Self {
+            ends: [NewtonEnd::Stuck; LANES],
+            is_active: std::array::from_fn(|lane| lane < queries),
+            last: [f64::INFINITY; LANES],
+            progress: [Progress::default(); LANES],
+            count: 0,
+        }
+    }
+
+    /// Ends the iterations that this step completes, and returns which of them have converged.
+    ///
+    /// - `lengths`: length of the step of each lane.
+    /// - `largest`: largest coordinate of each lane, in magnitude.
+    /// - `next`: the next positions, and their squared distances from the middle of the support.
+    #[inline(always)]
+    fn judge(
+        &mut self,
+        method: &PcpMethod,
+        fit: &Fit<D>,
+        lengths: &[f64; LANES],
+        largest: &[f64; LANES],
+        (next, squares): (&[Lanes; D], &[f64; LANES]),
+    ) -> [bool; LANES] {
+        let limit = fit.radius * fit.radius;
+        let mut converged = [false; LANES];
+        for lane in 0..LANES {
+            if !self.is_active[lane] {
+                continue;
+            }
+            self.count += 1;
+            if !lengths[lane].is_finite() {
+                // The gradient vanished or numbers overflowed: the result stays `Stuck`.
+                self.is_active[lane] = false;
+            } else if is_last_step(method, lengths[lane], self.last[lane], fit.radius, largest[lane]) {
+                converged[lane] = true;
+                self.is_active[lane] = false;
+            } else if self.progress[lane].is_stuck(lengths[lane]) {
+                self.is_active[lane] = false;
+            } else if squares[lane] > limit {
+                self.ends[lane] = NewtonEnd::LeftSupport(of_lane(next, lane));
+                self.is_active[lane] = false;
+            }
+        }
+        converged
+    }
+
+    /// Stores the foot points of the converged lanes. They are one last step away from `x`, where the jet was
+    /// evaluated.
+    #[inline(always)]
+    fn store(&mut self, converged: &[bool; LANES], x: &[Lanes; D], step: &[Lanes; D], jet: &Jet<Lanes, D>) {
+        let jet = jet.translated(step);
+        let foot = add_scaled(x, Lanes::splat(1.0), step);
+        let (normal, curvature) = (jet.normal(), jet.curvature().to_array());
+        for lane in (0..LANES).filter(|lane| converged[*lane]) {
+            let (point, normal) = (of_lane(&foot, lane), of_lane(&normal, lane));
+            self.ends[lane] = NewtonEnd::Converged(FootPoint { point, normal, curvature: curvature[lane] });
+        }
+    }
+}
+
+/// Up to [`LANES`] vectors, one per lane. Spare lanes repeat the first vector.
+#[inline(always)]
+fn transpose<const D: usize>(vectors: &[Vector<D>]) -> [Lanes; D] {
+    std::array::from_fn(|d| {
+        Lanes::new(std::array::from_fn(|lane| vectors[if lane < vectors.len() { lane } else { 0 }][d]))
+    })
+}
+
+/// The same vector in every lane.
+#[inline(always)]
+fn splat<const D: usize>(vector: &Vector<D>) -> [Lanes; D] {
+    std::array::from_fn(|d| Lanes::splat(vector[d]))
+}
+
+/// The vector of one lane.
+#[inline(always)]
+fn of_lane<const D: usize>(vectors: &[Lanes; D], lane: usize) -> Vector<D> {
+    Vector::<D>::from_fn(|d, _| vectors[d].to_array()[lane])
+}
+
+/// Largest coordinate of each lane, in magnitude.
+#[inline(always)]
+fn largest_coordinates<const D: usize>(x: &[Lanes; D]) -> [f64; LANES] {
+    let mut largest = x[0].abs();
+    for component in &x[1..] {
+        largest = largest.max(component.abs());
+    }
+    largest.to_array()
+}
+
+/// The Newton step at a point for the offset `query − x`. It is not finite where the gradient vanishes.
+///
+/// With the unit normal n and the multiplier λ = offset·n/‖∇p‖, the normal step is −p/‖∇p‖ n. The tangential step
+/// solves the reduced system with the matrix tᵢ·(I + λ∇∇p)·tⱼ, whose pivots are at least [`PIVOT_FLOOR`].
 #[inline(always)]
 pub(super) fn newton_step<T: Number, const D: usize>(jet: &Jet<T, D>, offset: &[T; D]) -> [T; D] {
     let floor = T::splat(PIVOT_FLOOR);
@@ -203,29 +267,29 @@ pub(super) fn newton_step<T: Number, const D: usize>(jet: &Jet<T, D>, offset: &[
     let n = jet.gradient.map(|g| g * inverse);
     // x − query + λ∇p = 0 in the least-squares sense.
     let lambda = dot(offset, &n) * inverse;
-    let along = -(jet.value * inverse);
-    let step = n.map(|c| c * along);
-    // What is left to slide after the normal step: the offset less (I + λ∇∇p) times that step.
-    let bend = times(&jet.hessian, &step);
-    let pull = add_scaled(&difference(offset, &step), -lambda, &bend);
+    let normal_length = -(jet.value * inverse);
+    let step = n.map(|c| c * normal_length);
+    // Residual of the tangential equations: the offset minus (I + λ∇∇p) times the normal step.
+    let hessian_step = multiply_symmetric(&jet.hessian, &step);
+    let residual = add_scaled(&difference(offset, &step), -lambda, &hessian_step);
     let (s, t) = tangents(&n);
-    let bent = times(&jet.hessian, &s);
-    let first = Number::max(lambda.mul_add(dot(&s, &bent), one), floor);
-    let mut slide = dot(&s, &pull) / first;
+    let hessian_s = multiply_symmetric(&jet.hessian, &s);
+    let first_pivot = Number::max(lambda.mul_add(dot(&s, &hessian_s), one), floor);
+    let mut along_s = dot(&s, &residual) / first_pivot;
     if D == 3 {
-        let factor = lambda * dot(&t, &bent) / first;
-        let diagonal = lambda.mul_add(dot(&t, &times(&jet.hessian, &t)), one);
-        let second = Number::max(diagonal - factor * factor * first, floor);
-        let other = (dot(&t, &pull) - factor * first * slide) / second;
-        slide = slide - factor * other;
-        let across = add_scaled(&step, other, &t);
-        return add_scaled(&across, slide, &s);
+        let factor = lambda * dot(&t, &hessian_s) / first_pivot;
+        let diagonal = lambda.mul_add(dot(&t, &multiply_symmetric(&jet.hessian, &t)), one);
+        let second_pivot = Number::max(diagonal - factor * factor * first_pivot, floor);
+        let along_t = (dot(&t, &residual) - factor * first_pivot * along_s) / second_pivot;
+        along_s = along_s - factor * along_t;
+        let step = add_scaled(&step, along_t, &t);
+        return add_scaled(&step, along_s, &s);
     }
-    add_scaled(&step, slide, &s)
+    add_scaled(&step, along_s, &s)
 }
 
-/// Unit vectors that span the plane across the unit normal n without a case distinction (Duff et al. 2017); the second
-/// is zero in two dimensions.
+/// Unit vectors that span the tangent plane of the unit normal n, without branches (Duff 2017). The second one is zero
+/// in two dimensions.
 #[inline(always)]
 pub(super) fn tangents<T: Number, const D: usize>(n: &[T; D]) -> ([T; D], [T; D]) {
     let zero = T::splat(0.0);
@@ -274,7 +338,8 @@ mod tests {
 
     #[test]
     fn one_step_from_the_pole_of_a_paraboloid_is_newtons() {
-        // p = z + (a x² + b y²)/2 at the origin, query (u, v, w): slides of u/(1 + w a), v/(1 + w b).
+        // p = z + (a x² + b y²)/2 at the origin and the query (u, v, w) give the tangential steps u/(1 + w a) and v/(1
+        // + w b).
         let (a, b) = (0.7, -0.4);
         let jet =
             Jet { value: 0.0, gradient: [0.0, 0.0, 1.0], hessian: [[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, 0.0]] };
@@ -283,7 +348,7 @@ mod tests {
         for d in 0..3 {
             assert!((step[d] - expected[d]).abs() < 1e-15);
         }
-        // Beyond the centre of curvature the pivot is held above its floor.
+        // Beyond the center of curvature the pivot is held above its floor.
         let far = newton_step(&jet, &[0.0, 0.01, 5.0]);
         assert!((far[1] - 0.1).abs() < 1e-15);
     }

@@ -1,26 +1,32 @@
 //! Projection onto the zero of a local polynomial along its gradient (PCP eq. 9), in space or in initial positions.
+//!
+//! The iteration is x ← x − p ∇p/‖∇p‖² with steps of limited length.
 
 use super::method::PcpMethod;
 use super::newton::ACCEPTED;
 use crate::geometry::Vector;
 use crate::polynomials::Fit;
 
-/// Longest step as a share of the support's radius.
+/// Longest step, as a fraction of the support's radius.
 const LONGEST_STEP: f64 = 0.5;
 
-/// Where a projection ends: at `x + step`, at most one last short step from where the polynomial was evaluated.
+/// Result of a projection, the point `x + step`.
 #[derive(Debug, Clone, Copy)]
 pub struct Projected<T, const D: usize> {
-    /// Where the polynomial was evaluated last.
+    /// Position of the last evaluation of the polynomial.
     pub x: Vector<D>,
-    /// The last step.
+    /// The last, short step, after which the polynomial was not evaluated again.
     pub step: Vector<D>,
-    /// What was found there.
+    /// Result of the last evaluation.
     pub found: T,
 }
 
-/// Moves `start` onto the zero of what `evaluate` gives as value and gradient, with whatever the caller wants to know
-/// of the place; None when the iteration leaves the support of the fit or does not settle.
+/// Projects `start` onto the zero of a polynomial.
+///
+/// - `fit`: geometry of the fit, whose support bounds the iteration.
+/// - `evaluate`: value, gradient, and any further result at a point; None ends the projection.
+///
+/// Returns None when the iteration leaves the support of the fit or does not converge.
 #[must_use]
 pub fn project<T, const D: usize>(
     method: &PcpMethod,
@@ -38,17 +44,18 @@ pub fn project<T, const D: usize>(
         }
         let mut step = gradient * (-value / slope);
         let length = step.norm();
-        // Round-off may keep the residual above the tolerance for ever: no progress at a tiny step is the end too.
+        // Round-off may keep the residual above the tolerance. The iteration also ends when tiny steps do not get
+        // shorter.
         let is_stalled = length <= ACCEPTED * fit.radius && length >= 0.5 * last;
-        // The next step would be shorter than the square of this one, and coordinates cannot move by less than their
-        // own last bit.
+        // Convergence is quadratic: the next step would be shorter than the square of this one. Nor can coordinates
+        // change by less than their last bit.
         let is_quadratic = length <= ACCEPTED * fit.radius && length <= 1e-2 * last;
         if length <= method.tolerance || is_stalled || is_quadratic || length <= f64::EPSILON * x.amax() {
             return Some(Projected { x, step, found });
         }
-        let most = LONGEST_STEP * fit.radius;
-        if length > most {
-            step *= most / length;
+        let longest = LONGEST_STEP * fit.radius;
+        if length > longest {
+            step *= longest / length;
         }
         x += step;
         if (x - fit.middle).norm_squared() > fit.radius * fit.radius {

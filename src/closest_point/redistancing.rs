@@ -1,40 +1,74 @@
-//! Redistancing as a whole: near-surface particles → fits → sample particles; queries → closest points.
+//! Redistancing with fits in space: from particles to sample points, and from queries to closest points.
 
 use super::detection::Detection;
 use super::method::PcpMethod;
-use super::newton::{Foot, NewtonEnd, Patch, closest_points};
+use super::newton::{FootPoint, NewtonEnd, Patch, closest_points};
 use super::projection::{Projected, project};
-use super::rescue::{RescueCounts, Soundness, add};
+use super::rescue::{FitDiagnostics, RescueCounts, add};
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::number::LANES;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
-use crate::polynomials::{Fit, FitData, Jet, Regression, RegressionScratch};
+use crate::polynomials::{Fit, FitData, Jet, LocalPolynomial, Regression, RegressionScratch};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
-/// The answer to a query.
+/// Closest point of the surface to a query point x, with the geometry there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClosestPoint<const D: usize> {
     /// The closest point of the surface.
     pub point: Vector<D>,
-    /// |x − point| ≥ 0.
+    /// Distance ‖x − point‖ ≥ 0.
     pub distance: f64,
-    /// ∇p/|∇p| there: outward.
+    /// Outward unit normal ∇p/‖∇p‖ at the point.
     pub normal: Vector<D>,
-    /// ∇·n there.
+    /// Curvature ∇·n at the point.
     pub curvature: f64,
-    /// Whether the query lies on the outer side, by the normal.
+    /// Whether x lies on the side to which the normal points.
     pub is_outside: bool,
-    /// Whether it is the nearest sample itself, for want of a closest point.
+    /// Whether the point is the nearest sample itself, since no closest point was found.
     pub is_sample: bool,
 }
 
-/// The surface of a set of particles: sample particles with their polynomials, and the means to rebuild it.
+/// The zero of a level set on particles: sample points with their polynomials.
 ///
-/// 1. [`Self::detect`] and [`Self::fit_samples`]: detection of near-surface particles, regression, projection.
-/// 2. [`Self::closest_points`](super::queries) or [`Self::query`]: nearest sample, Newton, rescue.
+/// 1. [`Self::detect`] and [`Self::fit_samples`] rebuild the surface: detection of near-surface particles, regression,
+///    projection.
+/// 2. [`Self::closest_points`](super::queries) or [`Self::query`] find closest points: nearest sample, Newton's method,
+///    fallbacks.
 ///
-/// All storage is reused; a rebuild allocates only while counts grow.
+/// All memory is reused. A rebuild allocates only when numbers of particles or samples grow.
+///
+/// ```
+/// use meniscus::closest_point::method::NeighborhoodChoice;
+/// use meniscus::closest_point::{PcpMethod, Redistancing};
+/// use meniscus::geometry::{Domain, Vector};
+/// use meniscus::parallel::Interrupt;
+/// use meniscus::polynomials::{BasisKind, Solver};
+///
+/// // A circle of radius 0.5 as the level x² + y² − 1/4 of particles on a lattice.
+/// let h = 1.0 / 16.0;
+/// let nodes = (0..33 * 33).map(|k| Vector::<2>::new((k % 33) as f64, (k / 33) as f64));
+/// let positions: Vec<Vector<2>> = nodes.map(|x| (x * h).add_scalar(-1.0)).collect();
+/// let level: Vec<f64> = positions.iter().map(|x| x.norm_squared() - 0.25).collect();
+/// let method = PcpMethod {
+///     degree: 4,
+///     basis: BasisKind::Minter,
+///     neighborhood: NeighborhoodChoice::Radius { cutoff_h: 2.8 },
+///     solver: Solver::Moments,
+///     same_branch: false,
+///     weight: 2.0,
+///     minimum_ratio: 1.5,
+///     sample_threshold_h: 1.5,
+///     tolerance: 1e-12,
+///     max_iterations: 100,
+/// };
+/// let mut surface = Redistancing::new(method, Domain::unbounded(), h);
+/// let never = Interrupt::default();
+/// surface.detect(&positions, &level, &never).unwrap();
+/// surface.fit_samples(&positions, &level, None, &never).unwrap();
+/// let closest = surface.query(&Vector::<2>::new(0.6, 0.0), 1.0).unwrap();
+/// assert!((closest.distance - 0.1).abs() < 1e-10 && (closest.curvature - 2.0).abs() < 1e-8);
+/// ```
 #[derive(Debug)]
 pub struct Redistancing<const D: usize> {
     method: PcpMethod,
@@ -42,29 +76,52 @@ pub struct Redistancing<const D: usize> {
     spacing: f64,
     regression: Regression<D>,
     detection: Detection<D>,
+    /// Sample of each near-surface particle; None where fit or projection failed.
     fitted: Vec<Option<Sample<D>>>,
+    /// Coefficients of the polynomials of all near-surface particles.
     coefficients: Vec<f64>,
+    /// The samples of `fitted`, without gaps.
     samples: Vec<Sample<D>>,
     sample_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
-    soundness: Soundness,
+    fit_diagnostics: FitDiagnostics,
 }
 
-/// A sample particle: a point of the surface with the polynomial that it was projected with.
+/// A point of the surface with the polynomial by which it was found.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample<const D: usize> {
     point: Vector<D>,
+    /// Value, gradient and Hessian of the polynomial at the point.
     jet: Jet<f64, D>,
     fit: Fit<D>,
-    /// Where its coefficients begin.
-    place: usize,
+    /// Index of the first coefficient of the polynomial.
+    first: usize,
 }
 
-/// Rounds of moving on to another sample's polynomial before the sample itself is taken.
-const MOST_HOPS: usize = 4;
+impl<const D: usize> Sample<D> {
+    /// Projects the near-surface particle at `x` onto the zero of its polynomial; None when the projection fails.
+    ///
+    /// `first` is the index of the first coefficient of the polynomial.
+    fn project(
+        method: &PcpMethod,
+        fit: Fit<D>,
+        x: &Vector<D>,
+        polynomial: &LocalPolynomial<'_, D>,
+        first: usize,
+    ) -> Option<Self> {
+        let Projected { x, step, found } = project(method, &fit, x, |x| {
+            let jet = polynomial.jet(&(x - fit.center));
+            Some((jet.value, Vector::<D>::from(jet.gradient), jet))
+        })?;
+        Some(Self { point: x + step, jet: found.translated(&step.into()), fit, first })
+    }
+}
+
+/// Largest number of changes to another sample's polynomial before the nearest sample itself is the result.
+const MAX_SAMPLE_CHANGES: usize = 4;
 
 impl<const D: usize> Redistancing<D> {
-    /// A redistancing without a surface yet, for particles of spacing h.
+    /// A surface without samples, for particles of spacing h.
     #[must_use]
     pub fn new(method: PcpMethod, domain: Domain<D>, spacing: f64) -> Self {
         Self {
@@ -78,54 +135,57 @@ impl<const D: usize> Redistancing<D> {
             coefficients: Vec::new(),
             samples: Vec::new(),
             scratch: PerThread::new(),
-            soundness: Soundness::default(),
+            fit_diagnostics: FitDiagnostics::default(),
         }
     }
 
-    /// h.
+    /// Spacing h of the particles.
     #[must_use]
     pub fn spacing(&self) -> f64 {
         self.spacing
     }
 
-    /// Positions of the sample particles.
+    /// Sample points of the surface.
     pub fn sample_points(&self) -> impl ExactSizeIterator<Item = Vector<D>> + '_ {
         self.samples.iter().map(|sample| sample.point)
     }
 
+    /// All samples.
     pub(super) fn samples(&self) -> &[Sample<D>] {
         &self.samples
     }
 
-    /// How sound fits and queries have been so far.
+    /// Fallbacks and condition of all fits and queries so far.
     #[must_use]
-    pub fn soundness(&self) -> &Soundness {
-        &self.soundness
+    pub fn fit_diagnostics(&self) -> &FitDiagnostics {
+        &self.fit_diagnostics
     }
 
-    /// The same, to take over that of an earlier part of the run.
-    pub fn soundness_mut(&mut self) -> &mut Soundness {
-        &mut self.soundness
+    /// The fit diagnostics, for adding those of an earlier part of the run.
+    pub fn fit_diagnostics_mut(&mut self) -> &mut FitDiagnostics {
+        &mut self.fit_diagnostics
     }
 
-    /// Step one of a rebuild: the particles with another of the opposite sign within ξ (PCP 3.1).
+    /// First step of a rebuild: finds the particles with a particle of the opposite sign within ξ (PCP 3.1).
     ///
     /// A level of exactly zero counts as outside.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn detect(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
         let threshold = self.method.sample_threshold_h * self.spacing;
         self.detection.rebuild(positions, level, threshold, interrupt)
     }
 
-    /// Step two of a rebuild: fits about the near-surface particles and their projection onto the surface.
+    /// Second step of a rebuild: fits polynomials around the near-surface particles and projects the particles onto the
+    /// surface.
     ///
-    /// `normals` are those of the last redistancing (zero where unknown): where the method says so, only particles
-    /// whose normals agree with that of the fit's centre take part, so that two sheets of a filament are kept apart.
+    /// `normals` are those of the last redistancing, zero where they are unknown. With [`PcpMethod::same_branch`], only
+    /// particles whose normals agree with the normal of the fit's center take part in a fit. This separates the two
+    /// sheets of a filament.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn fit_samples(
         &mut self,
         positions: &[Vector<D>],
@@ -138,10 +198,10 @@ impl<const D: usize> Redistancing<D> {
         self.fitted.resize(near.len(), None);
         self.coefficients.resize(near.len() * terms, 0.0);
         let (cells, regression, method, scratch, counts) =
-            (self.detection.cells(), &self.regression, &self.method, &self.scratch, &self.soundness.counts);
+            (self.detection.cells(), &self.regression, &self.method, &self.scratch, &self.fit_diagnostics.counts);
         let normals = normals.filter(|_| method.same_branch);
         let is_same_branch = |i: usize, j: usize| {
-            // Unknown normals, which are zero, agree with every other.
+            // An unknown normal, which is zero, agrees with every other.
             normals.is_none_or(|normals| i == j || normals[i].dot(&normals[j]) >= 0.0)
         };
         self.fitted
@@ -153,34 +213,26 @@ impl<const D: usize> Redistancing<D> {
                 if interrupt.is_raised() {
                     return;
                 }
-                let mut place = block * BLOCK * terms;
+                let mut first = block * BLOCK * terms;
                 scratch.with(|scratch| {
                     let lanes = fitted.chunks_mut(LANES).zip(coefficients.chunks_mut(LANES * terms));
                     for ((fitted, coefficients), near) in lanes.zip(near.chunks(LANES)) {
                         let last = near.len() - 1;
-                        let centres: [Vector<D>; LANES] = std::array::from_fn(|lane| positions[near[lane.min(last)]]);
+                        let centers: [Vector<D>; LANES] = std::array::from_fn(|lane| positions[near[lane.min(last)]]);
                         let admit = |lane: usize, j: usize| is_same_branch(near[lane], j);
                         let data = FitData { search: cells, values: |j, _| level[j], quantities: 1, admit };
-                        let fits = regression.fit_lanes(&data, &centres[..near.len()], scratch, coefficients);
+                        let fits = regression.fit_lanes(&data, &centers[..near.len()], scratch, coefficients);
                         for ((slot, coefficients), (fit, x)) in
-                            fitted.iter_mut().zip(coefficients.chunks(terms)).zip(fits.iter().zip(&centres))
+                            fitted.iter_mut().zip(coefficients.chunks(terms)).zip(fits.iter().zip(&centers))
                         {
                             *slot = fit.and_then(|fit| {
                                 let polynomial = fit.polynomial(regression.degree(), coefficients);
-                                let projected = project(method, &fit, x, |x| {
-                                    let jet = polynomial.jet(&(x - fit.centre));
-                                    Some((jet.value, Vector::<D>::from(jet.gradient), jet))
-                                });
-                                add(&counts.unprojected, u64::from(projected.is_none()));
-                                projected.map(|Projected { x, step, found }| Sample {
-                                    point: x + step,
-                                    jet: found.moved(&step.into()),
-                                    fit,
-                                    place,
-                                })
+                                let sample = Sample::project(method, fit, x, &polynomial, first);
+                                add(&counts.unprojected, u64::from(sample.is_none()));
+                                sample
                             });
-                            place += terms;
-                            counts.take_fit(fit.as_ref(), regression.degree());
+                            first += terms;
+                            counts.count_fit(fit.as_ref(), regression.degree());
                         }
                     }
                 });
@@ -188,76 +240,79 @@ impl<const D: usize> Redistancing<D> {
         interrupt.check()?;
         self.samples.clear();
         self.samples.extend(self.fitted.iter().flatten());
-        self.soundness.worst_condition =
-            self.samples.iter().fold(self.soundness.worst_condition, |worst, s| worst.max(s.fit.condition));
+        self.fit_diagnostics.worst_condition =
+            self.samples.iter().fold(self.fit_diagnostics.worst_condition, |worst, s| worst.max(s.fit.condition));
         self.sample_cells.rebuild(self.samples.iter().map(|s| s.point), SAMPLE_CELL * self.spacing);
         Ok(())
     }
 
-    /// The closest point of the surface for any point whose nearest sample lies within `reach`; None if none does.
+    /// The closest point of the surface to `x`; None without a sample within `cutoff`.
     ///
-    /// 1. Newton on the nearest sample's polynomial.
-    /// 2. Where the iterate leaves that polynomial's support: on with the sample nearest to it.
-    /// 3. A foot farther than the sample, or none: the sample itself (counted).
+    /// 1. Solve by Newton's method on the polynomial of the nearest sample.
+    /// 2. If the iterate leaves the support of the polynomial, continue with the sample nearest to the iterate.
+    /// 3. If the foot point is farther away than the sample, or if there is none, return the sample itself.
     #[must_use]
-    pub fn query(&self, x: &Vector<D>, reach: f64) -> Option<ClosestPoint<D>> {
-        let (nearest, distance) = self.sample_cells.nearest(x, reach)?;
+    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
+        let (nearest, distance) = self.sample_cells.nearest(x, cutoff)?;
         let mut foot = [None];
-        // Only the queries of a redistancing are counted.
-        self.solve(nearest, &[*x], &[distance], &mut foot, &mut Tally::default());
+        // Only the queries of `closest_points` are counted.
+        self.solve(nearest, &[*x], &[distance], &mut foot, &mut QueryCounts::default());
         foot[0]
     }
 
-    /// The nearest sample not farther than `reach`, and its squared distance, for one query after another: each search
-    /// starts from the sample that `last` holds.
-    pub(super) fn nearest_sample(&self, x: &Vector<D>, reach: f64, last: &mut Option<usize>) -> Option<(usize, f64)> {
-        self.sample_cells.nearest_next(x, reach, last, |sample| self.samples[sample].point)
+    /// The nearest sample within `cutoff` and its squared distance, for a sequence of queries. A search starts from the
+    /// sample `last`.
+    pub(super) fn nearest_sample(&self, x: &Vector<D>, cutoff: f64, last: &mut Option<usize>) -> Option<(usize, f64)> {
+        self.sample_cells.nearest_next(x, cutoff, last, |sample| self.samples[sample].point)
     }
 
+    /// The polynomial of a sample.
     fn patch(&self, sample: usize) -> Patch<'_, D> {
-        let Sample { point, jet, fit, place } = &self.samples[sample];
-        let coefficients = &self.coefficients[*place..place + self.regression.terms()];
+        let Sample { point, jet, fit, first } = &self.samples[sample];
+        let coefficients = &self.coefficients[*first..first + self.regression.terms()];
         Patch { fit, degree: self.regression.degree(), coefficients, start: point, jet }
     }
 
-    /// The point in the frame of a sample: the short way round a periodic axis.
-    fn in_frame_of(&self, sample: usize, x: &Vector<D>) -> Vector<D> {
+    /// The periodic image of `x` that is nearest to a sample.
+    fn image_near(&self, sample: usize, x: &Vector<D>) -> Vector<D> {
         let point = self.samples[sample].point;
         point + self.domain.displacement(&point, x)
     }
 
-    /// Answers for up to [`LANES`] points that have the same nearest sample, at the given distances from it.
+    /// Writes the closest points of up to [`LANES`] points to `feet`. All points have the same nearest sample, at the
+    /// given distances.
     pub(super) fn solve(
         &self,
         nearest: usize,
         points: &[Vector<D>],
         distances: &[f64],
         feet: &mut [Option<ClosestPoint<D>>],
-        tally: &mut Tally,
+        query_counts: &mut QueryCounts,
     ) {
         let last = points.len() - 1;
-        let queries: [Vector<D>; LANES] =
-            std::array::from_fn(|lane| self.in_frame_of(nearest, &points[lane.min(last)]));
+        let queries: [Vector<D>; LANES] = std::array::from_fn(|lane| self.image_near(nearest, &points[lane.min(last)]));
         let (ends, iterations) = closest_points(&self.method, &self.patch(nearest), &queries[..points.len()]);
-        tally.queries += points.len() as u64;
-        tally.iterations += iterations;
+        query_counts.queries += points.len() as u64;
+        query_counts.iterations += iterations;
         for (lane, (x, foot)) in points.iter().zip(feet).enumerate() {
             let distance = distances[lane];
             let found = match ends[lane] {
                 NewtonEnd::Converged(foot) => self.accepted(&queries[lane], &foot, distance),
-                NewtonEnd::LeftSupport(at) => self.hop(nearest, x, &at, distance, tally),
+                NewtonEnd::LeftSupport(at) => {
+                    self.continue_from_another_sample(nearest, x, &at, distance, query_counts)
+                }
                 NewtonEnd::Stuck => None,
             };
-            tally.sample_distance += u64::from(found.is_none());
+            query_counts.sample_distance += u64::from(found.is_none());
             *foot = Some(found.unwrap_or_else(|| self.sample_itself(nearest, x, distance)));
         }
     }
 
-    /// The answer of a foot, unless it lies farther from the query than the sample does.
-    fn accepted(&self, query: &Vector<D>, foot: &Foot<D>, sample_distance: f64) -> Option<ClosestPoint<D>> {
+    /// The closest point from a foot point, unless it lies farther from the query than the sample does.
+    fn accepted(&self, query: &Vector<D>, foot: &FootPoint<D>, sample_distance: f64) -> Option<ClosestPoint<D>> {
         let offset = query - foot.point;
         let distance = offset.norm();
-        // Equal up to the tolerance and the last bits of the coordinates counts as not farther.
+        // A distance that is equal up to the tolerance and the last bits of the coordinates does not count as farther.
         let slack = self.method.slack(query);
         (distance <= sample_distance * (1.0 + 1e-9) + slack).then(|| ClosestPoint {
             point: self.domain.wrap(foot.point),
@@ -269,29 +324,30 @@ impl<const D: usize> Redistancing<D> {
         })
     }
 
-    /// On with the sample nearest to where an iterate left its polynomial's support, a few times.
-    fn hop(
+    /// Continues with the sample nearest to `at`, where the iterate left the support of a polynomial, up to
+    /// [`MAX_SAMPLE_CHANGES`] times.
+    fn continue_from_another_sample(
         &self,
         from: usize,
         x: &Vector<D>,
         at: &Vector<D>,
         distance: f64,
-        tally: &mut Tally,
+        query_counts: &mut QueryCounts,
     ) -> Option<ClosestPoint<D>> {
         let (mut current, mut at) = (from, *at);
-        for _ in 0..MOST_HOPS {
+        for _ in 0..MAX_SAMPLE_CHANGES {
             let (next, _) = self.sample_cells.nearest(&at, f64::INFINITY)?;
             if next == current {
                 return None;
             }
             current = next;
-            let query = self.in_frame_of(current, x);
+            let query = self.image_near(current, x);
             let (ends, iterations) = closest_points(&self.method, &self.patch(current), &[query]);
-            tally.iterations += iterations;
+            query_counts.iterations += iterations;
             match ends[0] {
                 NewtonEnd::Converged(foot) => {
                     let accepted = self.accepted(&query, &foot, distance);
-                    tally.hopped += u64::from(accepted.is_some());
+                    query_counts.other_sample += u64::from(accepted.is_some());
                     return accepted;
                 }
                 NewtonEnd::LeftSupport(place) => at = place,
@@ -301,6 +357,7 @@ impl<const D: usize> Redistancing<D> {
         None
     }
 
+    /// The nearest sample as the closest point.
     fn sample_itself(&self, nearest: usize, x: &Vector<D>, distance: f64) -> ClosestPoint<D> {
         let Sample { point, jet, .. } = &self.samples[nearest];
         let normal = Vector::<D>::from(jet.normal());
@@ -314,37 +371,39 @@ impl<const D: usize> Redistancing<D> {
         }
     }
 
-    /// Whether the particle nearest to `x` has a negative level: the side of a point away from the surface, also where
-    /// the surface has gaps.
+    /// Whether the particle nearest to `x` has a negative level. This tells the side of a point away from the surface,
+    /// also where the surface has gaps.
     #[must_use]
     pub fn is_nearest_particle_inside(&self, x: &Vector<D>) -> bool {
         self.detection.is_nearest_inside(x)
     }
 
-    /// Whether the surface has no sample at all.
+    /// Whether the surface has no sample.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.samples.is_empty()
     }
 }
 
-/// Edge of the cells of sample particles, in spacings.
+/// Edge of the cells of the sample points, in multiples of h.
 const SAMPLE_CELL: f64 = 3.0;
 
-/// Counts of one block of queries, booked at once to keep threads off each other's cache lines.
+/// Counts of a block of queries. They are added to the total at once, so that threads do not compete for its cache
+/// lines.
 #[derive(Debug, Default)]
-pub(super) struct Tally {
+pub(super) struct QueryCounts {
     pub(super) queries: u64,
     pub(super) iterations: u64,
-    pub(super) hopped: u64,
+    pub(super) other_sample: u64,
     pub(super) sample_distance: u64,
 }
 
-impl Tally {
-    pub(super) fn book(&self, counts: &RescueCounts) {
+impl QueryCounts {
+    /// Adds these counts to the total.
+    pub(super) fn add_to(&self, counts: &RescueCounts) {
         add(&counts.queries, self.queries);
         add(&counts.iterations, self.iterations);
-        add(&counts.hopped, self.hopped);
+        add(&counts.other_sample, self.other_sample);
         add(&counts.sample_distance, self.sample_distance);
     }
 }

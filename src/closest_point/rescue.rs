@@ -1,29 +1,29 @@
-//! Counts of everything that did not go the plain way. A rescue is data: counted and reported, never silent.
+//! Counts of fits, queries and their fallbacks. Every fallback is counted and reported.
 
 use crate::polynomials::Fit;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 macro_rules! counters {
     ($($(#[$doc:meta])* $name:ident => $label:literal,)*) => {
-        /// How often what happened, over the life of a simulation.
+        /// Numbers of fits, queries and fallbacks since the start of a simulation.
         #[derive(Debug, Default)]
         pub struct RescueCounts {
             $($(#[$doc])* pub $name: AtomicU64,)*
         }
 
         impl RescueCounts {
-            /// Labels and counts in a fixed order.
+            /// Names, as in reports, and counts in a fixed order.
             #[must_use]
             pub fn entries(&self) -> Vec<(&'static str, u64)> {
                 vec![$(($label, self.$name.load(Ordering::Relaxed)),)*]
             }
 
-            /// Adds those of another.
+            /// Adds the counts of another.
             pub fn add(&self, other: &Self) {
                 $(add(&self.$name, get(&other.$name));)*
             }
 
-            /// Takes the counts of an earlier [`Self::entries`] in the same order.
+            /// Restores the counts of [`Self::entries`], given in the same order.
             pub fn restore(&self, counts: &[u64]) {
                 let slots = [$(&self.$name,)*];
                 for (slot, count) in slots.into_iter().zip(counts) {
@@ -34,51 +34,51 @@ macro_rules! counters {
     };
 }
 
-/// How sound the fits and queries of a surface have been.
+/// Fallbacks and condition of the fits and queries of a surface.
 #[derive(Debug, Default)]
-pub struct Soundness {
-    /// What did not go the plain way so far.
+pub struct FitDiagnostics {
+    /// Numbers of fits, queries and fallbacks so far.
     pub counts: RescueCounts,
-    /// The worst condition of a scaled regression matrix so far.
+    /// Largest condition number of a scaled regression matrix so far.
     pub worst_condition: f64,
 }
 
-impl Soundness {
-    /// Adds that of another surface of the same particles.
-    pub fn take_over(&mut self, other: &Self) {
+impl FitDiagnostics {
+    /// Adds the diagnostics of another surface.
+    pub fn merge(&mut self, other: &Self) {
         self.counts.add(&other.counts);
         self.worst_condition = self.worst_condition.max(other.worst_condition);
     }
 }
 
 counters! {
-    /// Regressions solved.
+    /// Number of fits.
     fits => "fits",
-    /// Fits whose radius or count had to grow.
+    /// Fits whose radius or number of neighbors had to grow.
     enlarged => "fits.larger_radius",
-    /// Fits of a lower degree than asked.
+    /// Fits of a lower degree than the method's.
     lowered => "fits.lower_degree",
-    /// Fits that moments were asked for and could not do (too few neighbours, too small a pivot, values that are no
-    /// numbers), left to orthogonal decomposition.
+    /// Fits by orthogonal decomposition in place of moments, because of too few neighbors, a small pivot or values that
+    /// are not finite.
     decomposed => "fits.orthogonal",
-    /// Near-surface particles without any fit.
+    /// Near-surface particles without a fit.
     unfitted => "fits.none",
-    /// Fits whose zero could not be reached: no sample particle; in initial positions also points of a stretched patch
-    /// that could not be reached, or were too many.
+    /// Fits whose zero was not reached, so that there is no sample. In initial positions also points of a stretched
+    /// patch that were not reached or were too many.
     unprojected => "samples.not_projected",
-    /// Queries solved, the rescued ones included.
+    /// Number of queries.
     queries => "queries",
-    /// Newton iterations of all queries.
+    /// Number of Newton iterations of all queries.
     iterations => "queries.iterations",
-    /// Queries that went on with another sample's polynomial.
-    hopped => "queries.other_sample",
-    /// Queries answered by the nearest sample itself.
+    /// Queries that were solved on the polynomial of another sample than the nearest.
+    other_sample => "queries.other_sample",
+    /// Queries whose result is the nearest sample itself.
     sample_distance => "queries.sample_distance",
 }
 
 impl RescueCounts {
-    /// Takes a fit, or the want of one, into account for a method of the given degree.
-    pub(super) fn take_fit<const D: usize>(&self, fit: Option<&Fit<D>>, degree: usize) {
+    /// Counts a fit, or a missing one, of a method of the given degree.
+    pub(super) fn count_fit<const D: usize>(&self, fit: Option<&Fit<D>>, degree: usize) {
         add(&self.fits, 1);
         match fit {
             None => add(&self.unfitted, 1),
@@ -91,14 +91,14 @@ impl RescueCounts {
     }
 }
 
-/// Adds to a counter.
+/// Adds `amount` to a counter.
 pub(crate) fn add(counter: &AtomicU64, amount: u64) {
     if amount > 0 {
         counter.fetch_add(amount, Ordering::Relaxed);
     }
 }
 
-/// Reads a counter.
+/// Value of a counter.
 pub(crate) fn get(counter: &AtomicU64) -> u64 {
     counter.load(Ordering::Relaxed)
 }
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn counts_survive_a_round_trip() {
         let counts = RescueCounts::default();
-        add(&counts.hopped, 3);
+        add(&counts.other_sample, 3);
         add(&counts.queries, 70);
         let saved: Vec<u64> = counts.entries().into_iter().map(|e| e.1).collect();
         let other = RescueCounts::default();

@@ -1,13 +1,13 @@
-//! The space that particles live in: unbounded, or periodic along chosen axes.
+//! The space in which particles move: unbounded, or periodic along chosen axes.
 
 use super::Vector;
 
 /// One axis of a domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Axis {
-    /// The axis has no end.
+    /// Coordinates run from −∞ to ∞.
     Unbounded,
-    /// Positions `x` and `x + length` are the same point; coordinates live in `[start, start + length)`.
+    /// Positions `x` and `x + length` are the same point. Wrapped coordinates lie in `[start, start + length)`.
     Periodic {
         /// Lower end of the period.
         start: f64,
@@ -17,38 +17,46 @@ pub enum Axis {
 }
 
 /// A box of `D` axes, each unbounded or periodic.
+///
+/// ```
+/// use meniscus::geometry::{Domain, Vector, domain::Axis};
+///
+/// let domain = Domain::new([Axis::Periodic { start: 0.0, length: 1.0 }, Axis::Unbounded]);
+/// let dx = domain.displacement(&Vector::<2>::new(0.9, 0.0), &Vector::<2>::new(0.1, 0.0));
+/// assert!((dx[0] - 0.2).abs() < 1e-15);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Domain<const D: usize> {
     axes: [Axis; D],
 }
 
 impl<const D: usize> Domain<D> {
-    /// All of space.
+    /// A domain without bounds along any axis.
     #[must_use]
     pub fn unbounded() -> Self {
         Self { axes: [Axis::Unbounded; D] }
     }
 
-    /// A domain from its axes.
+    /// A domain with the given axes, in the order x, y, z.
     #[must_use]
     pub fn new(axes: [Axis; D]) -> Self {
         Self { axes }
     }
 
-    /// The axes in order x, y, z.
+    /// The axes in the order x, y, z.
     #[must_use]
     pub fn axes(&self) -> &[Axis; D] {
         &self.axes
     }
 
-    /// The representative of `x` inside the box: periodic coordinates are moved into `[start, start + length)`.
+    /// The point `x` with its periodic coordinates moved into `[start, start + length)`.
     #[must_use]
     pub fn wrap(&self, mut x: Vector<D>) -> Vector<D> {
         for d in 0..D {
             if let Axis::Periodic { start, length } = self.axes[d] {
                 let turns = ((x[d] - start) / length).floor();
                 x[d] -= turns * length;
-                // Rounding may land exactly on the upper end, which is the lower end.
+                // Rounding may give the upper end itself, which is the same point as the lower end.
                 if x[d] >= start + length || x[d] < start {
                     x[d] = start;
                 }

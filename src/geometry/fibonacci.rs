@@ -1,34 +1,47 @@
-//! Points spread evenly over surfaces of revolution: equal shares of the area from one to the next, turned by the golden angle.
+//! Evenly spread points on surfaces of revolution, along a Fibonacci spiral (González 2009).
+//!
+//! Each point stands for the same area. The next point is turned about the axis by the golden angle.
 
 use super::Vector;
 use std::f64::consts::PI;
 
-/// The angle from one point to the next, π (3 − √5).
-fn golden(i: usize) -> f64 {
+/// Angle of point i about the axis: i times the golden angle π (3 − √5).
+fn spiral_angle(i: usize) -> f64 {
     PI * (3.0 - 5.0_f64.sqrt()) * i as f64
 }
 
-/// Fibonacci points of the unit sphere: z_i = 1 − 2 (i + ½)/N, turned by the golden angle from one to the next.
+/// `count` Fibonacci points of the unit sphere: z_i = 1 − 2 (i + ½)/N at the angle i π (3 − √5).
+///
+/// ```
+/// let points = meniscus::geometry::fibonacci::sphere(100);
+/// assert!(points.iter().all(|x| (x.norm() - 1.0).abs() < 1e-14));
+/// ```
 #[must_use]
 pub fn sphere(count: usize) -> Vec<Vector<3>> {
     (0..count)
         .map(|i| {
             let z = 1.0 - 2.0 * (i as f64 + 0.5) / count as f64;
-            let (across, angle) = ((1.0 - z * z).sqrt(), golden(i));
+            let (across, angle) = ((1.0 - z * z).sqrt(), spiral_angle(i));
             Vector::<3>::new(across * angle.cos(), across * angle.sin(), z)
         })
         .collect()
 }
 
-/// Points of a surface of revolution about z: `share(s)`, rising from 0 to 1 over [0, 1], is the part of the area up to the
-/// parameter s, `profile(s)` the distance from the axis and z there.
+/// `count` Fibonacci points of a surface of revolution about the z axis.
+///
+/// - `share(s)`: the share of the area below the parameter s, rising from 0 to 1 over [0, 1].
+/// - `profile(s)`: distance from the axis, and z, at the parameter s.
 #[must_use]
-pub fn of_revolution(count: usize, share: impl Fn(f64) -> f64, profile: impl Fn(f64) -> (f64, f64)) -> Vec<Vector<3>> {
+pub fn surface_of_revolution(
+    count: usize,
+    share: impl Fn(f64) -> f64,
+    profile: impl Fn(f64) -> (f64, f64),
+) -> Vec<Vector<3>> {
     (0..count)
         .map(|i| {
             let wanted = (i as f64 + 0.5) / count as f64;
             let (mut low, mut high) = (0.0, 1.0);
-            // Sixty halvings leave nothing of a double's digits.
+            // Sixty halvings of [0, 1] exhaust the 53 bits of a double.
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
                 if share(middle) < wanted {
@@ -37,7 +50,7 @@ pub fn of_revolution(count: usize, share: impl Fn(f64) -> f64, profile: impl Fn(
                     high = middle;
                 }
             }
-            let ((across, z), angle) = (profile(low), golden(i));
+            let ((across, z), angle) = (profile(low), spiral_angle(i));
             Vector::<3>::new(across * angle.cos(), across * angle.sin(), z)
         })
         .collect()
@@ -60,7 +73,8 @@ mod tests {
 
     #[test]
     fn the_sphere_is_a_surface_of_revolution() {
-        let turned = super::of_revolution(300, |s| 0.5 * (1.0 - (PI * s).cos()), |s| ((PI * s).sin(), (PI * s).cos()));
+        let turned =
+            super::surface_of_revolution(300, |s| 0.5 * (1.0 - (PI * s).cos()), |s| ((PI * s).sin(), (PI * s).cos()));
         for (x, y) in turned.iter().zip(super::sphere(300)) {
             assert!((x - y).norm() < 1e-12);
         }

@@ -1,4 +1,4 @@
-//! Prescribed velocity fields u(x, t). One file a flow.
+//! Prescribed velocity fields u(x, t), one file per flow.
 
 pub mod rays;
 pub mod rotation;
@@ -33,10 +33,11 @@ impl Stretch {
 /// A flow answers all questions about itself, so no other code needs to know which flow it is. Methods with a default
 /// state what holds for most flows.
 pub trait Flow<const D: usize>: Send + Sync {
-    /// u(x, t).
+    /// Velocity u(x, t).
     fn velocity(&self, x: &Vector<D>, time: f64) -> Vector<D>;
 
-    /// An upper bound of |u| at all times over the points that start in the box from `low` to `high`. It limits time steps.
+    /// An upper bound of |u| at all times over the points that start in the box from `low` to `high`. It limits time
+    /// steps.
     fn top_speed(&self, low: &Vector<D>, high: &Vector<D>) -> f64;
 
     /// Position that a rigid motion gives `x` after `duration`, by its formula; None where the motion is not rigid.

@@ -1,34 +1,45 @@
-//! Points on a Cartesian lattice, regular or jittered (PCP paper, eqs. 19 and 20).
+//! Points of a Cartesian lattice, regular or jittered (PCP eqs. 19 and 20).
 
 use super::Vector;
 use super::random::CounterRandom;
 use crate::parallel::Interrupt;
 
-/// A lattice `x_m = (m + offset) h + α h μ_m`, `μ_m ~ U[−1, 1]^D` drawn by the counter `m`.
+/// The lattice `x_m = (m + offset) h + α h μ_m` with random numbers `μ_m ~ U[−1, 1]^D` that depend on the seed and m
+/// alone.
+///
+/// ```
+/// use meniscus::{geometry::{Vector, lattice::Lattice}, parallel::Interrupt};
+///
+/// let lattice = Lattice { spacing: 0.25, offset: 0.0, jitter: 0.2, seed: 1 };
+/// let corner = Vector::<2>::repeat(1.0);
+/// let circle = |x: &Vector<2>| x.norm() - 0.5;
+/// let band = lattice.points_near(&-corner, &corner, 0.3, circle, &Interrupt::default());
+/// assert!(band.iter().all(|x| circle(x).abs() <= 0.3));
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Lattice {
     /// Spacing h > 0.
     pub spacing: f64,
-    /// 0 puts points on multiples of h, ½ on the centres of cells.
+    /// Offset of the nodes in multiples of h: 0 for multiples of h, ½ for centers of cells.
     pub offset: f64,
-    /// α in `[0, 0.5)`: with a half two points could meet.
+    /// Jitter α in `[0, 0.5)`, in multiples of h. At a half two points could coincide.
     pub jitter: f64,
-    /// Seed of the draws.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
 impl Lattice {
-    /// All points within `reach` of a surface given by its distance, x running fastest. The box `[low, high]` must
-    /// hold every node that comes into question.
+    /// All lattice points within `cutoff` of the surface with the given `distance`, x running fastest.
     ///
-    /// A distance changes by no more than the way, so nodes far from the band are stepped over. An interrupt ends the
-    /// search with what there is.
+    /// The box from `low` to `high` must contain every node that can belong to the band. A distance function changes by
+    /// no more than the distance between two points, so nodes far from the band are skipped. An interrupt ends the
+    /// search early, with the points found so far.
     #[must_use]
     pub fn points_near<const D: usize>(
         &self,
         low: &Vector<D>,
         high: &Vector<D>,
-        reach: f64,
+        cutoff: f64,
         distance: impl Fn(&Vector<D>) -> f64,
         interrupt: &Interrupt,
     ) -> Vec<Vector<D>> {
@@ -40,13 +51,13 @@ impl Lattice {
         if (0..D).any(|d| first[d] > last[d]) {
             return points;
         }
-        // Jitter moves both this node and the next ones.
+        // Jitter moves this node and the next one.
         let slack = 2.0 * self.jitter * (D as f64).sqrt() + 1e-6;
         let mut node = first;
         loop {
             while node[0] <= last[0] {
                 let x = self.point(&random, &node);
-                let beyond = (distance(&x).abs() - reach) / h;
+                let beyond = (distance(&x).abs() - cutoff) / h;
                 if beyond <= 0.0 {
                     points.push(x);
                 }
@@ -68,7 +79,7 @@ impl Lattice {
         }
     }
 
-    /// The point of a node.
+    /// Position of a node, jitter included.
     fn point<const D: usize>(&self, random: &CounterRandom, node: &[i64; D]) -> Vector<D> {
         Vector::<D>::from_fn(|d, _| {
             let regular = (node[d] as f64 + self.offset) * self.spacing;
@@ -76,6 +87,7 @@ impl Lattice {
         })
     }
 
+    /// Random number μ in [−1, 1) for one axis of a node.
     fn draw<const D: usize>(&self, random: &CounterRandom, node: &[i64; D], axis: usize) -> f64 {
         let mut counters = [0_i64; 4];
         counters[..D].copy_from_slice(node);

@@ -1,35 +1,43 @@
-//! Random numbers by counter: the value at a counter depends on the seed and the counter alone, so that no
-//! order of evaluation and no number of threads can change a scene.
+//! Random numbers by counter: a value depends on the seed and its counters alone.
 //!
-//! The mixing function is the finaliser of SplitMix64 (Steele, Lea, Flood 2014).
+//! Neither the order of evaluation nor the number of threads can therefore change a scene. The mixing function is the
+//! finalizer of SplitMix64 (key "SplitMix64" of the bibliography).
 
-/// A keyed source of uniform numbers without state.
+/// A keyed source of uniform random numbers without state.
+///
+/// ```
+/// use meniscus::geometry::random::CounterRandom;
+///
+/// let random = CounterRandom::new(7);
+/// assert_eq!(random.symmetric(&[3, 0]), CounterRandom::new(7).symmetric(&[3, 0]));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CounterRandom {
     key: u64,
 }
 
 impl CounterRandom {
-    /// A source for one seed.
+    /// The source for a seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self { key: mix(seed ^ 0x6d65_6e69_7363_7573) }
     }
 
-    /// A number uniform in `[−1, 1)` for a list of counters (such as lattice indices and an axis).
+    /// A number, uniform in `[−1, 1)`, for a list of counters, such as the indices of a lattice node and an axis.
     #[must_use]
     pub fn symmetric(&self, counters: &[i64]) -> f64 {
         let mut state = self.key;
         for &counter in counters {
             state = mix(state ^ counter.cast_unsigned().wrapping_mul(0x9e37_79b9_7f4a_7c15));
         }
-        // 53 random bits make a number in [0, 1).
+        // 53 random bits give a number in [0, 1).
         #[expect(clippy::cast_precision_loss, reason = "53 bits fit a double")]
         let unit = (state >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0);
         2.0 * unit - 1.0
     }
 }
 
+/// The finalizer of SplitMix64, a bijection of 64-bit integers.
 fn mix(mut z: u64) -> u64 {
     z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,7 +1,7 @@
-//! Analytic surfaces with exact distance, closest point, normal and curvature: what scenes start from and what
-//! errors are measured against. One file a shape.
+//! Analytic surfaces with exact distance, closest point, normal and curvature, one file per shape.
 //!
-//! Signed distances are positive outside; normals point outward; the curvature is ∇·n (circle 1/R, sphere 2/R).
+//! Scenes start from these surfaces, and errors are measured against them. Signed distances are positive outside, and
+//! normals point outward. The curvature is ∇·n: 1/R on a circle, 2/R on a sphere.
 
 pub mod ball;
 pub mod cuboid;
@@ -24,46 +24,56 @@ pub use zalesak_disk::ZalesakDisk;
 
 use super::Vector;
 
-/// The exact answer of a surface for one query point.
+/// Closest point of a surface to a query point, with the geometry there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint<const D: usize> {
     /// Signed distance, positive outside.
     pub distance: f64,
-    /// A closest point; at the medial axis one of several.
+    /// A closest point. On the medial axis it is one of several.
     pub point: Vector<D>,
-    /// Outward unit normal at the closest point, where the surface has one (not at corners and edges).
+    /// Outward unit normal at the closest point; None at corners and edges.
     pub normal: Option<Vector<D>>,
-    /// ∇·n at the closest point, where it exists.
+    /// Curvature ∇·n at the closest point; None where it does not exist.
     pub curvature: Option<f64>,
 }
 
-/// A closed surface (curve in 2D) known exactly.
+/// A closed surface in space, or a closed curve in the plane, that is known exactly.
+///
+/// ```
+/// use meniscus::geometry::{Surface, Vector, surfaces::Ball};
+///
+/// let circle = Ball { center: Vector::<2>::zeros(), radius: 0.5 };
+/// let nearest = circle.nearest(&Vector::<2>::new(0.0, 2.0));
+/// assert_eq!((nearest.distance, nearest.curvature), (1.5, Some(2.0)));
+/// ```
 pub trait Surface<const D: usize>: Send + Sync {
-    /// Distance, closest point, normal and curvature for a query point, exact to round-off.
+    /// Signed distance, closest point, normal and curvature for the query point `x`, exact to round-off.
     fn nearest(&self, x: &Vector<D>) -> SurfacePoint<D>;
 
-    /// A box that holds the surface: lower and upper corner.
+    /// Lower and upper corner of a box that contains the surface.
     fn bounding_box(&self) -> (Vector<D>, Vector<D>);
 
     /// The enclosed area (2D) or volume (3D).
-    fn measure(&self) -> f64;
+    fn area_or_volume(&self) -> f64;
 
-    /// Whether `x` lies within `tolerance` of a place with more than one closest point, where normals and
-    /// curvatures of a numerical answer may rightly differ from this surface's choice.
+    /// Whether `x` lies within the distance `tolerance` of the medial axis.
+    ///
+    /// There a numerical method may find another of the closest points, with another normal and curvature.
     fn near_medial_axis(&self, x: &Vector<D>, tolerance: f64) -> bool;
 
-    /// The curve as chains of points at most `spacing` apart, inside on the left; empty in 3D.
+    /// The curve as chains of points at most `spacing` apart, with the inside on the left; empty in 3D.
     ///
-    /// Consecutive points of a chain are joined; a closed chain repeats its first point at the end.
+    /// Consecutive points of a chain are joined. A closed chain repeats its first point at the end.
     fn outline(&self, spacing: f64) -> Vec<Vec<Vector<D>>>;
 
-    /// Signed distance alone.
+    /// Signed distance of `x`, positive outside.
     fn signed_distance(&self, x: &Vector<D>) -> f64 {
         self.nearest(x).distance
     }
 }
 
-/// Points of a circular arc from angle `from` to `to`, both included, at most `spacing` apart.
+/// Points at most `spacing` apart on an elliptic arc with the given semi-axes, from the angle `from` to the angle `to`
+/// (rad), both included.
 pub(crate) fn arc_points<const D: usize>(
     center: &Vector<D>,
     semi_axes: [f64; 2],
@@ -84,13 +94,13 @@ pub(crate) fn arc_points<const D: usize>(
         .collect()
 }
 
-/// Points of a straight line from `a` to `b`, both included, at most `spacing` apart.
+/// Points at most `spacing` apart on the straight line from `a` to `b`, both included.
 pub(crate) fn line_points<const D: usize>(a: &Vector<D>, b: &Vector<D>, spacing: f64) -> Vec<Vector<D>> {
     let count = (((b - a).norm() / spacing).ceil() as usize).max(1);
     (0..=count).map(|k| a + (b - a) * (k as f64 / count as f64)).collect()
 }
 
-/// Joins consecutive pieces that share their ends into one chain.
+/// Joins pieces, each of which starts at the end of the one before, into one chain.
 pub(crate) fn join<const D: usize>(pieces: Vec<Vec<Vector<D>>>) -> Vec<Vector<D>> {
     let mut chain: Vec<Vector<D>> = Vec::new();
     for piece in pieces {

@@ -1,6 +1,23 @@
-//! Dense least squares by Householder QR with column exchange: rank-revealing, scaled, free of allocation.
+//! Dense least squares by Householder QR with column pivoting.
+//!
+//! Columns are scaled to length one, the decomposition reveals the rank, and repeated solves allocate nothing.
 
-/// Reusable storage for problems `min ‖A c − b‖`, `A` with `rows × columns`, columns stored one after another.
+/// Workspace for problems `min ‖A c − b‖` with a matrix of `rows × columns`, stored by columns.
+///
+/// ```
+/// use meniscus::linear_algebra::least_squares::LeastSquares;
+///
+/// // The line c₀ + c₁ t through (0, 1), (1, 3), (2, 5).
+/// let mut problem = LeastSquares::default();
+/// problem.reset(3, 2);
+/// for k in 0..3 {
+///     let t = k as f64;
+///     problem.set_row(k, &[1.0, t], 1.0 + 2.0 * t);
+/// }
+/// let (factorization, c) = problem.solve();
+/// assert_eq!(factorization.rank, 2);
+/// assert!((c[0] - 1.0).abs() < 1e-12 && (c[1] - 2.0).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct LeastSquares {
     rows: usize,
@@ -13,20 +30,20 @@ pub struct LeastSquares {
     solution: Vec<f64>,
 }
 
-/// What a solve found out about its matrix.
+/// Rank and condition of the matrix of a solved problem.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Factorisation {
-    /// Columns that are linearly independent to `1e-12` of the largest.
+pub struct Factorization {
+    /// Number of linearly independent columns: those with a pivot above `1e-12` of the scaled columns.
     pub rank: usize,
-    /// Ratio of the largest to the least pivot of the scaled matrix: an estimate of its condition.
+    /// Ratio of the largest to the smallest pivot of the scaled matrix, an estimate of its condition number.
     pub condition: f64,
 }
 
-/// Pivots below this share of the largest count as zero.
+/// Pivots of the scaled matrix (columns of length one) below this value count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
 impl LeastSquares {
-    /// Starts a problem of the given shape; every entry is then written by [`Self::column_mut`] and [`Self::rhs_mut`].
+    /// Starts a problem of the given shape. Every row must then be written by [`Self::set_row`].
     pub fn reset(&mut self, rows: usize, columns: usize) {
         self.rows = rows;
         self.columns = columns;
@@ -38,7 +55,7 @@ impl LeastSquares {
         self.solution.resize(columns, 0.0);
     }
 
-    /// Writes one row of the matrix and the right-hand side.
+    /// Writes one row of the matrix and its entry of the right-hand side.
     #[inline]
     pub fn set_row(&mut self, row: usize, values: &[f64], rhs: f64) {
         for (k, value) in values.iter().enumerate() {
@@ -47,8 +64,10 @@ impl LeastSquares {
         self.rhs[row] = rhs;
     }
 
-    /// Factorises and solves. For lower rank it is a basic solution: the columns beyond the rank are left out.
-    pub fn solve(&mut self) -> (Factorisation, &[f64]) {
+    /// Factorizes the matrix and solves the problem.
+    ///
+    /// The solution of a rank-deficient problem is basic: the coefficients of columns beyond the rank are zero.
+    pub fn solve(&mut self) -> (Factorization, &[f64]) {
         let (m, n) = (self.rows, self.columns);
         for k in 0..n {
             let column = &mut self.matrix[k * m..(k + 1) * m];
@@ -79,9 +98,10 @@ impl LeastSquares {
             largest / least
         };
         self.back_substitute(rank);
-        (Factorisation { rank, condition }, &self.solution[..n])
+        (Factorization { rank, condition }, &self.solution[..n])
     }
 
+    /// Exchanges the columns k < j.
     fn exchange(&mut self, k: usize, j: usize) {
         if k != j {
             let m = self.rows;
@@ -92,7 +112,7 @@ impl LeastSquares {
         }
     }
 
-    /// Applies the reflection that clears column k below its diagonal to the rest of the matrix and to b.
+    /// Applies the Householder reflection that clears column k below its diagonal to the later columns and to b.
     fn reflect(&mut self, k: usize, norm: f64) {
         let m = self.rows;
         let (done, rest) = self.matrix.split_at_mut((k + 1) * m);
@@ -111,12 +131,13 @@ impl LeastSquares {
         tail.iter_mut().zip(v.iter()).for_each(|(a, v)| *a -= s * v);
     }
 
+    /// Solves with the leading `rank × rank` triangle of R and undoes scaling and pivoting.
     fn back_substitute(&mut self, rank: usize) {
         let (m, n) = (self.rows, self.columns);
         for k in (0..rank).rev() {
             let mut sum = self.rhs[k];
             for j in k + 1..rank {
-                // Rows of R above the diagonal stay in place of the matrix.
+                // The rows of R above the diagonal have replaced the matrix.
                 sum -= self.matrix[j * m + k] * self.rhs[j];
             }
             self.rhs[k] = sum / self.diagonal[k];
@@ -127,11 +148,12 @@ impl LeastSquares {
     }
 }
 
+/// Euclidean norm of the part of a column that is not yet triangular.
 fn tail_norm(v: &[f64]) -> f64 {
     dot(v, v).sqrt()
 }
 
-/// Scalar product in a fixed order of eight partial sums, which the compiler keeps in vector registers.
+/// Scalar product a·b as eight partial sums in a fixed order, which the compiler keeps in vector registers.
 #[inline]
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {

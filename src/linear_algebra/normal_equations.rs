@@ -1,21 +1,23 @@
-//! Symmetric positive systems of equal size, one in each vector lane, by L D Lᵀ.
+//! Symmetric positive definite systems of equal size, one in each vector lane, by L D Lᵀ.
 //!
 //! Regressions with moderately conditioned matrices are solved this way at a fraction of the cost of an orthogonal
-//! decomposition: the condition is squared, which costs digits that the pivots show.
+//! decomposition. Normal equations square the condition number. The pivots show how many digits that costs.
 
 use super::number::Lanes;
 
-/// Systems `G c = b` with packed lower triangles (row by row, diagonal last in its row) and room for their factors.
+/// Systems `G c = b`, one per lane, and the workspace of their factorization.
+///
+/// Only the lower triangle of G is stored, row by row, with the diagonal entry last in its row.
 #[derive(Debug, Clone, Default)]
 pub struct LaneSystems {
     size: usize,
-    /// G on the way in; below the diagonal L, on it 1/d after [`Self::factorise`].
+    /// G before [`Self::factorize`]; afterwards L below the diagonal and 1/d on it.
     matrix: Vec<Lanes>,
-    /// The rows of L D in the making.
+    /// Two rows of L D during the factorization.
     row: Vec<Lanes>,
 }
 
-/// The place of row i in a packed lower triangle.
+/// Index of the first entry of row i in a packed lower triangle.
 #[inline(always)]
 #[must_use]
 pub fn packed_row(i: usize) -> usize {
@@ -23,26 +25,28 @@ pub fn packed_row(i: usize) -> usize {
 }
 
 impl LaneSystems {
-    /// Sets the size; the matrix is then written through [`Self::matrix_mut`].
+    /// Sets the number of unknowns. The matrix must then be written through [`Self::matrix_mut`].
     pub fn reset(&mut self, size: usize) {
         self.size = size;
         self.matrix.resize(packed_row(size), Lanes::splat(0.0));
         self.row.resize(2 * size, Lanes::splat(0.0));
     }
 
-    /// The packed lower triangle.
+    /// The packed lower triangle of G, for writing.
     pub fn matrix_mut(&mut self) -> &mut [Lanes] {
         &mut self.matrix
     }
 
-    /// Factorises in place. Returns, for each lane, the least share d_i/G_ii of a pivot in its diagonal: how far a
-    /// column is from a combination of those before it. Zero or less (or NaN) means a matrix of low rank.
-    pub fn factorise(&mut self) -> Lanes {
+    /// Factorizes all matrices in place and returns the smallest pivot ratio d_i/G_ii of each lane.
+    ///
+    /// The ratio measures how far a column is from a combination of the columns before it. A matrix with a ratio that
+    /// is zero, negative or NaN is rank-deficient.
+    pub fn factorize(&mut self) -> Lanes {
         let n = self.size;
         let one = Lanes::splat(1.0);
         let mut least = one;
         let (first, second) = self.row.split_at_mut(n);
-        // Two rows at a time share the loads of the rows above.
+        // Two rows are processed together, so that they share the loads of the rows above.
         let mut i = 0;
         while i < n {
             let pair = i + 1 < n;
@@ -85,7 +89,7 @@ impl LaneSystems {
         least
     }
 
-    /// Solves for one right-hand side in place.
+    /// Solves all systems for one right-hand side, which is replaced by the solution.
     pub fn solve(&self, b: &mut [Lanes]) {
         let n = self.size;
         for i in 0..n {
@@ -108,7 +112,9 @@ impl LaneSystems {
     }
 }
 
-/// Turns row i of L D into that of L and puts 1/d_i on the diagonal, which is returned.
+/// Turns row i of L D, given as `scaled`, into that of L, and writes 1/d_i on the diagonal. Returns 1/d_i.
+///
+/// `inverse_of(j)` is 1/d_j of an earlier row. `least` is lowered to the pivot ratio of row i.
 #[inline(always)]
 fn finish_row(
     i: usize,
@@ -124,7 +130,7 @@ fn finish_row(
         d = (-scaled[j]).mul_add(l, d);
         row[j] = l;
     }
-    // `min` in this order lets a NaN pass into the result.
+    // With the operands in this order, a NaN passes into the result.
     let share = d / diagonal;
     *least = share.simd_ge(*least).select(*least, share);
     let inverse = Lanes::splat(1.0) / d;
@@ -154,7 +160,7 @@ mod tests {
                     systems.matrix_mut()[packed_row(i) + j] = Lanes::new(std::array::from_fn(|l| gram(l, i, j)));
                 }
             }
-            let least = systems.factorise().to_array();
+            let least = systems.factorize().to_array();
             assert!(least.iter().all(|s| *s > 1e-6 && *s <= 1.0), "{least:?}");
             let exact = |lane: usize, i: usize| random.symmetric(&[99, lane as i64, i as i64]);
             let mut b: Vec<Lanes> = (0..n)
@@ -178,7 +184,7 @@ mod tests {
         let lanes = |first: f64| Lanes::new([first, 2.0, 2.0, 2.0]);
         systems.matrix_mut().copy_from_slice(&[lanes(1.0), lanes(1.0), lanes(1.0)]);
         systems.matrix_mut()[1] = Lanes::new([1.0, 0.5, 0.5, 0.5]);
-        let least = systems.factorise().to_array();
+        let least = systems.factorize().to_array();
         assert_eq!(least[0], 0.0);
         assert!(least[1] > 0.9);
     }

@@ -1,29 +1,41 @@
-//! What hot loops compute with: one number, or several side by side in a vector register. One implementation of a
-//! formula serves both, and a lane gives the same bits wherever it stands and whatever its neighbours hold.
+//! Numbers of hot loops: a single `f64`, or several side by side in a vector register.
+//!
+//! One implementation of a formula serves both. The result of a lane does not depend on its position or on the other
+//! lanes, to the last bit.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Several numbers side by side.
+/// [`LANES`] numbers in one vector register.
 pub type Lanes = wide::f64x4;
 
-/// How many.
+/// Numbers per vector register.
 pub const LANES: usize = 4;
 
-/// A number or [`Lanes`] of them.
+/// A single number, or [`Lanes`] of numbers.
+///
+/// ```
+/// use meniscus::linear_algebra::number::{Lanes, Number};
+///
+/// fn square_plus_one<T: Number>(x: T) -> T {
+///     x.mul_add(x, T::splat(1.0))
+/// }
+/// assert_eq!(square_plus_one(2.0), 5.0);
+/// assert_eq!(square_plus_one(Lanes::splat(2.0)).to_array(), [5.0; 4]);
+/// ```
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// The same value in every lane.
+    /// The number with `value` in every lane.
     fn splat(value: f64) -> Self;
-    /// self · factor + summand, fused where the machine can.
+    /// `self · factor + summand`, with one rounding where the processor has the instruction.
     fn mul_add(self, factor: Self, summand: Self) -> Self;
-    /// The square root.
+    /// Square root.
     fn sqrt(self) -> Self;
-    /// The larger one; of a NaN and a number the number.
+    /// The larger of two numbers. If one is a NaN, the other.
     fn max(self, other: Self) -> Self;
-    /// The number where it is positive, else 0; also of a NaN.
+    /// `self` where it is positive, else 0. The positive part of a NaN is 0.
     fn positive_part(self) -> Self;
-    /// |self| with the sign of `sign`, where zero counts as positive.
+    /// |self| with the sign of `sign`. Zero of either sign counts as positive.
     fn copysign(self, sign: Self) -> Self;
 }
 
@@ -35,7 +47,7 @@ impl Number for f64 {
 
     #[inline(always)]
     fn mul_add(self, factor: Self, summand: Self) -> Self {
-        // Without the instruction the fused form is a slow library call.
+        // Without the instruction, the fused form is a slow library call.
         if cfg!(target_feature = "fma") { f64::mul_add(self, factor, summand) } else { self * factor + summand }
     }
 
@@ -93,7 +105,7 @@ impl Number for Lanes {
     }
 }
 
-/// Scalar product.
+/// Scalar product a·b.
 #[inline(always)]
 pub fn dot<T: Number, const D: usize>(a: &[T; D], b: &[T; D]) -> T {
     let mut sum = a[0] * b[0];
@@ -103,7 +115,7 @@ pub fn dot<T: Number, const D: usize>(a: &[T; D], b: &[T; D]) -> T {
     sum
 }
 
-/// a + s b.
+/// The vector a + s b.
 #[inline(always)]
 pub fn add_scaled<T: Number, const D: usize>(a: &[T; D], s: T, b: &[T; D]) -> [T; D] {
     let mut sum = *a;
@@ -113,7 +125,7 @@ pub fn add_scaled<T: Number, const D: usize>(a: &[T; D], s: T, b: &[T; D]) -> [T
     sum
 }
 
-/// a − b.
+/// The vector a − b.
 #[inline(always)]
 pub fn difference<T: Number, const D: usize>(a: &[T; D], b: &[T; D]) -> [T; D] {
     let mut difference = *a;
@@ -123,9 +135,9 @@ pub fn difference<T: Number, const D: usize>(a: &[T; D], b: &[T; D]) -> [T; D] {
     difference
 }
 
-/// A b for a symmetric matrix.
+/// The product A b for a symmetric matrix A.
 #[inline(always)]
-pub fn times<T: Number, const D: usize>(matrix: &[[T; D]; D], b: &[T; D]) -> [T; D] {
+pub fn multiply_symmetric<T: Number, const D: usize>(matrix: &[[T; D]; D], b: &[T; D]) -> [T; D] {
     let mut product = *b;
     for d in 0..D {
         product[d] = dot(&matrix[d], b);

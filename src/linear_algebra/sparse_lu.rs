@@ -1,45 +1,62 @@
-//! Sparse LU decomposition, by faer.
+//! Sparse LU decomposition, with the library faer.
 
 use super::SparseRows;
 use faer::Col;
 use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::LuError;
 use faer::sparse::linalg::solvers::Lu;
 use faer::sparse::{SparseColMat, Triplet};
 
-/// A decomposition that solves for any right-hand side.
+/// The decomposition of A, or of A + α 1 1ᵀ/n for a matrix A that maps constants to zero.
 ///
-/// A + α 1 1ᵀ/n is dense: what is decomposed is A with β added to its first diagonal entry, which makes it regular, and both changes of
-/// rank one are made good by Woodbury's formula.
+/// The second matrix is dense. Instead, A is decomposed with β added to its first diagonal entry, which makes it
+/// regular. Woodbury's formula then accounts for both changes of rank one.
+///
+/// ```
+/// use meniscus::linear_algebra::{SparseRows, sparse_lu::SparseLu};
+///
+/// let mut rows = SparseRows::default();
+/// rows.push_row(&[0, 1], &[2.0, 1.0]);
+/// rows.push_row(&[1], &[4.0]);
+/// let mut x = [0.0; 2];
+/// SparseLu::from_rows(&rows, None).unwrap().solve(&[4.0, 8.0], &mut x);
+/// assert_eq!(x, [1.0, 2.0]);
+/// ```
 pub struct SparseLu {
     factors: Lu<usize, f64>,
     size: usize,
     correction: Option<Correction>,
 }
 
-/// B⁻¹ U and the small matrix S = C⁻¹ + Uᵀ B⁻¹ U for U = (e₀, 1) and C = diag(−β, α/n).
+/// Woodbury's correction for U = (e₀, 1) and C = diag(−β, α/n), where B = A + β e₀ e₀ᵀ was decomposed.
 struct Correction {
+    /// The columns of B⁻¹ U.
     columns: [Vec<f64>; 2],
+    /// The matrix C⁻¹ + Uᵀ B⁻¹ U.
     small: [[f64; 2]; 2],
 }
 
-/// The matrix is singular, or too large.
+/// Reason of a failure that is not one of the numbers.
+const TOO_LARGE: &str = "it is too large for the memory or for the indices";
+
+/// The matrix is singular or too large to be decomposed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("sparse LU decomposition of {size} rows failed: {reason}")]
-pub struct Undecomposed {
-    /// Rows.
+pub struct DecompositionFailed {
+    /// Number of rows of the matrix.
     pub size: usize,
-    /// What the library says.
+    /// The reason that the library gives.
     pub reason: String,
 }
 
 impl SparseLu {
-    /// Of A, or of A + α 1 1ᵀ/n.
+    /// Decomposes the matrix A with the given rows or, with `alpha`, the matrix A + α 1 1ᵀ/n.
     ///
     /// # Errors
-    /// [`Undecomposed`].
-    pub fn of(rows: &SparseRows, alpha: Option<f64>) -> Result<Self, Undecomposed> {
+    /// [`DecompositionFailed`] when the matrix is singular or too large.
+    pub fn from_rows(rows: &SparseRows, alpha: Option<f64>) -> Result<Self, DecompositionFailed> {
         let size = rows.rows();
-        let failed = |reason: String| Undecomposed { size, reason };
+        let failed = |reason: &str| DecompositionFailed { size, reason: reason.to_owned() };
         let mut triplets = Vec::with_capacity(rows.entries() + 1);
         let mut largest = 0.0_f64;
         for i in 0..size {
@@ -47,12 +64,17 @@ impl SparseLu {
             triplets.extend(columns.iter().zip(weights).map(|(j, w)| Triplet::new(i, *j as usize, *w)));
             largest = weights.iter().fold(largest, |most, w| most.max(w.abs()));
         }
-        // Of the size of the entries, with the sign of what is added.
+        // β has the magnitude of the largest entry and the sign of α.
         let beta = alpha.map(|alpha| largest.copysign(alpha));
         triplets.extend(beta.map(|beta| Triplet::new(0, 0, beta)));
         let matrix: SparseColMat<usize, f64> =
-            SparseColMat::try_new_from_triplets(size, size, &triplets).map_err(|error| failed(format!("{error:?}")))?;
-        let factors = matrix.sp_lu().map_err(|error| failed(format!("{error:?}")))?;
+            SparseColMat::try_new_from_triplets(size, size, &triplets).map_err(|_| failed(TOO_LARGE))?;
+        let factors = matrix.sp_lu().map_err(|error| match error {
+            LuError::SymbolicSingular { index } => {
+                failed(&format!("it is singular, no pivot was found in step {index}"))
+            }
+            LuError::Generic(_) => failed(TOO_LARGE),
+        })?;
         let mut whole = Self { factors, size, correction: None };
         if let (Some(alpha), Some(beta)) = (alpha, beta) {
             let mut columns = [vec![0.0; size], vec![1.0; size]];
@@ -68,13 +90,14 @@ impl SparseLu {
         Ok(whole)
     }
 
+    /// Replaces a right-hand side by the solution with the decomposed matrix, without the correction.
     fn solve_in_place(&self, x: &mut [f64]) {
         let mut column = Col::from_fn(self.size, |i| x[i]);
         self.factors.solve_in_place(column.as_mut());
         x.iter_mut().enumerate().for_each(|(i, x)| *x = column[i]);
     }
 
-    /// x with A x = b.
+    /// Writes the solution of A x = b, or of (A + α 1 1ᵀ/n) x = b, to `x`.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) {
         x.copy_from_slice(b);
         self.solve_in_place(x);
@@ -114,7 +137,7 @@ mod tests {
             let a = ring(diagonal);
             let (mut b, mut x) = (vec![0.0; n], vec![0.0; n]);
             a.apply(&exact, &mut b);
-            SparseLu::of(&a, alpha).unwrap().solve(&b, &mut x);
+            SparseLu::from_rows(&a, alpha).unwrap().solve(&b, &mut x);
             assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-10));
         }
     }

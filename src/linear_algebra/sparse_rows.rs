@@ -1,34 +1,46 @@
-//! A linear operator as sparse rows: each point its neighbours and their weights (compressed sparse rows).
+//! Sparse matrices in compressed rows. A row of an operator on points holds the neighbors of a point and their weights.
 
 use rayon::prelude::{IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
-/// Rows of (column, weight); compressed.
+/// A sparse matrix in compressed rows.
+///
+/// ```
+/// use meniscus::linear_algebra::SparseRows;
+///
+/// let mut difference = SparseRows::default();
+/// difference.push_row(&[0, 1], &[-1.0, 1.0]);
+/// difference.push_row(&[1, 2], &[-1.0, 1.0]);
+/// let mut out = [0.0; 2];
+/// difference.apply(&[1.0, 4.0, 9.0], &mut out);
+/// assert_eq!(out, [3.0, 5.0]);
+/// ```
 #[derive(Debug, Clone)]
 pub struct SparseRows {
+    /// First entry of each row, and the number of entries at the end.
     starts: Vec<usize>,
     columns: Vec<u32>,
     weights: Vec<f64>,
 }
 
-/// Rows that one task applies at least.
+/// Smallest number of rows of a parallel task.
 const ROWS: usize = 512;
 
 impl Default for SparseRows {
-    /// No rows yet.
+    /// A matrix without rows.
     fn default() -> Self {
         Self { starts: vec![0], columns: Vec::new(), weights: Vec::new() }
     }
 }
 
 impl SparseRows {
-    /// Adds a row.
+    /// Appends a row with the given columns and weights.
     pub fn push_row(&mut self, columns: &[u32], weights: &[f64]) {
         self.columns.extend_from_slice(columns);
         self.weights.extend_from_slice(weights);
         self.starts.push(self.columns.len());
     }
 
-    /// The rows of several operators, one after another, in room of their size.
+    /// The rows of several matrices, one after another.
     pub fn stacked<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let entries = parts.clone().map(Self::entries).sum();
         let mut starts = Vec::with_capacity(parts.clone().map(Self::rows).sum::<usize>() + 1);
@@ -43,26 +55,27 @@ impl SparseRows {
         whole
     }
 
-    /// Rows.
+    /// Number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// Entries of all rows.
+    /// Number of entries of all rows together.
     #[must_use]
     pub fn entries(&self) -> usize {
         self.columns.len()
     }
 
-    /// Columns and weights of a row.
+    /// Columns and weights of row i.
     #[must_use]
     pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
         let row = self.starts[i]..self.starts[i + 1];
         (&self.columns[row.clone()], &self.weights[row])
     }
 
-    /// The same operator with the columns of every row in rising order, each once.
+    /// The same matrix with the columns of every row in ascending order and each column once; repeated entries are
+    /// added up.
     #[must_use]
     pub fn sorted(&self) -> Self {
         let mut sorted = Self {
@@ -76,7 +89,7 @@ impl SparseRows {
             let (columns, weights) = self.row(i);
             row.clear();
             row.extend(columns.iter().copied().zip(weights.iter().copied()));
-            // Equal columns keep their order, and with it the order of the sum.
+            // A stable sort: equal columns are added in their original order.
             row.sort_by_key(|(column, _)| *column);
             for (column, weight) in &row {
                 let begun = sorted.columns.len() > sorted.starts[i];
@@ -93,7 +106,7 @@ impl SparseRows {
         sorted
     }
 
-    /// Replaces the weights row by row: `change` sees the row, its columns and its weights.
+    /// Changes the weights row by row. `change` gets the index, the columns and the weights of a row.
     pub fn change_rows(&mut self, mut change: impl FnMut(usize, &[u32], &mut [f64])) {
         for i in 0..self.rows() {
             let row = self.starts[i]..self.starts[i + 1];
@@ -101,15 +114,15 @@ impl SparseRows {
         }
     }
 
-    /// max_i Σ_j |w_ij|.
+    /// The norm ‖A‖∞ = max_i Σ_j |w_ij|.
     #[must_use]
-    pub fn largest_row(&self) -> f64 {
+    pub fn infinity_norm(&self) -> f64 {
         let sum = |i: usize| self.row(i).1.iter().map(|weight| weight.abs()).sum::<f64>();
-        // A maximum does not depend on the order.
+        // A maximum does not depend on the order of the tasks.
         (0..self.rows()).into_par_iter().with_min_len(ROWS).map(sum).reduce(|| 0.0, f64::max)
     }
 
-    /// out_i = Σ_j w_ij f_j, each sum in the order of its row.
+    /// Writes out_i = Σ_j w_ij f_j, each sum in the order of its row.
     pub fn apply(&self, field: &[f64], out: &mut [f64]) {
         out.par_iter_mut().with_min_len(ROWS).enumerate().for_each(|(i, out)| {
             let row = self.starts[i]..self.starts[i + 1];
@@ -134,7 +147,7 @@ mod tests {
         let mut out = [7.0; 3];
         operator.apply(&[1.0, 2.0, 3.0], &mut out);
         assert_eq!((out, operator.rows(), operator.entries()), ([-5.0, 0.0, 6.0], 3, 3));
-        assert!((operator.largest_row() - 3.0).abs() < f64::EPSILON);
+        assert!((operator.infinity_norm() - 3.0).abs() < f64::EPSILON);
     }
 
     #[test]

@@ -1,14 +1,14 @@
-//! Looking at every point: slow and obviously right, the oracle of the other searches.
+//! Search by looking at every point, the slow reference for the other searches.
 
 use super::NeighborSearch;
 use crate::geometry::{Domain, Vector};
 
-/// All points in the order given.
+/// A search that visits all points in their given order.
 #[derive(Debug, Clone)]
 pub struct BruteForce<'a, const D: usize> {
-    /// The domain, for periodic axes.
+    /// Domain, which gives displacements along periodic axes.
     pub domain: &'a Domain<D>,
-    /// The points.
+    /// Points to search.
     pub points: &'a [Vector<D>],
 }
 
@@ -23,9 +23,9 @@ impl<const D: usize> NeighborSearch<D> for BruteForce<'_, D> {
         }
     }
 
-    fn nearest(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)> {
-        let mut best = (usize::MAX, reach * reach);
-        self.for_each_within(x, reach, |j, _, r2| {
+    fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)> {
+        let mut best = (usize::MAX, cutoff * cutoff);
+        self.for_each_within(x, cutoff, |j, _, r2| {
             if r2 < best.1 || r2 <= best.1 && j < best.0 {
                 best = (j, r2);
             }

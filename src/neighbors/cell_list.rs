@@ -1,32 +1,44 @@
-//! Cell list: points sorted by the cell of a Cartesian grid that they lie in, x running fastest, so that the cells
-//! of a row are one contiguous range of points.
+//! Cell list: points sorted by their cell in a Cartesian grid (Quentrec 1973).
 //!
-//! Along periodic axes the grid divides the period into whole cells and rows wrap round; along the others it covers
-//! the bounding box of the points. Rebuilding reuses all storage.
+//! The index x runs fastest, so that the points of adjacent cells in a row form one contiguous range. Along periodic
+//! axes the grid divides the period into whole cells, and rows wrap around. Along the other axes it covers the bounding
+//! box of the points. A rebuild reuses all memory.
 
 use super::{Neighbor, NeighborSearch};
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
 
-/// Points in cells of an edge of at least the one asked for.
+/// Points sorted into the cells of a grid.
+///
+/// ```
+/// use meniscus::geometry::{Domain, Vector};
+/// use meniscus::neighbors::{CellList, NeighborSearch};
+///
+/// let points = [Vector::<2>::new(0.0, 0.0), Vector::<2>::new(1.0, 0.0), Vector::<2>::new(5.0, 0.0)];
+/// let mut cells = CellList::new(Domain::unbounded());
+/// cells.rebuild(points.iter().copied(), 1.5);
+/// assert_eq!(cells.nearest(&Vector::<2>::new(4.0, 0.0), 2.0), Some((2, 1.0)));
+/// ```
 #[derive(Debug, Clone)]
 pub struct CellList<const D: usize> {
     domain: Domain<D>,
     /// Lower corner of the grid.
     low: Vector<D>,
-    /// Cell edges.
+    /// Edge lengths of a cell.
     edge: Vector<D>,
-    /// 1/edge: divisions cost as much as the rest of a look-up.
+    /// 1/edge, since a division costs as much as the rest of a look-up.
     inverse_edge: Vector<D>,
     /// Whether any axis is periodic.
     is_wrapped: bool,
+    /// Number of cells along each axis.
     counts: [usize; D],
-    /// First sorted place of each cell, and one more for the end.
+    /// First sorted slot of each cell, and the number of points at the end.
     starts: Vec<usize>,
-    /// Index of the point at each sorted place.
+    /// Index of the point in each sorted slot.
     order: Vec<usize>,
-    /// Positions in sorted order (wrapped into the domain).
+    /// Positions in sorted order, wrapped into the domain.
     sorted: Vec<Vector<D>>,
+    /// Cell of each point, in the original order.
     cell_of: Vec<usize>,
 }
 
@@ -48,9 +60,9 @@ impl<const D: usize> CellList<D> {
         }
     }
 
-    /// Sorts the points anew into cells of an edge of at least `edge`.
+    /// Sorts points into cells with edges of at least `edge`.
     ///
-    /// When points spread over so much space that cells would outnumber points four to one, cells grow.
+    /// Cells become larger where there would be more than four of them per point.
     pub fn rebuild(&mut self, points: impl ExactSizeIterator<Item = Vector<D>> + Clone, edge: f64) {
         let n = points.len();
         let mut low = Vector::<D>::repeat(f64::INFINITY);
@@ -59,9 +71,9 @@ impl<const D: usize> CellList<D> {
             low = low.inf(&x);
             high = high.sup(&x);
         }
-        // Points that are nowhere share one cell: whoever moved them will find out.
-        let is_somewhere = low.iter().chain(high.iter()).all(|c| c.is_finite());
-        if n == 0 || !is_somewhere {
+        // Points with infinite or undefined coordinates share one cell. The scheme that moved them reports them.
+        let is_finite = low.iter().chain(high.iter()).all(|c| c.is_finite());
+        if n == 0 || !is_finite {
             low = Vector::<D>::zeros();
             high = Vector::<D>::zeros();
         }
@@ -76,7 +88,7 @@ impl<const D: usize> CellList<D> {
                 };
                 self.low[d] = start;
                 let along = match self.domain.axes()[d] {
-                    // One more cell, so that the highest point has a cell of its own.
+                    // One more cell for the point with the largest coordinate.
                     Axis::Unbounded => (length / wanted).floor() + 1.0,
                     Axis::Periodic { .. } => (length / wanted).floor().max(1.0),
                 };
@@ -96,6 +108,7 @@ impl<const D: usize> CellList<D> {
         self.sort(points);
     }
 
+    /// A stable counting sort of the points by their cells.
     fn sort(&mut self, points: impl ExactSizeIterator<Item = Vector<D>> + Clone) {
         let cells: usize = self.counts.iter().product();
         self.starts.clear();
@@ -112,12 +125,12 @@ impl<const D: usize> CellList<D> {
         let n = self.cell_of.len();
         self.order.resize(n, 0);
         self.sorted.resize(n, Vector::<D>::zeros());
-        // A stable counting sort; filling from the starts and shifting them back keeps one array.
+        // Filling advances the starts of the cells; they are shifted back afterwards, which saves a second array.
         for (i, x) in points.enumerate() {
             let cell = self.cell_of[i];
-            let place = self.starts[cell];
-            self.order[place] = i;
-            self.sorted[place] = self.wrap(x);
+            let slot = self.starts[cell];
+            self.order[slot] = i;
+            self.sorted[slot] = self.wrap(x);
             self.starts[cell] += 1;
         }
         for c in (1..=cells).rev() {
@@ -126,18 +139,19 @@ impl<const D: usize> CellList<D> {
         self.starts[0] = 0;
     }
 
-    /// How many points are in the list.
+    /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.order.len()
     }
 
-    /// Whether there is none.
+    /// Whether there is no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.order.is_empty()
     }
 
+    /// Grid indices of the cell that contains a wrapped point.
     fn cell(&self, x: &Vector<D>) -> [usize; D] {
         std::array::from_fn(|d| {
             let index = (x[d] - self.low[d]) * self.inverse_edge[d];
@@ -145,6 +159,7 @@ impl<const D: usize> CellList<D> {
         })
     }
 
+    /// Number of a cell with the given grid indices.
     fn flat(&self, cell: &[usize; D]) -> usize {
         (0..D).rev().fold(0, |flat, d| flat * self.counts[d] + cell[d])
     }
@@ -159,7 +174,7 @@ impl<const D: usize> CellList<D> {
         if self.is_wrapped { self.domain.displacement(from, to) } else { to - from }
     }
 
-    /// Whether a span of a row holds so few points that narrowing it costs more than it saves.
+    /// Whether a span of a row contains so few points that narrowing it costs more than it saves.
     #[inline(always)]
     fn is_row_short(&self, base: usize, span: (i64, i64)) -> bool {
         let (first, last) = (self.wrapped(span.0, 0), self.wrapped(span.1, 0));
@@ -170,13 +185,13 @@ impl<const D: usize> CellList<D> {
         matches!(self.domain.axes()[d], Axis::Periodic { .. })
     }
 
-    /// Range of (unwrapped) cell indices along axis d that can hold points within `radius` of `x`.
+    /// First and last cell index along axis d, not wrapped, whose cells can contain points within `radius` of `x`.
     fn span(&self, x: &Vector<D>, radius: f64, d: usize) -> (i64, i64) {
-        // The padding covers rounding of the divisions for points exactly `radius` away.
-        let (at, reach) = ((x[d] - self.low[d]) * self.inverse_edge[d], radius * self.inverse_edge[d]);
+        // The padding covers the rounding of the products for points at the distance `radius` itself.
+        let (at, cutoff) = ((x[d] - self.low[d]) * self.inverse_edge[d], radius * self.inverse_edge[d]);
         let pad = 1e-9 * (1.0 + at.abs());
-        let first = (at - reach - pad).floor();
-        let last = (at + reach + pad).floor();
+        let first = (at - cutoff - pad).floor();
+        let last = (at + cutoff + pad).floor();
         let count = self.counts[d] as f64;
         if self.is_periodic(d) {
             if last - first + 1.0 >= count { (0, self.counts[d] as i64 - 1) } else { (first as i64, last as i64) }
@@ -185,13 +200,13 @@ impl<const D: usize> CellList<D> {
         }
     }
 
-    /// Calls `visit` with each range of sorted places that the given spans of cells cover.
+    /// Calls `visit` with each range of sorted slots in the given spans of cells.
     #[inline(always)]
     fn for_each_range(&self, spans: &[(i64, i64); D], mut visit: impl FnMut(usize, usize)) {
         self.for_each_row(spans, |_, base| self.for_each_part(base, spans[0], &mut visit));
     }
 
-    /// Calls `visit` with the (unwrapped) indices and the first cell of each row of the given spans.
+    /// Calls `visit` with the indices, not wrapped, and the first cell of each row in the given spans.
     #[inline(always)]
     fn for_each_row(&self, spans: &[(i64, i64); D], mut visit: impl FnMut(&[i64; D], usize)) {
         if spans.iter().any(|(first, last)| first > last) {
@@ -219,7 +234,8 @@ impl<const D: usize> CellList<D> {
         }
     }
 
-    /// The one or two ranges of places of a span of cells of a row.
+    /// Calls `visit` with the ranges of sorted slots of a span of cells in a row: one, or two where the span wraps
+    /// around.
     #[inline(always)]
     fn for_each_part(&self, base: usize, span: (i64, i64), mut visit: impl FnMut(usize, usize)) {
         if span.0 > span.1 {
@@ -231,7 +247,7 @@ impl<const D: usize> CellList<D> {
         if first > last {
             (rest, from, to) = (Some((self.starts[base], to)), from, self.starts[base + self.counts[0]]);
         }
-        // One call, so that it can be inlined.
+        // A single call of `visit` in the code lets the compiler inline it.
         loop {
             if from < to {
                 visit(from, to);
@@ -242,12 +258,14 @@ impl<const D: usize> CellList<D> {
     }
 
     #[inline(always)]
+    /// A cell index along axis d, wrapped into the grid.
     fn wrapped(&self, index: i64, d: usize) -> usize {
         let count = self.counts[d] as i64;
-        // A division in the innermost loop is worth avoiding.
+        // The test avoids a division in the innermost loop.
         if (0..count).contains(&index) { index as usize } else { index.rem_euclid(count) as usize }
     }
 
+    /// The spans of cells along all axes that can contain points within `radius` of `x`.
     fn spans(&self, x: &Vector<D>, radius: f64) -> [(i64, i64); D] {
         std::array::from_fn(|d| self.span(x, radius, d))
     }
@@ -257,16 +275,16 @@ impl<const D: usize> NeighborSearch<D> for CellList<D> {
     fn gather(&self, x: &Vector<D>, radius: f64, found: &mut Vec<Neighbor<D>>) {
         let x = self.wrap(*x);
         let limit = radius * radius;
-        let nobody = Neighbor { r2: 0.0, index: 0, dx: Vector::<D>::zeros() };
+        let filler = Neighbor { r2: 0.0, index: 0, dx: Vector::<D>::zeros() };
         found.clear();
         self.for_each_range(&self.spans(&x, radius), |from, to| {
             let mut end = found.len();
-            // Every candidate is written where the next hit belongs: a branch would be guessed wrong half the time.
-            found.resize(end + (to - from), nobody);
-            for (place, position) in (from..to).zip(&self.sorted[from..to]) {
+            // Each candidate is written to the slot of the next hit. A branch would be mispredicted half the time.
+            found.resize(end + (to - from), filler);
+            for (slot, position) in (from..to).zip(&self.sorted[from..to]) {
                 let dx = self.displacement(&x, position);
                 let r2 = dx.norm_squared();
-                found[end] = Neighbor { r2, index: self.order[place], dx };
+                found[end] = Neighbor { r2, index: self.order[slot], dx };
                 end += usize::from(r2 <= limit);
             }
             found.truncate(end);
@@ -278,24 +296,24 @@ impl<const D: usize> NeighborSearch<D> for CellList<D> {
         let x = self.wrap(*x);
         let limit = radius * radius;
         self.for_each_range(&self.spans(&x, radius), |from, to| {
-            for place in from..to {
-                let dx = self.displacement(&x, &self.sorted[place]);
+            for slot in from..to {
+                let dx = self.displacement(&x, &self.sorted[slot]);
                 let r2 = dx.norm_squared();
                 if r2 <= limit {
-                    visit(self.order[place], &dx, r2);
+                    visit(self.order[slot], &dx, r2);
                 }
             }
         });
     }
 
-    fn nearest(&self, x: &Vector<D>, reach: f64) -> Option<(usize, f64)> {
+    fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)> {
         if self.is_empty() {
             return None;
         }
-        // Search balls of doubling radius until one holds a point: the nearest point of that ball is the nearest.
+        // The radius doubles until the ball contains a point. The nearest point in the ball is then the nearest of all.
         let edge = self.edge.max();
         let widest = self.farthest(x);
-        let mut radius = edge.min(reach);
+        let mut radius = edge.min(cutoff);
         loop {
             let mut best = (usize::MAX, f64::INFINITY);
             self.for_each_within(x, radius, |j, _, r2| {
@@ -306,50 +324,52 @@ impl<const D: usize> NeighborSearch<D> for CellList<D> {
             if best.0 != usize::MAX {
                 return Some((best.0, best.1.sqrt()));
             }
-            if radius >= reach || radius > widest {
+            if radius >= cutoff || radius > widest {
                 return None;
             }
-            radius = (2.0 * radius).min(reach);
+            radius = (2.0 * radius).min(cutoff);
         }
     }
 }
 
 impl<const D: usize> CellList<D> {
-    /// The points in the order of their cells.
+    /// Indices of the points in the order of their cells.
     #[must_use]
-    pub fn order(&self) -> &[usize] {
+    pub fn permutation(&self) -> &[usize] {
         &self.order
     }
 
-    /// Positions in that order, wrapped into the domain.
+    /// Positions in the order of [`Self::permutation`], wrapped into the domain.
     #[must_use]
     pub fn sorted(&self) -> &[Vector<D>] {
         &self.sorted
     }
 
-    /// Places of the points of each cell: those of cell c are `starts[c]..starts[c + 1]`.
+    /// First slot of each cell: the points of cell c are in the slots `starts[c]..starts[c + 1]`.
     #[must_use]
     pub fn starts(&self) -> &[usize] {
         &self.starts
     }
 
-    /// Whether the place of any point within `radius` fulfils the condition; the search ends with the first that does.
+    /// Whether any point within `radius` has a slot that fulfills the condition. The search ends at the first such
+    /// point.
     pub fn any_within(&self, x: &Vector<D>, radius: f64, condition: impl Fn(usize) -> bool) -> bool {
         let x = self.wrap(*x);
         let limit = radius * radius;
         let mut found = false;
         self.for_each_range(&self.spans(&x, radius), |from, to| {
             found = found
-                || (from..to).zip(&self.sorted[from..to]).any(|(place, position)| {
-                    // The condition is often the cheaper half.
-                    condition(place) && self.displacement(&x, position).norm_squared() <= limit
+                || (from..to).zip(&self.sorted[from..to]).any(|(slot, position)| {
+                    // The condition is often cheaper than the distance.
+                    condition(slot) && self.displacement(&x, position).norm_squared() <= limit
                 });
         });
         found
     }
 
-    /// Gives every cell the union of its own marks and those of the cells round it.
-    pub fn spread(&self, marks: &mut Vec<u8>, before: &mut Vec<u8>) {
+    /// Gives every cell the union (bitwise or) of its own marks and those of the adjacent cells. `before` is a scratch
+    /// buffer.
+    pub fn spread_marks(&self, marks: &mut Vec<u8>, before: &mut Vec<u8>) {
         let mut stride = 1;
         for d in 0..D {
             let (count, wraps) = (self.counts[d], self.is_periodic(d));
@@ -368,42 +388,43 @@ impl<const D: usize> CellList<D> {
         }
     }
 
-    /// The nearest point, as (index, r²), for someone who knows a point at the squared distance `known.1`.
+    /// Index and squared distance of the nearest point, given a `known` point with its squared distance.
     ///
-    /// Rows of cells, and cells of a row, beyond the best so far are left out. Among equals the least index.
+    /// Rows and cells farther away than the best point so far are skipped. Of equally near points the one with the
+    /// smallest index is returned.
     #[must_use]
     pub fn nearest_from(&self, x: &Vector<D>, known: (usize, f64)) -> (usize, f64) {
         let x = self.wrap(*x);
         let mut best = known;
         let spans = self.spans(&x, known.1.sqrt());
-        // A span of a whole period says nothing of how far its rows are.
+        // The indices of a span over a whole period do not tell the distance of its rows.
         let is_whole: [bool; D] =
             std::array::from_fn(|d| self.is_periodic(d) && spans[d].1 - spans[d].0 + 1 >= self.counts[d] as i64);
         self.for_each_row(&spans, |row, base| {
-            let mut away = 0.0;
+            let mut row_distance = 0.0;
             for d in 1..D {
                 if !is_whole[d] {
                     let start = self.low[d] + row[d] as f64 * self.edge[d];
                     let gap = (start - x[d]).max(x[d] - start - self.edge[d]).max(0.0);
-                    away += gap * gap;
+                    row_distance += gap * gap;
                 }
             }
-            // Slack for the rounding of cell borders.
-            if away * (1.0 - 1e-9) > best.1 {
+            // The slack covers the rounding of cell borders.
+            if row_distance * (1.0 - 1e-9) > best.1 {
                 return;
             }
             let mut along = spans[0];
             if !is_whole[0] && !self.is_row_short(base, along) {
-                let reach = (best.1 - away * (1.0 - 1e-9)).sqrt();
-                let narrow = self.span(&x, reach, 0);
+                let cutoff = (best.1 - row_distance * (1.0 - 1e-9)).sqrt();
+                let narrow = self.span(&x, cutoff, 0);
                 along = (along.0.max(narrow.0), along.1.min(narrow.1));
             }
             self.for_each_part(base, along, |from, to| {
-                for (place, position) in (from..to).zip(&self.sorted[from..to]) {
+                for (slot, position) in (from..to).zip(&self.sorted[from..to]) {
                     let dx = self.displacement(&x, position);
                     let r2 = dx.norm_squared();
-                    if r2 < best.1 || r2 <= best.1 && self.order[place] < best.0 {
-                        best = (self.order[place], r2);
+                    if r2 < best.1 || r2 <= best.1 && self.order[slot] < best.0 {
+                        best = (self.order[slot], r2);
                     }
                 }
             });
@@ -411,26 +432,28 @@ impl<const D: usize> CellList<D> {
         best
     }
 
-    /// The nearest point not farther than `reach`, as (index, r²), for one place after another: each search starts from
-    /// the point that `last` holds, whose position `at` tells.
+    /// Index and squared distance of the nearest point with `r ≤ cutoff`, for a sequence of nearby queries.
+    ///
+    /// - `last`: result of the query before, from which the search starts; replaced by the result of this query.
+    /// - `at`: position of a point by its index.
     #[must_use]
     pub fn nearest_next(
         &self,
         x: &Vector<D>,
-        reach: f64,
+        cutoff: f64,
         last: &mut Option<usize>,
         at: impl Fn(usize) -> Vector<D>,
     ) -> Option<(usize, f64)> {
         let nearest = match *last {
             Some(point) => self.nearest_from(x, (point, self.displacement(x, &at(point)).norm_squared())),
-            // Without a point to start from, the search itself ends at the reach.
-            None => self.nearest(x, reach).map(|(point, distance)| (point, distance * distance))?,
+            // The plain search respects the cutoff itself.
+            None => self.nearest(x, cutoff).map(|(point, distance)| (point, distance * distance))?,
         };
         *last = Some(nearest.0);
-        (nearest.1.sqrt() <= reach).then_some(nearest)
+        (nearest.1.sqrt() <= cutoff).then_some(nearest)
     }
 
-    /// A distance that no point of the list exceeds from `x`.
+    /// An upper bound of the distance from `x` to any point of the list.
     fn farthest(&self, x: &Vector<D>) -> f64 {
         let high = Vector::<D>::from_fn(|d, _| self.low[d] + self.edge[d] * self.counts[d] as f64);
         (x - self.low).abs().sup(&(x - high).abs()).norm()

@@ -1,12 +1,14 @@
-//! Pairs of neighbours, each once, as groups that stand side by side in memory: points of a periodic box sorted into pencils
-//! along x (stripes in the plane), in each by x, so that those within reach of a point are a few contiguous ranges, cut into
-//! groups of [`GROUP`]. Of two neighbours the one that stands earlier in the order lists the other, the box being closed to a
-//! ring along its last axis: sums go to both sides of a pair.
+//! Lists of neighbor pairs for sums in vector lanes.
 //!
-//! A loop over groups needs no condition: the last group of a range may reach beyond it, to points that are out of reach,
-//! or to places that nobody stands at, of which every pencil ends with a few. Periodic images need no copies: groups are
-//! told with the period that their point is moved by to meet them. The lists hold while no point has moved by more than
-//! half the skin; an order is a function of the positions that it was made of alone.
+//! The points of a periodic box are sorted into pencils along x (stripes in the plane), and by x within each pencil.
+//! The neighbors of a point are then a few contiguous ranges of slots, which are cut into groups of [`GROUP`] slots.
+//! Each pair is listed once, by the point that comes first in the order. The box is closed to a ring along its last
+//! axis. A sum adds to both points of a pair.
+//!
+//! A loop over groups needs no condition. The last group of a range may contain points beyond the cutoff, whose kernel
+//! is zero, or padding slots, with which every pencil ends. Periodic images are not copied: a group comes with the
+//! period by which its point must be shifted. A list is valid while no point has moved by more than half the skin. The
+//! order depends only on the positions from which it was built.
 
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
@@ -18,48 +20,51 @@ mod slabs;
 
 pub use slabs::Window;
 
-/// Places of a group.
+/// Number of slots in a group.
 pub const GROUP: usize = 4;
-/// Who stands at a place where nobody stands.
-const NOBODY: u32 = u32::MAX;
-/// Pencils that the reach spans: more follow the round support closer, fewer are longer (measured).
-const fn pencils_a_reach(dimension: usize) -> f64 {
+/// Index that marks a padding slot.
+const EMPTY_SLOT: u32 = u32::MAX;
+/// Number of pencils per cutoff radius. More pencils follow the round support more closely, fewer are longer. The
+/// values are measured.
+const fn pencils_per_cutoff(dimension: usize) -> f64 {
     if dimension == 2 { 3.0 } else { 2.0 }
 }
-/// Edge of the cells along x by the edge of a pencil.
+/// Ratio of the edge of a cell along x to the edge of a pencil.
 const CELL: f64 = 0.5;
 
-/// Groups that are met from one image of their point.
+/// Consecutive groups that are paired with the same periodic image of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Run {
-    /// Behind the last group, in the groups of the slab.
+    /// End of the groups of this run in the list of the slab.
     end: u32,
-    /// Which image: an index into the shifts.
+    /// The image, as an index into the shifts.
     image: u32,
 }
 
-/// The groups of the places of a slab.
+/// The neighbor lists of the slots of a slab.
 #[derive(Debug, Clone, Default)]
 struct Slab {
-    places: Range<usize>,
-    /// First place of each group.
+    /// Slots of the slab.
+    slots: Range<usize>,
+    /// First slot of each group, for all slots of the slab one after another.
     groups: Vec<u32>,
+    /// The groups of each slot by image.
     runs: Vec<Run>,
-    /// Where the runs of each place end.
+    /// End of the runs of each slot.
     ends: Vec<u32>,
 }
 
-/// The neighbours that one place lists: groups by image.
+/// The neighbors that one slot lists, as groups by image.
 #[derive(Debug, Clone, Copy)]
-pub struct Near<'a, const D: usize> {
+pub struct NeighborGroups<'a, const D: usize> {
     groups: &'a [u32],
     runs: &'a [Run],
     begin: u32,
     shifts: &'a [Vector<D>],
 }
 
-impl<'a, const D: usize> Near<'a, D> {
-    /// Groups with the displacement of the image that they are met from: add it to the position of the point.
+impl<'a, const D: usize> NeighborGroups<'a, D> {
+    /// Groups (by their first slots), each with the shift to add to the position of the point.
     pub fn runs(&self) -> impl Iterator<Item = (&'a Vector<D>, &'a [u32])> + '_ {
         let mut begin = self.begin as usize;
         self.runs.iter().map(move |run| {
@@ -70,45 +75,63 @@ impl<'a, const D: usize> Near<'a, D> {
     }
 }
 
-/// Points of a periodic box in pencils, with the ranges in reach of each.
+/// Points of a periodic box, sorted into pencils, with the list of neighbor pairs.
+///
+/// ```
+/// use meniscus::geometry::{Domain, Vector, domain::Axis};
+/// use meniscus::{neighbors::Pencils, parallel::Interrupt};
+///
+/// let domain = Domain::new([Axis::Periodic { start: 0.0, length: 1.0 }; 2]);
+/// let mut pencils = Pencils::<2>::new(&domain, 0.1).unwrap();
+/// pencils.rebuild(&[Vector::<2>::new(0.5, 0.5), Vector::<2>::new(0.55, 0.5)], &Interrupt::default()).unwrap();
+/// assert_eq!(pencils.occupied().count(), 2);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Pencils<const D: usize> {
+    /// Lower corner of the box.
     low: Vector<D>,
+    /// Edge lengths of the box.
     lengths: Vector<D>,
-    /// Cells along x, pencils along the others.
+    /// Number of cells along x, and of pencils along the other axes.
     counts: [usize; D],
+    /// Edge lengths of the cells.
     edges: Vector<D>,
-    reach: f64,
-    /// Pencils along every axis that the reach may span.
+    /// Radius within which points are neighbors.
+    cutoff: f64,
+    /// Number of pencils along each axis that the cutoff radius can span.
     spans: [i64; D],
+    /// First slot of each cell.
     starts: Vec<u32>,
+    /// Cell of each point.
     cell_of: Vec<u32>,
-    /// Who stands where; those of the first slab twice.
+    /// Index of the point in each slot; the slots of the first slab are repeated at the end.
     order: Vec<u32>,
-    /// Positions in that order, once.
+    /// Position of the point in each slot, without the repeated slab.
     sorted: Vec<Vector<D>>,
     slabs: Vec<Slab>,
+    /// Displacements of the periodic images.
     shifts: Vec<Vector<D>>,
 }
 
-/// A box that is too small for a reach.
+/// The box is too small for the cutoff radius.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("a periodic length of {length} is too short for neighbours within {reach}: {least} is needed")]
+#[error("the periodic length {length} is too short for neighbors within {cutoff}; it must be at least {least}")]
 pub struct BoxTooSmall {
-    /// The length.
+    /// Length of the period, 0 for an axis that is not periodic.
     pub length: f64,
-    /// The reach.
-    pub reach: f64,
-    /// What would do.
+    /// Cutoff radius.
+    pub cutoff: f64,
+    /// Smallest length that suffices.
     pub least: f64,
 }
 
 impl<const D: usize> Pencils<D> {
-    /// Nobody yet, in a box that is periodic along every axis, for neighbours within `reach`.
+    /// Empty pencils in a box that is periodic along every axis, for neighbors within `cutoff`.
     ///
     /// # Errors
-    /// [`BoxTooSmall`] where a point could meet two images of another; an axis without a period counts as length 0.
-    pub fn new(domain: &Domain<D>, reach: f64) -> Result<Self, BoxTooSmall> {
+    /// [`BoxTooSmall`] when a point could be a neighbor of two images of another point. An axis that is not periodic
+    /// counts as length 0.
+    pub fn new(domain: &Domain<D>, cutoff: f64) -> Result<Self, BoxTooSmall> {
         let mut low = Vector::<D>::zeros();
         let mut lengths = Vector::<D>::zeros();
         for (d, axis) in domain.axes().iter().enumerate() {
@@ -117,17 +140,17 @@ impl<const D: usize> Pencils<D> {
                 lengths[d] = *length;
             }
         }
-        let edge = reach / pencils_a_reach(D);
-        let least = (2.0 * pencils_a_reach(D) + 2.0) * edge;
+        let edge = cutoff / pencils_per_cutoff(D);
+        let least = (2.0 * pencils_per_cutoff(D) + 2.0) * edge;
         if let Some(length) = lengths.iter().copied().find(|length| *length < least) {
-            return Err(BoxTooSmall { length, reach, least });
+            return Err(BoxTooSmall { length, cutoff, least });
         }
         let counts: [usize; D] = std::array::from_fn(|d| {
             let wanted = if d == 0 { CELL * edge } else { edge };
             (lengths[d] / wanted).floor().max(1.0) as usize
         });
         let edges = Vector::<D>::from_fn(|d, _| lengths[d] / counts[d] as f64);
-        let spans = std::array::from_fn(|d| if d == 0 { 0 } else { (reach / edges[d]).ceil() as i64 });
+        let spans = std::array::from_fn(|d| if d == 0 { 0 } else { (cutoff / edges[d]).ceil() as i64 });
         let shifts = (0..3_usize.pow(D as u32))
             .map(|image| Vector::<D>::from_fn(|d, _| (image / 3_usize.pow(d as u32) % 3) as f64 - 1.0))
             .map(|turns| turns.component_mul(&lengths))
@@ -137,7 +160,7 @@ impl<const D: usize> Pencils<D> {
             lengths,
             counts,
             edges,
-            reach,
+            cutoff,
             spans,
             starts: Vec::new(),
             cell_of: Vec::new(),
@@ -148,10 +171,10 @@ impl<const D: usize> Pencils<D> {
         })
     }
 
-    /// Sorts points, which lie in the box, and finds their ranges.
+    /// Sorts points, which must lie in the box, and lists their neighbors.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn rebuild(&mut self, points: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
         self.sort(points);
         let mut slabs = std::mem::take(&mut self.slabs);
@@ -164,36 +187,37 @@ impl<const D: usize> Pencils<D> {
             if interrupt.is_raised() {
                 return;
             }
-            for place in slab.places.clone() {
-                if this.order[place] != NOBODY {
-                    this.find_groups(place, slab);
+            for slot in slab.slots.clone() {
+                if this.order[slot] != EMPTY_SLOT {
+                    this.find_groups(slot, slab);
                 }
                 slab.ends.push(slab.runs.len() as u32);
             }
         });
-        let again = slabs.first().map_or(0, |slab| slab.places.end);
+        let again = slabs.first().map_or(0, |slab| slab.slots.end);
         self.order.extend_from_within(..again);
         self.slabs = slabs;
         interrupt.check()
     }
 
-    /// How many places there are, those of the first slab counted twice.
+    /// Number of slots; those of the first slab are counted twice.
     #[must_use]
-    pub fn places(&self) -> usize {
+    pub fn slot_count(&self) -> usize {
         self.order.len()
     }
 
-    /// Places and who stands there.
+    /// Slots that contain a point, each with the index of its point.
     pub fn occupied(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let once = self.order.iter().take(self.sorted.len()).enumerate();
-        once.filter(|(_, i)| **i != NOBODY).map(|(place, i)| (place, *i as usize))
+        once.filter(|(_, i)| **i != EMPTY_SLOT).map(|(slot, i)| (slot, *i as usize))
     }
 
-    /// One number a place; `nobodys` where nobody stands.
-    pub fn by_place(&self, nobodys: f64, value: impl Fn(usize) -> f64) -> impl Iterator<Item = f64> {
-        self.order.iter().map(move |i| if *i == NOBODY { nobodys } else { value(*i as usize) })
+    /// One number per slot: `value` of the point's index, or `padding` in padding slots.
+    pub fn by_slot(&self, padding: f64, value: impl Fn(usize) -> f64) -> impl Iterator<Item = f64> {
+        self.order.iter().map(move |i| if *i == EMPTY_SLOT { padding } else { value(*i as usize) })
     }
 
+    /// Number of the cell that contains `x`.
     fn cell(&self, x: &Vector<D>) -> usize {
         (0..D).rev().fold(0, |flat, d| {
             let index = ((x[d] - self.low[d]) / self.edges[d]).max(0.0) as usize;
@@ -201,7 +225,7 @@ impl<const D: usize> Pencils<D> {
         })
     }
 
-    /// A counting sort by cells and by x inside each; points of equal x in the order given.
+    /// A counting sort by cells, and by x within each cell. Points with equal x keep their order.
     fn sort(&mut self, points: &[Vector<D>]) {
         let cells: usize = self.counts.iter().product();
         self.starts.clear();
@@ -212,19 +236,19 @@ impl<const D: usize> Pencils<D> {
             self.cell_of.push(cell as u32);
             self.starts[cell + 1] += 1;
         }
-        // Behind the last cell of every pencil stand a few nobodies.
+        // Each pencil ends with one group of padding slots.
         for cell in 0..cells {
             let pencil_ends = (cell + 1).is_multiple_of(self.counts[0]);
             self.starts[cell + 1] += self.starts[cell] + if pencil_ends { GROUP as u32 } else { 0 };
         }
         self.order.clear();
-        self.order.resize(self.starts[cells] as usize, NOBODY);
+        self.order.resize(self.starts[cells] as usize, EMPTY_SLOT);
         for (i, cell) in self.cell_of.iter().enumerate() {
-            let place = &mut self.starts[*cell as usize];
-            self.order[*place as usize] = i as u32;
-            *place += 1;
+            let slot = &mut self.starts[*cell as usize];
+            self.order[*slot as usize] = i as u32;
+            *slot += 1;
         }
-        // The starts have become ends, short of the nobodies.
+        // The starts have become ends, without the padding. They are shifted back.
         for cell in (1..=cells).rev() {
             let pencil_ends = cell.is_multiple_of(self.counts[0]);
             self.starts[cell] = self.starts[cell - 1] + if pencil_ends { GROUP as u32 } else { 0 };
@@ -232,7 +256,7 @@ impl<const D: usize> Pencils<D> {
         self.starts[0] = 0;
         for ends in self.starts.windows(2) {
             let members = &mut self.order[ends[0] as usize..ends[1] as usize];
-            // Nobody goes last.
+            // Padding slots sort last.
             let x_of = |i: u32| points.get(i as usize).map_or(f64::INFINITY, |x| x[0]);
             members.sort_unstable_by(|a, b| x_of(*a).total_cmp(&x_of(*b)).then(a.cmp(b)));
         }
@@ -241,59 +265,65 @@ impl<const D: usize> Pencils<D> {
         self.sorted.extend(self.order.iter().map(|i| points.get(*i as usize).copied().unwrap_or(far)));
     }
 
-    /// The groups of everybody behind a place within its reach, pencil by pencil.
-    fn find_groups(&self, place: usize, found: &mut Slab) {
+    /// Lists the neighbors of a slot that come later in the order, pencil by pencil.
+    fn find_groups(&self, slot: usize, found: &mut Slab) {
         let first_run = found.runs.len();
-        let x = &self.sorted[place];
+        let x = &self.sorted[slot];
         let own: [i64; D] = std::array::from_fn(|d| {
             (((x[d] - self.low[d]) / self.edges[d]).max(0.0) as i64).min(self.counts[d] as i64 - 1)
         });
-        // The rest of its own pencil first, then those that differ upwards along the last axis that they differ along.
-        let mut away = [0; D];
+        // First the rest of the slot's own pencil. Then those pencils whose offset is positive along the last axis
+        // where it is not zero.
+        let mut offset = [0; D];
         loop {
-            self.groups_of_pencil(place, &own, &away, first_run, found);
+            self.add_pencil(slot, &own, &offset, first_run, found);
             let mut d = 1;
             loop {
                 if d == D {
                     return;
                 }
-                away[d] += 1;
-                if away[d] <= self.spans[d] {
+                offset[d] += 1;
+                if offset[d] <= self.spans[d] {
                     break;
                 }
-                // Backwards along this axis where a later one goes upwards.
-                away[d] = -self.spans[d];
+                // With a positive offset along a later axis, this one also takes negative values.
+                offset[d] = -self.spans[d];
                 d += 1;
             }
         }
     }
 
-    fn groups_of_pencil(&self, place: usize, own: &[i64; D], away: &[i64; D], first_run: usize, found: &mut Slab) {
-        let x = &self.sorted[place];
-        let is_own = away.iter().all(|steps| *steps == 0);
-        let (mut chord, mut base, mut image, mut digit) = (self.reach * self.reach, 0, 0, 1);
+    /// Lists the neighbors of a slot in one pencil.
+    ///
+    /// - `own`: indices of the slot's own pencil.
+    /// - `offset`: the other pencil relative to it.
+    /// - `first_run`: first run of this slot in `found`.
+    fn add_pencil(&self, slot: usize, own: &[i64; D], offset: &[i64; D], first_run: usize, found: &mut Slab) {
+        let x = &self.sorted[slot];
+        let is_own = offset.iter().all(|steps| *steps == 0);
+        let (mut chord, mut base, mut image, mut digit) = (self.cutoff * self.cutoff, 0, 0, 1);
         for d in 1..D {
-            let pencil = own[d] + away[d];
+            let pencil = own[d] + offset[d];
             let start = self.low[d] + pencil as f64 * self.edges[d];
             let gap = (start - x[d]).max(x[d] - start - self.edges[d]).max(0.0);
             chord -= gap * gap;
             digit *= 3;
             let count = self.counts[d] as i64;
-            // A pencil beyond an end is one of the other end: the point is moved by a period to meet it.
+            // A pencil beyond one end of the box is one at the other end: the point is shifted by a period.
             image += digit * usize::try_from(1 - pencil.div_euclid(count)).unwrap_or(1);
         }
         if chord < 0.0 {
             return;
         }
         for d in (1..D).rev() {
-            let pencil = (own[d] + away[d]).rem_euclid(self.counts[d] as i64) as usize;
+            let pencil = (own[d] + offset[d]).rem_euclid(self.counts[d] as i64) as usize;
             base = (base + pencil) * self.counts[d - 1];
         }
-        // Beyond the last slab the first one stands again.
-        let is_round = own[D - 1] + away[D - 1] >= self.counts[D - 1] as i64;
-        let round = if is_round && D > 1 { self.sorted.len() } else { 0 };
+        // The first slab is repeated after the last one.
+        let is_repeated = own[D - 1] + offset[D - 1] >= self.counts[D - 1] as i64;
+        let shift = if is_repeated && D > 1 { self.sorted.len() } else { 0 };
         let chord = chord.sqrt();
-        // In its own pencil a point lists those to the right of it, and round the end those at the left.
+        // In its own pencil a point lists the points to its right and, across the periodic end, those at the left.
         for turn in if is_own { -1..=0_i64 } else { -1..=1 } {
             let at = x[0] + turn as f64 * self.lengths[0];
             let (from, to) = (at - chord, at + chord);
@@ -306,7 +336,7 @@ impl<const D: usize> Pencils<D> {
             let mut first = self.starts[base + cell(from)] as usize;
             let mut end = self.starts[base + cell(to) + 1] as usize;
             if is_own && turn == 0 {
-                first = place + 1;
+                first = slot + 1;
             }
             while first < end && self.sorted[first][0] < from {
                 first += 1;
@@ -316,7 +346,7 @@ impl<const D: usize> Pencils<D> {
             }
             if first < end {
                 let image = (image + (turn + 1) as usize) as u32;
-                found.groups.extend((first..end).step_by(GROUP).map(|first| (first + round) as u32));
+                found.groups.extend((first..end).step_by(GROUP).map(|first| (first + shift) as u32));
                 let all = found.groups.len() as u32;
                 let is_new = found.runs.len() == first_run;
                 match found.runs.last_mut() {
@@ -330,13 +360,13 @@ impl<const D: usize> Pencils<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Domain, GROUP, Interrupt, NOBODY, Pencils, Vector};
+    use super::{Domain, EMPTY_SLOT, GROUP, Interrupt, Pencils, Vector};
     use crate::geometry::domain::Axis;
     use crate::geometry::random::CounterRandom;
     use crate::neighbors::{BruteForce, NeighborSearch};
     use std::sync::Mutex;
 
-    fn check<const D: usize>(lengths: [f64; D], count: usize, reach: f64) {
+    fn check<const D: usize>(lengths: [f64; D], count: usize, cutoff: f64) {
         let domain = Domain::new(std::array::from_fn(|d| Axis::Periodic { start: -0.3, length: lengths[d] }));
         let random = CounterRandom::new(7);
         let points: Vec<Vector<D>> = (0..count as i64)
@@ -345,22 +375,23 @@ mod tests {
                 domain.wrap(Vector::<D>::from_fn(|d, _| -0.3 + lengths[d] * draw(d)))
             })
             .collect();
-        let mut pencils = Pencils::new(&domain, reach).unwrap();
+        let mut pencils = Pencils::new(&domain, cutoff).unwrap();
         pencils.rebuild(&points, &Interrupt::default()).unwrap();
-        let standing: Vec<Option<usize>> =
-            pencils.order.iter().map(|i| (*i != NOBODY).then_some(*i as usize)).collect();
+        let points_in_slots: Vec<Option<usize>> =
+            pencils.order.iter().map(|i| (*i != EMPTY_SLOT).then_some(*i as usize)).collect();
         let met = Mutex::new(Vec::new());
-        let mut sums = vec![0.0; pencils.places()];
+        let mut sums = vec![0.0; pencils.slot_count()];
         pencils
-            .sum([&mut sums], &Interrupt::default(), |place, near, window| {
-                let i = standing[place].unwrap();
+            .sum([&mut sums], &Interrupt::default(), |slot, near, window| {
+                let i = points_in_slots[slot].unwrap();
                 for (shift, groups) in near.runs() {
                     let x = points[i] + shift;
-                    // What a group holds beyond its range is out of reach, or it would be found twice.
+                    // A point that a group contains beyond its range is farther away than the cutoff. Otherwise it
+                    // would be found twice.
                     for other in groups.iter().flat_map(|first| *first as usize..*first as usize + GROUP) {
-                        if let Some(j) = standing[other].filter(|j| (x - points[*j]).norm() <= reach) {
+                        if let Some(j) = points_in_slots[other].filter(|j| (x - points[*j]).norm() <= cutoff) {
                             met.lock().unwrap().push((i.min(j), i.max(j)));
-                            window.columns[0][place - window.begin] += 1.0;
+                            window.columns[0][slot - window.begin] += 1.0;
                             window.columns[0][other - window.begin] += 1.0;
                         }
                     }
@@ -369,15 +400,15 @@ mod tests {
             .unwrap();
         let brute = BruteForce { domain: &domain, points: &points };
         let mut expected = Vec::new();
-        for (place, i) in pencils.occupied() {
+        for (slot, i) in pencils.occupied() {
             let mut neighbors = 0;
-            brute.for_each_within(&points[i], reach, |j, _, _| {
+            brute.for_each_within(&points[i], cutoff, |j, _, _| {
                 neighbors += usize::from(j != i);
                 if i < j {
                     expected.push((i, j));
                 }
             });
-            assert_eq!(sums[place], neighbors as f64, "place {place}");
+            assert_eq!(sums[slot], neighbors as f64, "slot {slot}");
         }
         let mut met = met.into_inner().unwrap();
         met.sort_unstable();

@@ -1,20 +1,21 @@
-//! Polynomials of M coordinates up to a total degree, without the constant: products of Chebyshev
-//! polynomials, which keep the moment matrix well conditioned up to degree 7, less their value at the origin, so that a fit
-//! takes the value of its point exactly.
+//! Polynomials in M coordinates up to a total degree, without the constant.
+//!
+//! They are products of Chebyshev polynomials, which keep the moment matrix well conditioned up to degree 7. Their
+//! values at the origin are subtracted, so that a fit reproduces the value at its own point exactly.
 
 use crate::linear_algebra::number::{Lanes, Number};
 use crate::polynomials::multi_index::MultiIndexSet;
 
-/// Highest degree.
-pub(super) const MOST_DEGREE: usize = 7;
+/// Largest total degree.
+pub(super) const MAX_DEGREE: usize = 7;
 
-/// T_n^(k)(0) for n and k up to the highest degree, from T_{n+1} = 2 x T_n − T_{n−1}.
-fn derivatives_at_origin() -> [[f64; MOST_DEGREE + 1]; MOST_DEGREE + 1] {
-    let mut t = [[0.0; MOST_DEGREE + 1]; MOST_DEGREE + 1];
+/// Derivatives T_n^(k)(0) for n and k up to the largest degree, from T_{n+1} = 2 x T_n − T_{n−1}.
+fn derivatives_at_origin() -> [[f64; MAX_DEGREE + 1]; MAX_DEGREE + 1] {
+    let mut t = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];
     t[0][0] = 1.0;
     t[1][1] = 1.0;
-    for n in 2..=MOST_DEGREE {
-        for k in 0..=MOST_DEGREE {
+    for n in 2..=MAX_DEGREE {
+        for k in 0..=MAX_DEGREE {
             let rise = if k > 0 { 2.0 * k as f64 * t[n - 1][k - 1] } else { 0.0 };
             t[n][k] = rise - t[n - 2][k];
         }
@@ -22,40 +23,42 @@ fn derivatives_at_origin() -> [[f64; MOST_DEGREE + 1]; MOST_DEGREE + 1] {
     t
 }
 
-/// The functions ∏ T_{a_d}(x_d) − ∏ T_{a_d}(0) with 1 ≤ Σ a_d ≤ degree, by total degree.
+/// The functions ∏ T_{a_d}(x_d) − ∏ T_{a_d}(0) with 1 ≤ Σ a_d ≤ degree, sorted by total degree.
 #[derive(Debug, Clone)]
 pub(super) struct Basis<const M: usize> {
+    /// Total degree of the basis.
     degree: usize,
-    /// Degrees of the factors, and the value at the origin.
+    /// Degrees a of the factors of each function, and the product ∏ T_{a_d}(0).
     functions: Vec<([u8; M], f64)>,
-    /// ∂^α of every function at the origin, for the α of every function in their order.
+    /// Derivatives ∂^α of all functions at the origin, by the multi-index α.
     derivatives: Vec<f64>,
 }
 
 impl<const M: usize> Basis<M> {
+    /// The basis up to a total degree, at most [`MAX_DEGREE`].
     pub fn new(degree: usize) -> Self {
-        let degree = degree.min(MOST_DEGREE);
+        let degree = degree.min(MAX_DEGREE);
         let at_origin = derivatives_at_origin();
         let set = MultiIndexSet::<M>::total_degree(degree);
         let indices = &set.indices()[1..];
-        let derivative = |of: &[u8; M], alpha: &[u8; M]| -> f64 {
-            of.iter().zip(alpha).map(|(n, k)| at_origin[usize::from(*n)][usize::from(*k)]).product()
+        let derivative = |degrees: &[u8; M], alpha: &[u8; M]| -> f64 {
+            degrees.iter().zip(alpha).map(|(n, k)| at_origin[usize::from(*n)][usize::from(*k)]).product()
         };
         let functions = indices.iter().map(|a| (*a, derivative(a, &[0; M]))).collect();
         let derivatives = indices.iter().flat_map(|alpha| indices.iter().map(|a| derivative(a, alpha))).collect();
         Self { degree, functions, derivatives }
     }
 
-    /// How many functions there are.
+    /// Number of functions.
     pub fn size(&self) -> usize {
         self.functions.len()
     }
 
-    /// The values of all functions at a place, scaled coordinates.
+    /// Writes the values of all functions at the scaled coordinates `x`.
     #[inline(always)]
     pub fn values(&self, x: [Lanes; M], out: &mut [Lanes]) {
         let one = Lanes::splat(1.0);
-        let mut t = [[one; MOST_DEGREE + 1]; M];
+        let mut t = [[one; MAX_DEGREE + 1]; M];
         for (t, x) in t.iter_mut().zip(x) {
             t[1] = x;
             for n in 2..=self.degree {
@@ -63,16 +66,16 @@ impl<const M: usize> Basis<M> {
             }
         }
         for (out, (a, origin)) in out.iter_mut().zip(&self.functions) {
-            let mut product = t[0][usize::from(a[0]) & MOST_DEGREE];
+            let mut product = t[0][usize::from(a[0]) & MAX_DEGREE];
             for d in 1..M - 1 {
-                product *= t[d][usize::from(a[d]) & MOST_DEGREE];
+                product *= t[d][usize::from(a[d]) & MAX_DEGREE];
             }
-            let last = if M > 1 { t[M - 1][usize::from(a[M - 1]) & MOST_DEGREE] } else { one };
+            let last = if M > 1 { t[M - 1][usize::from(a[M - 1]) & MAX_DEGREE] } else { one };
             *out = Number::mul_add(product, last, Lanes::splat(-origin));
         }
     }
 
-    /// ∂^α of every function at the origin, in scaled coordinates; none for α = 0 or beyond the degree.
+    /// Derivatives ∂^α of all functions at the origin, in scaled coordinates. None for α = 0 or beyond the degree.
     pub fn derivative(&self, alpha: &[u8; M]) -> Option<&[f64]> {
         let place = self.functions.iter().position(|(a, _)| a == alpha)?;
         Some(&self.derivatives[place * self.size()..(place + 1) * self.size()])
@@ -114,7 +117,7 @@ mod tests {
             check::<3>(degree);
         }
         let basis = Basis::<2>::new(3);
-        // x y has ∂_xy = 1.
+        // The mixed derivative belongs to a single function.
         let mixed = basis.derivative(&[1, 1]).unwrap();
         assert_eq!(mixed.iter().filter(|v| **v != 0.0).count(), 1);
     }

@@ -1,28 +1,48 @@
-//! Operators as sparse rows from the fits of a chart, in parallel.
+//! Construction of operators as sparse rows, in parallel.
 
 use super::basis::Basis;
 use super::charts::{Chart, Functional, Heights, Node};
-use super::fits::{BLOCK, Fits, Outcome, RowSink, Soundness, Support, Work};
+use super::fits::{BLOCK, FitOutcome, Fits, RowSink, Support, SupportDiagnostics, Workspace};
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::number::Lanes;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
-/// Operators, one for each functional asked for, and what became of the points.
+/// Operators for a list of functionals, with the diagnostics of their fits.
 #[derive(Debug)]
 pub struct Construction<const M: usize> {
-    /// The operators, in the order of the functionals.
+    /// One operator per functional, in the order of the functionals.
     pub operators: Vec<SparseRows>,
-    /// Heights of the surface over the plane of each point, where the chart needs them.
+    /// Heights of the surface over the plane of each point; empty where the chart does not need them.
     pub heights: Vec<Heights<M>>,
-    /// Counts.
-    pub soundness: Soundness,
+    /// Numbers of fallbacks and failures of the fits.
+    pub fit_diagnostics: SupportDiagnostics,
 }
 
-/// Operators for the functionals on the points of a chart.
+/// Builds one operator per functional on the points of a chart.
+///
+/// The row of a point whose moment conditions cannot be met is a single NaN.
 ///
 /// # Errors
-/// [`Interrupted`].
+/// [`Interrupted`] when the interrupt is raised.
+///
+/// ```
+/// use meniscus::geometry::{Vector, fibonacci};
+/// use meniscus::operators::charts::tangent::Metric;
+/// use meniscus::operators::{Functional, Support, TangentChart, construct};
+/// use meniscus::parallel::Interrupt;
+///
+/// // Δ_S z = −2 z on the unit sphere.
+/// let points: Vec<Vector<3>> = fibonacci::sphere(1000);
+/// let radius = 0.4;
+/// let chart = TangentChart::new(&points, &points, Metric::FromNormals, radius);
+/// let support = Support { degree: 4, radius };
+/// let built = construct::<2>(&chart, support, &[Functional::LaplaceBeltrami], &Interrupt::default()).unwrap();
+/// let z: Vec<f64> = points.iter().map(|x| x[2]).collect();
+/// let mut laplacian = vec![0.0; 1000];
+/// built.operators[0].apply(&z, &mut laplacian);
+/// assert!(z.iter().zip(&laplacian).all(|(z, value)| (value + 2.0 * z).abs() < 1e-3));
+/// ```
 pub fn construct<const M: usize>(
     chart: &dyn Chart<M>,
     support: Support,
@@ -32,32 +52,32 @@ pub fn construct<const M: usize>(
     let basis = Basis::<M>::new(support.degree);
     let fits = Fits { chart, basis: &basis, radius: support.radius, functionals };
     let count = chart.count();
-    let blocks: Vec<(Rows, Outcome<M>)> = (0..count.div_ceil(BLOCK))
+    let blocks: Vec<(Rows, FitOutcome<M>)> = (0..count.div_ceil(BLOCK))
         .into_par_iter()
         .with_min_len(1)
-        .map_init(Work::default, |work, block| {
+        .map_init(Workspace::default, |workspace, block| {
             let mut rows = Rows { operators: vec![SparseRows::default(); functionals.len()], ..Rows::default() };
-            let mut outcome = Outcome::default();
+            let mut outcome = FitOutcome::default();
             let end = ((block + 1) * BLOCK).min(count);
-            fits.run(block * BLOCK..end, interrupt, work, &mut rows, &mut outcome);
+            fits.run(block * BLOCK..end, interrupt, workspace, &mut rows, &mut outcome);
             (rows, outcome)
         })
         .collect();
     interrupt.check()?;
     let stacked = |k: usize| SparseRows::stacked(blocks.iter().map(|(rows, _)| &rows.operators[k]));
     let operators = (0..functionals.len()).map(stacked).collect();
-    let mut soundness = Soundness::none();
+    let mut fit_diagnostics = SupportDiagnostics::default();
     for (_, outcome) in &blocks {
-        soundness.add(&outcome.soundness);
+        fit_diagnostics.add(&outcome.fit_diagnostics);
     }
     Ok(Construction {
         operators,
         heights: blocks.into_iter().flat_map(|(_, outcome)| outcome.heights).collect(),
-        soundness,
+        fit_diagnostics,
     })
 }
 
-/// Rows as they are made.
+/// Receives the weights of fits and appends them as rows.
 #[derive(Default)]
 struct Rows {
     operators: Vec<SparseRows>,
@@ -66,10 +86,11 @@ struct Rows {
 }
 
 impl<const M: usize> RowSink<M> for Rows {
-    /// The row of a lane: its neighbours, and for the point itself what makes the sum zero.
+    /// Appends the row of point i: the weights of its neighbors, and a weight of the point itself with which the row
+    /// sums to zero.
     fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>) {
         let Some((weights, lane)) = weights else {
-            // What is not known must not look like a number.
+            // An unknown row must not look like a number.
             self.operators[functional].push_row(&[i as u32], &[f64::NAN]);
             return;
         };
@@ -113,7 +134,7 @@ mod tests {
     }
 
     fn applied<const M: usize>(construction: &Construction<M>, k: usize, field: &[f64]) -> Vec<f64> {
-        assert_eq!(construction.soundness.failed, 0);
+        assert_eq!(construction.fit_diagnostics.failed, 0);
         let mut out = vec![0.0; construction.operators[k].rows()];
         construction.operators[k].apply(field, &mut out);
         out
@@ -145,38 +166,40 @@ mod tests {
     #[test]
     fn orders_are_one_below_the_degree() {
         for (degree, radius, order) in [(3, 2.4, 1.95), (5, 3.3, 3.9), (7, 4.2, 5.8)] {
-            for metric in [Metric::OfNormals, Metric::OfHeights] {
+            for metric in [Metric::FromNormals, Metric::FromHeights] {
                 let errors = [500, 2000, 8000].map(|count| error(count, degree, radius, metric, 0.0));
-                // Spacing halves from one to the next.
+                // The spacing halves from each count to the next.
                 let slope = 0.5 * (errors[0] / errors[2]).log2();
                 assert!(slope > order, "degree {degree}: slope {slope}, {errors:?}");
             }
         }
     }
 
-    /// Nine points in three rows: x³ is 3 x there about any of them, so that slopes are not known, but ∂xx + ∂yy is. A metric of fitted
-    /// heights has no slopes to be made of; exact normals need none.
+    /// Nine points in three rows: x³ is 3 x there about any of them, so that slopes are not known, but ∂xx + ∂yy is. A
+    /// metric of fitted heights has no slopes to be made of; exact normals need none.
     #[test]
     fn heights_that_cannot_be_fitted_make_no_row() {
         let points: Vec<_> = (0..9).map(|k| Vector::<3>::new(f64::from(k % 3), f64::from(k / 3), 0.0)).collect();
         let normals = vec![Vector::<3>::z(); 9];
         let support = Support { degree: 3, radius: 2.9 };
-        let soundness = |metric: Metric| {
+        let fit_diagnostics = |metric: Metric| {
             let chart = TangentChart::new(&points, &normals, metric, support.radius);
-            construct::<2>(&chart, support, &[Functional::LaplaceBeltrami], &Interrupt::default()).unwrap().soundness
+            construct::<2>(&chart, support, &[Functional::LaplaceBeltrami], &Interrupt::default())
+                .unwrap()
+                .fit_diagnostics
         };
-        let known = soundness(Metric::OfNormals);
+        let known = fit_diagnostics(Metric::FromNormals);
         assert_eq!((known.low_rank, known.failed, known.first_failed), (1, 8, Some(0)), "{known:?}");
-        let fitted = soundness(Metric::OfHeights);
+        let fitted = fit_diagnostics(Metric::FromHeights);
         assert_eq!((fitted.low_rank, fitted.failed, fitted.first_failed), (0, 9, Some(0)), "{fitted:?}");
     }
 
     #[test]
     fn fitted_heights_make_up_for_normals_that_are_off() {
-        let exact = error(4000, 5, 3.3, Metric::OfHeights, 0.0);
-        let off = error(4000, 5, 3.3, Metric::OfHeights, 1e-2);
+        let exact = error(4000, 5, 3.3, Metric::FromHeights, 0.0);
+        let off = error(4000, 5, 3.3, Metric::FromHeights, 1e-2);
         assert!(off < 1.2 * exact, "{off:e} {exact:e}");
-        assert!(error(4000, 5, 3.3, Metric::OfNormals, 1e-2) > 1e-3);
+        assert!(error(4000, 5, 3.3, Metric::FromNormals, 1e-2) > 1e-3);
     }
 
     #[test]
@@ -232,7 +255,7 @@ mod tests {
         let count = 4000;
         let points = fibonacci::sphere(count);
         let radius = 3.3 * spacing(count);
-        let chart = TangentChart::new(&points, &points, Metric::OfNormals, radius);
+        let chart = TangentChart::new(&points, &points, Metric::FromNormals, radius);
         let functionals = [0, 1, 2].map(Functional::Gradient);
         let built = construct::<2>(&chart, Support { degree: 5, radius }, &functionals, &Interrupt::default()).unwrap();
         // ∇_S of x is e_x − n n_x.

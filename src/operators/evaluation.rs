@@ -1,71 +1,73 @@
-//! Functionals of fields at once, without rows: for points that move, whose weights are used a single time.
+//! Evaluation of functionals without rows, for moving points, whose weights are used only once.
 
 use super::basis::Basis;
 use super::charts::{Chart, Functional, Node};
-use super::fits::{BLOCK, Fits, Outcome, RowSink, Soundness, Support, Work};
+use super::fits::{BLOCK, FitOutcome, Fits, RowSink, Support, SupportDiagnostics, Workspace};
 use crate::linear_algebra::number::Lanes;
 use crate::parallel::{Interrupt, Interrupted, PerThread};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
 use std::sync::{Mutex, PoisonError};
 
-/// Fits of one degree with the storage of all threads.
+/// Functionals with one support, and the workspaces of all threads.
 pub struct Evaluation<const M: usize> {
     basis: Basis<M>,
     support: Support,
     functionals: Vec<Functional<M>>,
-    work: PerThread<(Work<M>, Outcome<M>)>,
+    workspace: PerThread<(Workspace<M>, FitOutcome<M>)>,
 }
 
-/// Fields that are evaluated at a time, at most.
-pub const MOST_FIELDS: usize = 4;
+/// Largest number of fields that are evaluated together.
+pub const MAX_FIELDS: usize = 4;
 
 impl<const M: usize> Evaluation<M> {
-    /// Of functionals.
+    /// The evaluation of functionals with fits of the given support.
     #[must_use]
     pub fn new(support: Support, functionals: Vec<Functional<M>>) -> Self {
-        Self { basis: Basis::new(support.degree), support, functionals, work: PerThread::new() }
+        Self { basis: Basis::new(support.degree), support, functionals, workspace: PerThread::new() }
     }
 
-    /// Numbers of a point for so many fields.
+    /// Number of results per point for a number of fields.
     #[must_use]
     pub fn numbers(&self, fields: usize) -> usize {
         self.functionals.len() * fields
     }
 
-    /// Q_k f at every point of the chart: functional by functional, and in it field by field. Fields beyond
-    /// [`MOST_FIELDS`] are left out.
+    /// Writes the functionals of all fields at every point of the chart to `out`.
+    ///
+    /// The results of a point are ordered by functional, then by field. Fields beyond [`MAX_FIELDS`] are ignored.
+    /// Results of a point whose moment conditions cannot be met are NaN.
     ///
     /// # Errors
-    /// [`Interrupted`].
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn evaluate(
         &self,
         chart: &dyn Chart<M>,
         fields: &[&[f64]],
         out: &mut [f64],
         interrupt: &Interrupt,
-    ) -> Result<Soundness, Interrupted> {
-        let fields = &fields[..fields.len().min(MOST_FIELDS)];
+    ) -> Result<SupportDiagnostics, Interrupted> {
+        let fields = &fields[..fields.len().min(MAX_FIELDS)];
         let numbers = self.numbers(fields.len());
         let fits = Fits { chart, basis: &self.basis, radius: self.support.radius, functionals: &self.functionals };
-        let soundness = Mutex::new(Soundness::none());
+        let fit_diagnostics = Mutex::new(SupportDiagnostics::default());
         out.par_chunks_mut(BLOCK * numbers).enumerate().with_min_len(1).for_each(|(block, out)| {
-            self.work.with(|(work, outcome)| {
-                outcome.soundness = Soundness::none();
+            self.workspace.with(|(workspace, outcome)| {
+                outcome.fit_diagnostics = SupportDiagnostics::default();
                 outcome.heights.clear();
                 let first = block * BLOCK;
                 let mut sums = Sums { first, fields, numbers, out };
                 let points = first..first + sums.out.len() / numbers;
-                fits.run(points, interrupt, work, &mut sums, outcome);
-                // Counts and a minimum: the order of adding does not matter.
-                soundness.lock().unwrap_or_else(PoisonError::into_inner).add(&outcome.soundness);
+                fits.run(points, interrupt, workspace, &mut sums, outcome);
+                // The order in which counts and a minimum are combined does not matter.
+                fit_diagnostics.lock().unwrap_or_else(PoisonError::into_inner).add(&outcome.fit_diagnostics);
             });
         });
         interrupt.check()?;
-        Ok(soundness.into_inner().unwrap_or_else(PoisonError::into_inner))
+        Ok(fit_diagnostics.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// Σ w_j (f_j − f_i) as weights come.
+/// Receives the weights of fits and writes the sums Σ_j w_j (f_j − f_i).
 struct Sums<'a> {
     first: usize,
     fields: &'a [&'a [f64]],
@@ -76,12 +78,12 @@ struct Sums<'a> {
 impl<const M: usize> RowSink<M> for Sums<'_> {
     fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>) {
         let count = self.fields.len();
-        // What is not known must not look like a number.
-        let mut sums = [f64::NAN; MOST_FIELDS];
+        // An unknown value must not look like a number.
+        let mut sums = [f64::NAN; MAX_FIELDS];
         if let Some((weights, lane)) = weights {
-            let mut own = [0.0; MOST_FIELDS];
+            let mut own = [0.0; MAX_FIELDS];
             own.iter_mut().zip(self.fields).for_each(|(own, field)| *own = field[i]);
-            sums = [0.0; MOST_FIELDS];
+            sums = [0.0; MAX_FIELDS];
             for (node, weights) in nodes.iter().zip(weights) {
                 let weight = weights.as_array()[lane];
                 for ((sum, field), own) in sums.iter_mut().zip(self.fields).zip(own) {
@@ -120,8 +122,8 @@ mod tests {
         let mut out = vec![0.0; 4 * 300];
         let evaluation = Evaluation::<2>::new(support, functionals);
         let interrupt = Interrupt::default();
-        let soundness = evaluation.evaluate(&chart, &[&fields[0], &fields[1]], &mut out, &interrupt).unwrap();
-        assert_eq!(soundness, built.soundness);
+        let fit_diagnostics = evaluation.evaluate(&chart, &[&fields[0], &fields[1]], &mut out, &interrupt).unwrap();
+        assert_eq!(fit_diagnostics, built.fit_diagnostics);
         for (f, field) in fields.iter().enumerate() {
             for (k, rows) in built.operators.iter().enumerate() {
                 let mut expected = vec![0.0; 300];

@@ -1,7 +1,8 @@
-//! The fits of a chart, four points side by side: what supports grow to, which solutions stand, and where their weights go.
+//! The fits of a chart, four points at once, with their fallbacks.
 //!
-//! Supports that do not hold enough grow; where that does not do, what lies on the same side is taken, and the moment
-//! conditions are solved by a rank-revealing decomposition: the weights stand if they hold. Everything is counted.
+//! A support with too few neighbors, or with a rank-deficient moment matrix, grows. If that does not help, all points
+//! on the same side are accepted, and the moment conditions are solved by a rank-revealing decomposition. The weights
+//! are used if the conditions hold. Every fallback is counted.
 
 use super::basis::Basis;
 use super::charts::{Chart, Functional, Heights, Node};
@@ -10,110 +11,113 @@ use crate::linear_algebra::number::{LANES, Lanes};
 use crate::parallel::Interrupt;
 use std::ops::Range;
 
-/// Degree of the polynomials and the support of a point.
+/// Degree of the polynomials and radius of the support of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Support {
-    /// Total degree: at most 7.
+    /// Total degree of the polynomials, at most 7.
     pub degree: usize,
-    /// Radius of the support, r_c.
+    /// Nominal radius r_c of the support, a length.
     pub radius: f64,
 }
 
-/// What became of points.
+/// Numbers of fallbacks and failures of fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Soundness {
-    /// How often a support was enlarged.
+pub struct SupportDiagnostics {
+    /// Number of enlargements of supports.
     pub enlarged: u64,
     /// Points whose moment conditions were solved by the rank-revealing decomposition.
     pub low_rank: u64,
-    /// Points that had to take what lies beyond a turn of 60° of the normal: the surface is too coarse there.
+    /// Points with neighbors whose normals differ by more than 60°, because the surface is too coarse there.
     pub unresolved: u64,
-    /// Points whose moment conditions cannot be met: their rows give no number.
+    /// Points whose moment conditions cannot be met, so that their rows give NaN.
     pub failed: u64,
-    /// The first of them.
+    /// Index of the first failed point.
     pub first_failed: Option<usize>,
-    /// The least share of a pivot in its diagonal, of all points that were solved directly.
-    pub least_pivot: f64,
+    /// Smallest pivot ratio of the points that were solved directly.
+    pub min_pivot: f64,
 }
 
-impl Soundness {
-    /// Of no points.
-    #[must_use]
-    pub fn none() -> Self {
-        Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, first_failed: None, least_pivot: 1.0 }
+impl Default for SupportDiagnostics {
+    /// The diagnostics before any fit.
+    fn default() -> Self {
+        Self { enlarged: 0, low_rank: 0, unresolved: 0, failed: 0, first_failed: None, min_pivot: 1.0 }
     }
+}
 
-    /// Supports that were rescued, in one way or another.
+impl SupportDiagnostics {
+    /// Number of fallbacks of any kind that gave a result.
     #[must_use]
     pub fn rescued(&self) -> u64 {
         self.enlarged + self.low_rank + self.unresolved
     }
 
-    /// What a checkpoint keeps: the counts in their order, and the least pivot.
+    /// The numbers that a checkpoint keeps: the counts in their order, and the smallest pivot ratio.
     #[must_use]
     pub fn to_numbers(&self) -> ([u64; 4], f64) {
-        ([self.enlarged, self.low_rank, self.unresolved, self.failed], self.least_pivot)
+        ([self.enlarged, self.low_rank, self.unresolved, self.failed], self.min_pivot)
     }
 
-    /// Takes it back; which point failed first is not kept.
+    /// Restores the numbers of [`Self::to_numbers`]. The index of the first failed point is not kept.
     #[must_use]
-    pub fn from_numbers([enlarged, low_rank, unresolved, failed]: [u64; 4], least_pivot: f64) -> Self {
-        Self { enlarged, low_rank, unresolved, failed, first_failed: None, least_pivot }
+    pub fn from_numbers([enlarged, low_rank, unresolved, failed]: [u64; 4], min_pivot: f64) -> Self {
+        Self { enlarged, low_rank, unresolved, failed, first_failed: None, min_pivot }
     }
 
-    /// With others.
+    /// Adds the diagnostics of other fits.
     pub fn add(&mut self, other: &Self) {
         self.enlarged += other.enlarged;
         self.low_rank += other.low_rank;
         self.unresolved += other.unresolved;
         self.failed += other.failed;
         self.first_failed = [self.first_failed, other.first_failed].into_iter().flatten().min();
-        self.least_pivot = self.least_pivot.min(other.least_pivot);
+        self.min_pivot = self.min_pivot.min(other.min_pivot);
     }
 }
 
-/// Neighbours for a function at least: fewer make the fit an interpolation of noise.
-const NEIGHBORS_A_FUNCTION: f64 = 1.4;
-/// How a support grows that is not enough, and how far.
+/// Smallest number of neighbors per basis function. With fewer, a fit interpolates noise.
+const NEIGHBORS_PER_FUNCTION: f64 = 1.4;
+/// Factor of one enlargement of a support.
 const GROWTH: f64 = 1.2;
-/// The largest support by r_c.
-pub const MOST_GROWTH: f64 = 2.5;
-/// Below this share of a pivot in its diagonal the moment conditions do not hold to the digits that are wanted.
-const LEAST_PIVOT: f64 = 1e-9;
-/// Moment conditions that a rank-revealing solution may leave open, by the largest.
-const OPEN_MOMENTS: f64 = 1e-6;
-/// Points of a parallel task; a multiple of the lanes.
+/// Largest support radius, in multiples of the nominal radius.
+pub const MAX_GROWTH: f64 = 2.5;
+/// Smallest pivot ratio with which the moment conditions hold to enough digits.
+const MIN_PIVOT: f64 = 1e-9;
+/// Largest violation of the moment conditions by a rank-revealing solution, relative to the largest value of the
+/// functional.
+const MAX_MOMENT_VIOLATION: f64 = 1e-6;
+/// Number of points of a parallel task, a multiple of the lanes.
 pub(super) const BLOCK: usize = 64;
 
-/// Where the weights of points go.
+/// Receiver of the weights of fits.
 pub(super) trait RowSink<const M: usize> {
-    /// The nodes of point i and, in a lane, their weights for a functional; none where the moment conditions are not met.
+    /// Takes the nodes of point i and their weights for a functional, in the given lane; None where the moment
+    /// conditions are not met.
     fn take(&mut self, functional: usize, i: usize, nodes: &[Node<M>], weights: Option<(&[Lanes], usize)>);
 }
 
-/// What comes of a range of points beside the weights.
-pub(super) struct Outcome<const M: usize> {
+/// Results of the fits of a range of points, beside the weights.
+pub(super) struct FitOutcome<const M: usize> {
     pub heights: Vec<Heights<M>>,
-    pub soundness: Soundness,
+    pub fit_diagnostics: SupportDiagnostics,
 }
 
-impl<const M: usize> Default for Outcome<M> {
+impl<const M: usize> Default for FitOutcome<M> {
     fn default() -> Self {
-        Self { heights: Vec::new(), soundness: Soundness::none() }
+        Self { heights: Vec::new(), fit_diagnostics: SupportDiagnostics::default() }
     }
 }
 
-/// Storage of a thread.
+/// Workspace of a thread.
 #[derive(Default)]
-pub(super) struct Work<const M: usize> {
+pub(super) struct Workspace<const M: usize> {
     fit: MomentFit<M>,
     terms: Vec<([u8; M], f64)>,
     functional: Vec<f64>,
-    /// Values of the functional in hand on the functions, lane by lane.
+    /// Values of the present functional for the basis functions, in each lane.
     values: Vec<[f64; LANES]>,
 }
 
-/// What is fitted.
+/// The chart, basis and functionals of fits.
 pub(super) struct Fits<'a, const M: usize> {
     pub chart: &'a dyn Chart<M>,
     pub basis: &'a Basis<M>,
@@ -122,125 +126,136 @@ pub(super) struct Fits<'a, const M: usize> {
 }
 
 impl<const M: usize> Fits<'_, M> {
-    /// A range of points, in their order; ends early when interrupted.
+    /// Fits a range of points in their order. An interrupt ends the fits early.
     pub fn run(
         &self,
         points: Range<usize>,
         interrupt: &Interrupt,
-        work: &mut Work<M>,
+        workspace: &mut Workspace<M>,
         sink: &mut dyn RowSink<M>,
-        outcome: &mut Outcome<M>,
+        outcome: &mut FitOutcome<M>,
     ) {
         let end = points.end;
         for first in points.step_by(LANES) {
             if interrupt.is_raised() {
                 return;
             }
-            self.rows_of(first..(first + LANES).min(end), work, sink, outcome);
+            self.rows_of(first..(first + LANES).min(end), workspace, sink, outcome);
         }
     }
 
-    /// The rows of up to four points, one a lane.
-    fn rows_of(&self, points: Range<usize>, work: &mut Work<M>, sink: &mut dyn RowSink<M>, outcome: &mut Outcome<M>) {
+    /// Fits up to four points, one per lane.
+    ///
+    /// 1. Collect the neighbors, and enlarge supports with too few of them.
+    /// 2. Factorize the moment matrices, and enlarge rank-deficient supports until all are sound or at their limit.
+    /// 3. Solve for all functionals.
+    fn rows_of(
+        &self,
+        points: Range<usize>,
+        workspace: &mut Workspace<M>,
+        sink: &mut dyn RowSink<M>,
+        outcome: &mut FitOutcome<M>,
+    ) {
         let number = self.basis.size();
-        let wanted = (NEIGHBORS_A_FUNCTION * number as f64).ceil() as usize;
+        let wanted = (NEIGHBORS_PER_FUNCTION * number as f64).ceil() as usize;
         let last = points.end - 1;
         let nominal: [f64; LANES] =
             std::array::from_fn(|lane| self.radius * self.chart.scale((points.start + lane).min(last)));
-        let mut reach = nominal;
-        let can_grow = |lane: usize, reach: f64| self.chart.may_grow() && reach * GROWTH <= MOST_GROWTH * nominal[lane];
+        let mut radius = nominal;
+        let can_grow =
+            |lane: usize, radius: f64| self.chart.may_grow() && radius * GROWTH <= MAX_GROWTH * nominal[lane];
         for (lane, i) in points.clone().enumerate() {
             loop {
-                self.chart.gather(i, reach[lane], false, &mut work.fit.near[lane]);
-                if work.fit.near[lane].len() >= wanted || !can_grow(lane, reach[lane]) {
+                self.chart.gather(i, radius[lane], false, &mut workspace.fit.near[lane]);
+                if workspace.fit.near[lane].len() >= wanted || !can_grow(lane, radius[lane]) {
                     break;
                 }
-                reach[lane] *= GROWTH;
-                outcome.soundness.enlarged += 1;
+                radius[lane] *= GROWTH;
+                outcome.fit_diagnostics.enlarged += 1;
             }
         }
         for lane in points.len()..LANES {
-            // Spare lanes repeat the first.
-            let (first, rest) = work.fit.near.split_at_mut(1);
+            // Spare lanes repeat the first one.
+            let (first, rest) = workspace.fit.near.split_at_mut(1);
             rest[lane - 1].clone_from(&first[0]);
-            reach[lane] = reach[0];
+            radius[lane] = radius[0];
         }
         let mut is_last_resort = [!self.chart.may_grow(); LANES];
         loop {
-            let pivots = work.fit.factorise(self.basis);
+            let pivots = workspace.fit.factorize(self.basis);
             let sound: [bool; LANES] =
-                std::array::from_fn(|lane| pivots[lane] > LEAST_PIVOT && work.fit.near[lane].len() >= number);
+                std::array::from_fn(|lane| pivots[lane] > MIN_PIVOT && workspace.fit.near[lane].len() >= number);
             let mut is_again = false;
             for (lane, i) in points.clone().enumerate().filter(|(lane, _)| !sound[*lane]) {
-                if can_grow(lane, reach[lane]) && !is_last_resort[lane] {
-                    reach[lane] *= GROWTH;
-                    outcome.soundness.enlarged += 1;
+                if can_grow(lane, radius[lane]) && !is_last_resort[lane] {
+                    radius[lane] *= GROWTH;
+                    outcome.fit_diagnostics.enlarged += 1;
                 } else if !is_last_resort[lane] {
-                    reach[lane] = nominal[lane] * GROWTH;
+                    radius[lane] = nominal[lane] * GROWTH;
                     is_last_resort[lane] = true;
-                    outcome.soundness.unresolved += 1;
+                    outcome.fit_diagnostics.unresolved += 1;
                 } else {
                     continue;
                 }
-                self.chart.gather(i, reach[lane], is_last_resort[lane], &mut work.fit.near[lane]);
+                self.chart.gather(i, radius[lane], is_last_resort[lane], &mut workspace.fit.near[lane]);
                 is_again = true;
             }
             if !is_again {
                 for lane in (0..points.len()).filter(|lane| sound[*lane]) {
-                    outcome.soundness.least_pivot = outcome.soundness.least_pivot.min(pivots[lane]);
+                    outcome.fit_diagnostics.min_pivot = outcome.fit_diagnostics.min_pivot.min(pivots[lane]);
                 }
-                self.finish(&points, reach, sound, work, sink, outcome);
+                self.finish(&points, radius, sound, workspace, sink, outcome);
                 return;
             }
         }
     }
 
-    /// Solutions for every functional, with the supports and the factorization as they stand.
+    /// Solves for all functionals with the present supports and factorization, and passes the weights to the sink.
     fn finish(
         &self,
         points: &Range<usize>,
-        reach: [f64; LANES],
+        radius: [f64; LANES],
         sound: [bool; LANES],
-        work: &mut Work<M>,
+        workspace: &mut Workspace<M>,
         sink: &mut dyn RowSink<M>,
-        outcome: &mut Outcome<M>,
+        outcome: &mut FitOutcome<M>,
     ) {
-        let heights = self.chart.needs_heights().then(|| self.heights(reach, sound, work));
-        // Where the moments are singular, so are those of the heights: a metric of what comes out would be a metric of nothing.
+        let heights = self.chart.needs_heights().then(|| self.heights(radius, sound, workspace));
+        // Where the moments are singular, the heights are undefined, and with them the metric.
         let mut holds = sound.map(|is_sound| is_sound || heights.is_none());
         for (k, functional) in self.functionals.iter().enumerate() {
-            work.values.clear();
-            work.values.resize(self.basis.size(), [0.0; LANES]);
+            workspace.values.clear();
+            workspace.values.resize(self.basis.size(), [0.0; LANES]);
             for lane in 0..LANES {
                 let i = points.start + lane.min(points.len().saturating_sub(1));
-                work.terms.clear();
-                let of_lane = heights.as_ref().map(|heights| &heights[lane]);
-                self.chart.terms(*functional, i, of_lane, &mut work.terms);
-                for (alpha, coefficient) in &work.terms {
-                    // Functions are of coordinates by the reach.
+                workspace.terms.clear();
+                let lane_heights = heights.as_ref().map(|heights| &heights[lane]);
+                self.chart.terms(*functional, i, lane_heights, &mut workspace.terms);
+                for (alpha, coefficient) in &workspace.terms {
+                    // The basis functions depend on coordinates divided by the radius.
                     let order: u8 = alpha.iter().sum();
-                    let scale = coefficient * reach[lane].powi(-i32::from(order));
+                    let scale = coefficient * radius[lane].powi(-i32::from(order));
                     if let Some(values) = self.basis.derivative(alpha) {
-                        for (sum, value) in work.values.iter_mut().zip(values) {
+                        for (sum, value) in workspace.values.iter_mut().zip(values) {
                             sum[lane] += scale * value;
                         }
                     }
                 }
             }
-            work.fit.solution.clear();
-            work.fit.solution.extend(work.values.iter().map(|values| Lanes::new(*values)));
-            work.fit.solve();
+            workspace.fit.solution.clear();
+            workspace.fit.solution.extend(workspace.values.iter().map(|values| Lanes::new(*values)));
+            workspace.fit.solve();
             for (lane, i) in points.clone().enumerate() {
                 if !sound[lane] && holds[lane] {
-                    work.functional.clear();
-                    work.functional.extend(work.values.iter().map(|values| values[lane]));
-                    holds[lane] = work.fit.solve_low_rank(lane, &work.functional) <= OPEN_MOMENTS;
+                    workspace.functional.clear();
+                    workspace.functional.extend(workspace.values.iter().map(|values| values[lane]));
+                    holds[lane] = workspace.fit.solve_low_rank(lane, &workspace.functional) <= MAX_MOMENT_VIOLATION;
                 }
-                let weights = holds[lane].then_some((work.fit.weights.as_slice(), lane));
-                sink.take(k, i, &work.fit.near[lane], weights);
+                let weights = holds[lane].then_some((workspace.fit.weights.as_slice(), lane));
+                sink.take(k, i, &workspace.fit.near[lane], weights);
             }
         }
-        let Soundness { low_rank, failed, first_failed, .. } = &mut outcome.soundness;
+        let SupportDiagnostics { low_rank, failed, first_failed, .. } = &mut outcome.fit_diagnostics;
         for (lane, i) in points.clone().enumerate().filter(|(lane, _)| !sound[*lane]) {
             if holds[lane] {
                 *low_rank += 1;
@@ -254,22 +269,22 @@ impl<const M: usize> Fits<'_, M> {
         }
     }
 
-    /// Slopes and second derivatives of the surface over the plane of each lane, no numbers where it is not sound.
-    fn heights(&self, reach: [f64; LANES], sound: [bool; LANES], work: &mut Work<M>) -> [Heights<M>; LANES] {
-        work.fit.solve_heights(self.basis.size());
+    /// Slopes and second derivatives of the surface over the plane of each lane; NaN in lanes that are not sound.
+    fn heights(&self, radius: [f64; LANES], sound: [bool; LANES], workspace: &mut Workspace<M>) -> [Heights<M>; LANES] {
+        workspace.fit.solve_heights(self.basis.size());
         let derivative = |alpha: [u8; M], lane: usize| -> f64 {
             if !sound[lane] {
                 return f64::NAN;
             }
             let values = self.basis.derivative(&alpha).unwrap_or(&[]);
-            values.iter().zip(&work.fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
+            values.iter().zip(&workspace.fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
         };
         std::array::from_fn(|lane| Heights {
             first: std::array::from_fn(|a| derivative(std::array::from_fn(|d| u8::from(d == a)), lane)),
             second: std::array::from_fn(|a| {
                 std::array::from_fn(|b| {
                     let alpha = std::array::from_fn(|d| u8::from(d == a) + u8::from(d == b));
-                    derivative(alpha, lane) / reach[lane]
+                    derivative(alpha, lane) / radius[lane]
                 })
             }),
         })

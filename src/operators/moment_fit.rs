@@ -1,52 +1,53 @@
-//! The moment conditions of up to four points side by side: one factorization, then a solution a functional.
+//! The moment conditions of up to four points, one per lane: one factorization, then one solution per functional.
 
 use super::basis::Basis;
 use crate::linear_algebra::least_squares::LeastSquares;
 use crate::linear_algebra::normal_equations::{LaneSystems, packed_row};
 use crate::linear_algebra::number::{LANES, Lanes};
 
-/// A point of a support.
+/// A neighbor in the support of a point.
 #[derive(Debug, Clone, Copy)]
 pub struct Node<const M: usize> {
-    /// Whose value it takes.
+    /// Index of the point whose value the node takes.
     pub index: u32,
-    /// Coordinates from the centre, by the reach of the support.
+    /// Coordinates relative to the center, divided by the radius of the support.
     pub at: [f64; M],
-    /// Weight of the fit, not negative.
+    /// Weight in the fit, not negative.
     pub window: f64,
-    /// Height over the chart's plane, by the reach.
+    /// Height over the plane of the chart, divided by the radius of the support.
     pub height: f64,
 }
 
-/// Storage for four points.
+/// Workspace of the fits of up to four points.
 #[derive(Debug, Default)]
 pub(super) struct MomentFit<const M: usize> {
     systems: LaneSystems,
-    /// The support of each lane.
+    /// The neighbors in the support of each lane.
     pub near: [Vec<Node<M>>; LANES],
-    /// Values of the functions, node by node.
+    /// Values of the basis functions, node by node.
     values: Vec<Lanes>,
+    /// Weights of the nodes in the fit.
     windows: Vec<Lanes>,
-    /// Right-hand side, then the solution.
+    /// Right-hand side, which a solution replaces.
     pub solution: Vec<Lanes>,
     /// Weights of the nodes for the last functional.
     pub weights: Vec<Lanes>,
-    /// The moment matrix as it was, where a lane needs it once more.
+    /// Workspace of the rank-revealing solution of a single lane.
     dense: LeastSquares,
     row: Vec<f64>,
 }
 
 impl<const M: usize> MomentFit<M> {
-    /// Takes the supports as they stand: moments Σ W p pᵀ and their factorization. Returns the least share of a pivot in its
-    /// diagonal, lane by lane.
-    pub fn factorise(&mut self, basis: &Basis<M>) -> [f64; LANES] {
+    /// Computes the moment matrices Σ W p pᵀ of the present supports and factorizes them. Returns the smallest pivot
+    /// ratio of each lane.
+    pub fn factorize(&mut self, basis: &Basis<M>) -> [f64; LANES] {
         let number = basis.size();
-        let most = self.near.iter().map(Vec::len).max().unwrap_or(0);
+        let rows = self.near.iter().map(Vec::len).max().unwrap_or(0);
         self.systems.reset(number);
         self.systems.matrix_mut().fill(Lanes::splat(0.0));
-        self.values.resize(most * number, Lanes::splat(0.0));
+        self.values.resize(rows * number, Lanes::splat(0.0));
         self.windows.clear();
-        for k in 0..most {
+        for k in 0..rows {
             let (mut x, mut window) = ([[0.0; LANES]; M], [0.0; LANES]);
             for (lane, near) in self.near.iter().enumerate() {
                 if let Some(node) = near.get(k) {
@@ -69,10 +70,10 @@ impl<const M: usize> MomentFit<M> {
                 }
             }
         }
-        self.systems.factorise().to_array()
+        self.systems.factorize().to_array()
     }
 
-    /// The fit of the heights of the nodes: its coefficients are left in `solution`.
+    /// Fits the heights of the nodes. The coefficients are then in `solution`.
     pub fn solve_heights(&mut self, number: usize) {
         self.solution.clear();
         self.solution.resize(number, Lanes::splat(0.0));
@@ -86,13 +87,15 @@ impl<const M: usize> MomentFit<M> {
         self.systems.solve(&mut self.solution);
     }
 
-    /// Solves for the functional that stands in `solution` and makes the weights W_j z·p(x_j) of all nodes.
+    /// Solves for the functional in `solution` and computes the weights W_j z·p(x_j) of all nodes, where z is the
+    /// solution.
     pub fn solve(&mut self) {
         self.systems.solve(&mut self.solution);
-        self.weigh();
+        self.compute_weights();
     }
 
-    fn weigh(&mut self) {
+    /// Computes the weights of all nodes from `solution`.
+    fn compute_weights(&mut self) {
         let number = self.solution.len();
         self.weights.clear();
         for (values, window) in self.values.chunks_exact(number).zip(&self.windows) {
@@ -102,9 +105,11 @@ impl<const M: usize> MomentFit<M> {
         }
     }
 
-    /// The same for one lane whose moments are of low rank, by a rank-revealing solution, for a functional given by its values on
-    /// the functions. The weights of that lane stand in `weights` of lane `lane` afterwards. Returns the largest moment condition
-    /// that stays open, by the largest of the functional.
+    /// Solves one lane with a rank-deficient moment matrix by a rank-revealing decomposition.
+    ///
+    /// `functional` holds the values of the functional for the basis functions. The weights are written to the given
+    /// lane of `weights`. Returns the largest violation of a moment condition, relative to the largest value of the
+    /// functional.
     pub fn solve_low_rank(&mut self, lane: usize, functional: &[f64]) -> f64 {
         let number = functional.len();
         let count = self.near[lane].len();
@@ -124,7 +129,7 @@ impl<const M: usize> MomentFit<M> {
             self.weights[k].as_mut_array()[lane] = window(k) * product;
         }
         let moment = |a: usize| (0..count).map(|k| self.weights[k].as_array()[lane] * value(k, a)).sum::<f64>();
-        let open = (0..number).map(|a| (moment(a) - functional[a]).abs()).fold(0.0, f64::max);
-        open / functional.iter().fold(f64::MIN_POSITIVE, |most, f| most.max(f.abs()))
+        let violation = (0..number).map(|a| (moment(a) - functional[a]).abs()).fold(0.0, f64::max);
+        violation / functional.iter().fold(f64::MIN_POSITIVE, |largest, f| largest.max(f.abs()))
     }
 }

@@ -1,73 +1,82 @@
-//! A plane with a bump (Surface DC-PSE paper, section 4.4): the graph u(x) = α ζ(|x − p|/r) over [−2, 2]² with
-//! p = (−.5, 0), r = .25 and ζ(d) = exp(−1/(1 − d²)), cut off at d = .975.
+//! A plane with a bump (Surface DC-PSE, section 4.4): the graph u(x) = α ζ(‖x − p‖/r) over [−2, 2]².
+//!
+//! Here p = (−0.5, 0), r = 0.25, and ζ(d) = exp(−1/(1 − d²)) is truncated at d = 0.975. Points are dense where the bump
+//! is curved.
 
 use crate::geometry::{Vector, fibonacci};
 
-/// The surface.
+/// A plane with a bump of a given height.
+///
+/// ```
+/// let bump = meniscus::point_clouds::Bump { height: 1.0 };
+/// let top = bump.above(-0.5, 0.0);
+/// assert!((top.point[2] - (-1.0_f64).exp()).abs() < 1e-15);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bump {
-    /// α.
+    /// Factor α of ζ.
     pub height: f64,
 }
 
 /// Half the side of the square.
 pub const HALF_SIDE: f64 = 2.0;
-/// p.
+/// Center p of the bump in the plane.
 pub const CENTER: [f64; 2] = [-0.5, 0.0];
-/// r.
+/// Radius r of the bump.
 pub const RADIUS: f64 = 0.25;
-/// Spacing by the least radius of curvature.
-const BEND: f64 = 0.45;
-/// The spacing for which that holds: the paper's. Finer clouds are as much finer everywhere.
+/// Ratio of the spacing to the smallest radius of curvature, at the reference spacing.
+const SPACING_PER_CURVATURE_RADIUS: f64 = 0.45;
+/// The paper's spacing of the lattice. Finer clouds are finer by the same factor everywhere.
 const REFERENCE_SPACING: f64 = 1.0 / 32.0;
-/// Least spacing on the bump by that of the lattice.
-const LEAST_RATIO: f64 = 0.1;
-/// Change of the spacing along the surface, by the way.
+/// Smallest ratio of the spacing on the bump to that of the lattice.
+const MIN_RATIO: f64 = 0.1;
+/// Change of the spacing per length along the surface.
 const GRADE: f64 = 0.1;
-/// How far graded points reach: spacings are those of the lattice again there, and no initial field about the origin is cut.
+/// Radius of the graded points. Spacings there equal those of the lattice, and no initial field around the origin is
+/// cut.
 const OUTER: f64 = 0.7;
-/// What is left free between them and the nodes of the lattice, in spacings.
+/// Gap between the graded points and the nodes of the lattice, in spacings.
 const GAP: f64 = 0.35;
-/// Annuli by which the area of a bump is added up.
+/// Number of annuli for the quadrature of the area.
 const RINGS: usize = 4000;
-/// Parts of a cell along an axis by which areas next to the graded points are added up.
+/// Number of parts of a cell along each axis for the quadrature of the areas next to the graded points.
 const PARTS: usize = 16;
-/// Where ζ is cut off: it is exp(−20) there.
-const CUT: f64 = 0.975;
+/// Argument at which ζ is truncated. It is exp(−20) there.
+const TRUNCATION: f64 = 0.975;
 
-/// ζ and its first two derivatives.
+/// The function ζ with its first two derivatives.
 fn zeta(d: f64) -> [f64; 3] {
-    if d >= CUT {
+    if d >= TRUNCATION {
         return [0.0; 3];
     }
     let rest = 1.0 - d * d;
     let value = (-1.0 / rest).exp();
-    // ln ζ = −1/(1 − d²)
+    // The derivatives follow from ln ζ = −1/(1 − d²).
     let first = -2.0 * d / (rest * rest);
     let second = -2.0 / (rest * rest) - 8.0 * d * d / rest.powi(3);
     [value, value * first, value * (first * first + second)]
 }
 
-/// A point of the graph with what is known there.
+/// A point of the surface with the exact geometry there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BumpPoint {
-    /// Point.
+    /// Position of the point.
     pub point: Vector<3>,
-    /// Upward unit normal.
+    /// Upward unit normal n.
     pub normal: Vector<3>,
-    /// ∇·n.
+    /// Curvature ∇·n, the sum of the principal curvatures.
     pub curvature: f64,
-    /// Gauss curvature.
+    /// Gauss curvature, the product of the principal curvatures.
     pub gauss: f64,
 }
 
 impl Bump {
-    /// Slope of the profile at a distance from p.
+    /// Slope du/dρ of the profile at the distance ρ from p.
     fn slope(&self, rho: f64) -> f64 {
         self.height * zeta(rho / RADIUS)[1] / RADIUS
     }
 
-    /// The point above (x, y).
+    /// The point of the surface above (x, y).
     #[must_use]
     pub fn above(&self, x: f64, y: f64) -> BumpPoint {
         let (dx, dy) = (x - CENTER[0], y - CENTER[1]);
@@ -76,7 +85,7 @@ impl Bump {
         let (value, first) = (self.height * value, self.height * first / RADIUS);
         let second = self.height * second / (RADIUS * RADIUS);
         let (ex, ey) = if rho > 0.0 { (dx / rho, dy / rho) } else { (1.0, 0.0) };
-        // A surface of revolution: principal curvatures along the profile and across it.
+        // A surface of revolution has its principal directions along the profile and across it.
         let stretch = (1.0 + first * first).sqrt();
         let along = second / stretch.powi(3);
         let across = if rho > 0.0 { first / (rho * stretch) } else { second };
@@ -88,7 +97,7 @@ impl Bump {
         }
     }
 
-    /// How dense points are on the bump.
+    /// Spacing of the points on the bump.
     fn grading(&self) -> Grading {
         let ring = OUTER / RINGS as f64;
         let at = |k: usize| self.above(CENTER[0] + k as f64 * ring, CENTER[1]);
@@ -97,10 +106,10 @@ impl Bump {
                 // Principal curvatures from their sum and product.
                 let (half, gauss) = (0.5 * at(k).curvature, at(k).gauss);
                 let largest = half.abs() + (half * half - gauss).max(0.0).sqrt();
-                (BEND / (largest * REFERENCE_SPACING)).clamp(LEAST_RATIO, 1.0)
+                (SPACING_PER_CURVATURE_RADIUS / (largest * REFERENCE_SPACING)).clamp(MIN_RATIO, 1.0)
             })
             .collect();
-        // From the rim inwards and back: spacings change slowly along the surface.
+        // Two sweeps, inward and outward, bound the change of the spacing along the surface.
         let stretch = |k: usize| (1.0 + self.slope(k as f64 * ring).powi(2)).sqrt();
         let change = |k: usize| GRADE * ring * stretch(k) / REFERENCE_SPACING;
         for k in (0..RINGS).rev() {
@@ -119,17 +128,17 @@ impl Bump {
         Grading { spacing, cumulated, area }
     }
 
-    /// Cells a side for which there are about so many points.
+    /// Number of lattice cells per side for about `count` points.
     #[must_use]
     pub fn cells(&self, count: u64) -> usize {
         let grading = self.grading();
         let squares = (2.0 * HALF_SIDE).powi(2) - std::f64::consts::PI * OUTER.powi(2) + grading.squares();
-        // Nodes on the edges are half outside.
+        // Half the cell of a node on the edge is outside.
         let cells = 2.0 * HALF_SIDE * (count as f64 / squares).sqrt();
         ((cells - 1.0).round() as usize).max(4)
     }
 
-    /// Points of so many cells a side: graded ones, and nodes where it is flat.
+    /// Number of points for a lattice of `cells` per side: graded points and nodes.
     #[must_use]
     pub fn count(&self, cells: usize) -> u64 {
         let spacing = 2.0 * HALF_SIDE / cells as f64;
@@ -139,15 +148,18 @@ impl Bump {
         (nodes + grading.squares() / (spacing * spacing)).round() as u64
     }
 
-    /// Points with the area and the share of the lattice's spacing of each: nodes of a lattice of `cells` a side where it is flat,
-    /// graded Fibonacci points on the bump, and the `probes`, which are points themselves.
+    /// The points of the surface.
+    ///
+    /// - `cells`: number of lattice cells per side. Where the surface is flat, points are nodes of the lattice. On the
+    ///   bump they are graded Fibonacci points.
+    /// - `probes`: positions (x, y) that must be points. Each replaces the nearest point.
     #[must_use]
     pub fn points(&self, cells: usize, probes: &[[f64; 2]]) -> BumpPoints {
         let spacing = 2.0 * HALF_SIDE / cells as f64;
         let grading = self.grading();
         let mut found = BumpPoints::default();
         let count = (grading.squares() / (spacing * spacing)).ceil() as usize;
-        for x in fibonacci::of_revolution(count, |s| grading.share(s), |s| (s * OUTER, 0.0)) {
+        for x in fibonacci::surface_of_revolution(count, |s| grading.share(s), |s| (s * OUTER, 0.0)) {
             let ratio = grading.ratio(x[0].hypot(x[1]) / OUTER);
             found.points.push(self.above(CENTER[0] + x[0], CENTER[1] + x[1]));
             found.areas.push((ratio * spacing).powi(2));
@@ -171,61 +183,68 @@ impl Bump {
                 }
             }
         }
-        share_out_the_rim(&mut found, &nodes, cells);
+        distribute_rim_area(&mut found, &nodes, cells);
         for probe in probes {
             let probe = self.above(probe[0], probe[1]);
             let nearest = found.points.iter().enumerate().map(|(k, p)| (k, (p.point - probe.point).norm()));
             let (nearest, _) = nearest.fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
-            // The nearest point gives its place up.
+            // The probe replaces the nearest point.
             found.points[nearest] = probe;
         }
         found
     }
 }
 
-/// Points of a bump.
+/// The points of a bump with their areas and spacings.
 #[derive(Debug, Clone, Default)]
 pub struct BumpPoints {
-    /// Points.
+    /// Points with the exact geometry.
     pub points: Vec<BumpPoint>,
-    /// The area that each stands for.
+    /// Area that each point represents.
     pub areas: Vec<f64>,
-    /// Spacing about each by that of the lattice.
+    /// Ratio of the spacing around each point to that of the lattice.
     pub ratios: Vec<f64>,
 }
 
-/// Spacing on the bump by that of the lattice, over equal rings of the plane below it, and the cumulated number of points in
-/// squares of the lattice.
+/// Distribution of the points over rings of equal width in the plane.
 struct Grading {
+    /// Ratio of the spacing to that of the lattice, at each ring.
     spacing: Vec<f64>,
+    /// Number of points up to each ring, times the area of a lattice cell.
     cumulated: Vec<f64>,
+    /// Area of the surface over all rings.
     area: f64,
 }
 
 impl Grading {
+    /// Number of all graded points, times the area of a lattice cell.
     fn squares(&self) -> f64 {
         self.cumulated.last().copied().unwrap_or(0.0)
     }
 
-    fn between(of: &[f64], s: f64) -> f64 {
-        let rings = of.len() - 1;
+    /// Linear interpolation of values at the rings, for s in [0, 1] from the center to the outermost ring.
+    fn interpolate(values: &[f64], s: f64) -> f64 {
+        let rings = values.len() - 1;
         let place = s.clamp(0.0, 1.0) * rings as f64;
         let k = (place as usize).min(rings - 1);
-        of[k] + (place - k as f64) * (of[k + 1] - of[k])
+        values[k] + (place - k as f64) * (values[k + 1] - values[k])
     }
 
+    /// Ratio of the spacing to that of the lattice.
     fn ratio(&self, s: f64) -> f64 {
-        Self::between(&self.spacing, s)
+        Self::interpolate(&self.spacing, s)
     }
 
+    /// Fraction of the graded points within s.
     fn share(&self, s: f64) -> f64 {
-        Self::between(&self.cumulated, s) / self.squares()
+        Self::interpolate(&self.cumulated, s) / self.squares()
     }
 }
 
-/// Gives the plane next to the graded points, which cut through cells, to the nearest nodes that are there. `nodes` tells
-/// which point a node of the lattice is.
-fn share_out_the_rim(found: &mut BumpPoints, nodes: &[Option<usize>], cells: usize) {
+/// Distributes the area of the plane next to the graded points, where lattice cells are cut, to the nearest nodes.
+///
+/// `nodes` are the points of the lattice nodes; None for nodes that the graded points replace.
+fn distribute_rim_area(found: &mut BumpPoints, nodes: &[Option<usize>], cells: usize) {
     let spacing = 2.0 * HALF_SIDE / cells as f64;
     let at = |k: usize| -HALF_SIDE + k as f64 * spacing;
     let from_center = |x: f64, y: f64| (x - CENTER[0]).hypot(y - CENTER[1]);
@@ -263,16 +282,18 @@ fn share_out_the_rim(found: &mut BumpPoints, nodes: &[Option<usize>], cells: usi
     }
 }
 
-/// Images of points across the edges of the square, within `reach` of them: position, and whose image.
+/// Mirror images across the edges of the square, of points within `cutoff` of an edge.
+///
+/// Each image is its position with the index of the mirrored point.
 #[must_use]
-pub fn images(points: &[Vector<3>], reach: f64) -> Vec<(Vector<3>, u32)> {
+pub fn images(points: &[Vector<3>], cutoff: f64) -> Vec<(Vector<3>, u32)> {
     let mut found = Vec::new();
     for (k, x) in points.iter().enumerate() {
-        // Along each axis: itself, and its image where an edge is near and it does not lie on it.
+        // The mirrored coordinate, if an edge is near and the point does not lie on it.
         let mirrored = |c: f64| {
             let edge = HALF_SIDE.copysign(c);
             let gap = (edge - c).abs();
-            (gap > 1e-12 && gap < reach).then_some(2.0 * edge - c)
+            (gap > 1e-12 && gap < cutoff).then_some(2.0 * edge - c)
         };
         let across = [mirrored(x[0]), mirrored(x[1])];
         for (mx, my) in [(true, false), (false, true), (true, true)] {

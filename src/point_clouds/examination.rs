@@ -1,8 +1,7 @@
-//! What is wrong with the points of a surface, found before anything is computed on them.
+//! Examination of the points of a surface before anything is computed on them.
 //!
-//! Points that lie on one another, normals without a length and coordinates whose squares are no numbers leave nothing
-//! to compute ([`Unusable`]). Holes, parts of the surface that come too close and normals that contradict the points make
-//! a computation worse, not impossible ([`Flaw`]).
+//! Coincident points, normals of length zero and coordinates whose squares overflow make a computation impossible
+//! ([`Unusable`]). Holes, close sheets and normals that contradict the points make it less accurate ([`Flaw`]).
 
 use super::normals::plane;
 use crate::geometry::{Domain, Vector};
@@ -11,45 +10,50 @@ use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, ParallelI
 use std::cmp::Ordering;
 use std::fmt;
 
-/// Points whose distances are taken for a first idea of the spacing.
+/// Number of points whose distances give a first estimate of the spacing.
 const SAMPLES: usize = 500;
-/// Points that a cell of a few spacings may hold: with more of them, searches would take the square of their number.
+/// Largest number of points in a cell of a few spacings. With more points, the cost of searches would grow with their
+/// square.
 const MOST_IN_CELL: usize = 4096;
-/// Points are one where they are closer than this share of the spacing there.
+/// Points coincide when their distance is below this fraction of the local spacing.
 const SAME_POINT: f64 = 1e-3;
-/// Neighbours for normals and directions, by the spacing: about twenty of a surface, four of a curve.
+/// Radius of the neighborhood for normals and directions, in spacings: about twenty neighbors on a surface, four on a
+/// curve.
 const NEAR: f64 = 2.5;
-/// Sine of the elevation over the tangent plane above which a neighbour does not belong to the same sheet: on a sphere
-/// that of normals which differ by 60°, beyond which operators do not take neighbours either.
+/// Sine of the elevation over the tangent plane above which a neighbor belongs to another sheet.
+///
+/// On a sphere this is the elevation at which normals differ by 60°, beyond which operators do not use neighbors
+/// either.
 const ASIDE: f64 = 0.5;
-/// The largest angle without a neighbour inside a surface; on a curve (where it is 180° or 360°) inside it.
+/// Largest angle (rad) without a neighbor, for curves and for surfaces. A wider gap marks an edge. On a curve the gap
+/// is 180° or 360°.
 const WIDEST_GAP: [f64; 2] = [1.5 * std::f64::consts::PI, 2.0 * std::f64::consts::FRAC_PI_3];
-/// Extents whose squares, and the squares of these, are numbers, parts included.
+/// Extents whose fourth powers, and those of their parts, neither overflow nor underflow.
 const EXTENTS: std::ops::Range<f64> = 1e-40..1e40;
-/// The least spacing by the largest coordinate that leaves enough digits for differences.
+/// Smallest ratio of the spacing to the largest coordinate that leaves enough digits for differences.
 const LEAST_SPACING: f64 = 1e-9;
-/// Numbers of points that a message names.
+/// Number of points that a message names.
 const NAMED: usize = 5;
 
-/// Points by their numbers: the first few, and how many there are.
+/// A set of points: the indices of the first few, and their number.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Named {
-    /// The first few, rising.
+pub struct PointList {
+    /// Indices of the first few points, ascending.
     pub first: Vec<usize>,
-    /// All.
+    /// Number of all points.
     pub count: usize,
 }
 
-impl Named {
-    /// The points for which a condition holds, if there are any.
-    fn those(points: usize, holds: impl Fn(usize) -> bool) -> Option<Self> {
+impl PointList {
+    /// The points for which a condition holds; None if there are none.
+    fn from_condition(points: usize, holds: impl Fn(usize) -> bool) -> Option<Self> {
         let found: Vec<usize> = (0..points).filter(|i| holds(*i)).collect();
         let first = found.iter().take(NAMED).copied().collect();
         (!found.is_empty()).then_some(Self { first, count: found.len() })
     }
 }
 
-impl fmt::Display for Named {
+impl fmt::Display for PointList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let numbers: Vec<String> = self.first.iter().map(ToString::to_string).collect();
         write!(f, "{} {}", if self.count == 1 { "point" } else { "points" }, numbers.join(", "))?;
@@ -60,80 +64,80 @@ impl fmt::Display for Named {
     }
 }
 
-/// Why nothing can be computed on points.
+/// Reasons why nothing can be computed on points.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unusable {
-    /// Fewer than tell a spacing.
+    /// Too few points to determine a spacing.
     #[error("{count} points are too few for a surface: {least} at least")]
     TooFew {
-        /// How many.
+        /// Number of points.
         count: usize,
-        /// Least.
+        /// Smallest number that suffices.
         least: usize,
     },
-    /// Two points in one place.
+    /// Points that coincide.
     #[error("{points}: each lies where another one does (points {} and {} are {distance:.3e} apart); leave one of them", pair[0], pair[1])]
     Duplicates {
-        /// All that have another one in their place.
-        points: Named,
-        /// The first of them.
+        /// All points that coincide with another one.
+        points: PointList,
+        /// The first pair of coincident points.
         pair: [usize; 2],
-        /// How far these are apart.
+        /// Distance of this pair.
         distance: f64,
     },
-    /// Normals without a direction.
+    /// Normals of length zero or with undefined components.
     #[error("{0}: a normal without length")]
-    ZeroNormals(Named),
-    /// Coordinates beyond the digits of numbers.
+    ZeroNormals(PointList),
+    /// Coordinates that a double cannot resolve.
     #[error(
         "{count} points {spacing:.3e} apart, over {extent:.3e}, at coordinates up to {largest:.3e}: these are not told apart well enough; scale or shift them"
     )]
     OutOfScale {
-        /// How many.
+        /// Number of points.
         count: usize,
-        /// The length of the diagonal of the box that they lie in.
+        /// Diagonal of the bounding box.
         extent: f64,
-        /// Between points; NaN where it was not looked for.
+        /// Typical distance of neighbors; NaN where it was not computed.
         spacing: f64,
-        /// The largest coordinate.
+        /// Largest coordinate, in magnitude.
         largest: f64,
     },
-    /// Some points are very far from the others.
+    /// Some points are very far from the others, so that most points share a cell.
     #[error(
         "{count} points are about {spacing:.3e} apart while all spread over {extent:.3e}: point {farthest} at {at:?} is far from the others"
     )]
     Crowded {
-        /// In the fullest cell.
+        /// Number of points in the fullest cell.
         count: usize,
-        /// Between most points.
+        /// Typical distance of neighbors.
         spacing: f64,
-        /// The length of the diagonal of the box that all lie in.
+        /// Diagonal of the bounding box.
         extent: f64,
-        /// The point that is farthest from the middle one along the axes.
+        /// Index of the point that is farthest from the median of the coordinates.
         farthest: usize,
-        /// Where it is.
+        /// Position of that point.
         at: Vec<f64>,
     },
 }
 
-/// What makes a computation on points worse.
+/// Reasons why a computation on points is less accurate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Flaw {
-    /// Points at an edge: neighbours on one side alone.
-    Holes(Named),
-    /// Points whose support reaches another part of the surface.
+    /// Points at an edge, with neighbors on one side only.
+    Holes(PointList),
+    /// Points whose support contains points of another part of the surface.
     CloseSheets {
-        /// Which.
-        points: Named,
-        /// Of the support.
+        /// These points.
+        points: PointList,
+        /// Radius of the support.
         radius: f64,
     },
-    /// Given normals that opposed those about them, or did not stand on the points about them.
-    InconsistentNormals(Named),
+    /// Points whose given normals oppose those of their neighbors, or are not orthogonal to the surface.
+    InconsistentNormals(PointList),
 }
 
 impl Flaw {
-    /// A short name.
+    /// Short name of the flaw, used as the code of a finding.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -148,7 +152,7 @@ impl fmt::Display for Flaw {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Holes(points) => {
-                write!(f, "{points}: neighbours on one side alone, so the surface has a hole or an edge there")
+                write!(f, "{points}: neighbors on one side alone, so the surface has a hole or an edge there")
             }
             Self::CloseSheets { points, radius } => {
                 write!(f, "{points}: another part of the surface lies within the support of {radius:.4e}")
@@ -156,39 +160,53 @@ impl fmt::Display for Flaw {
             Self::InconsistentNormals(points) => {
                 write!(
                     f,
-                    "{points}: the normal opposes those of most neighbours, or does not stand on the surface; one that is estimated takes its place"
+                    "{points}: the normal opposes those of most neighbors, or does not stand on the surface; one that is estimated takes its place"
                 )
             }
         }
     }
 }
 
-/// Where normals come from.
+/// Origin of normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NormalSource {
-    /// They came with the points.
+    /// The normals were given with the points.
     Given,
-    /// From the points.
+    /// The normals were estimated from the points.
     Estimated,
 }
 
-/// Points that can be told apart, and who lies near them.
+/// Points that are distinct, with their spacing and neighbors.
+///
+/// ```
+/// use meniscus::{geometry::fibonacci, point_clouds::Examined};
+///
+/// let points = fibonacci::sphere(1000);
+/// let examined = Examined::new(&points).unwrap();
+/// let mut normals = points.clone();
+/// let given = meniscus::point_clouds::examination::NormalSource::Given;
+/// assert!(examined.flaws(&mut normals, given, 0.3).is_empty());
+/// ```
 #[derive(Debug)]
 pub struct Examined<'a, const D: usize> {
     points: &'a [Vector<D>],
     cells: CellList<D>,
-    /// The length, or the root of the area, that a point has for itself, about: the median.
+    /// Median spacing: the length per point of a curve, or the square root of the area per point of a surface.
     pub spacing: f64,
-    /// The same at each point.
+    /// Spacing at each point.
     local: Vec<f64>,
 }
 
 impl<'a, const D: usize> Examined<'a, D> {
-    /// 1. Equal points by sorting. 2. A first idea of the spacing from some points. 3. That of each by the number of its neighbours.
-    ///    4. Points that are almost one.
+    /// Examines points.
+    ///
+    /// 1. Find equal points by sorting.
+    /// 2. Estimate the spacing from some of the points.
+    /// 3. Compute the spacing at each point from the number of its neighbors.
+    /// 4. Find points that almost coincide.
     ///
     /// # Errors
-    /// [`Unusable`].
+    /// [`Unusable`] when nothing can be computed on the points.
     pub fn new(points: &'a [Vector<D>]) -> Result<Self, Unusable> {
         let nearest = if D == 2 { 4 } else { 12 };
         let count = points.len();
@@ -202,7 +220,7 @@ impl<'a, const D: usize> Examined<'a, D> {
         let largest = low.abs().sup(&high.abs()).max();
         let extent = (high - low).norm();
         let out_of_scale = |spacing: f64| Unusable::OutOfScale { count, extent, spacing, largest };
-        // Points that are all in one place are equal points, not small ones.
+        // Points that all coincide must be reported as equal points, not as points with a small extent.
         equal_points(points)?;
         if !EXTENTS.contains(&extent) {
             return Err(out_of_scale(f64::NAN));
@@ -211,7 +229,8 @@ impl<'a, const D: usize> Examined<'a, D> {
         if first <= LEAST_SPACING * largest {
             return Err(out_of_scale(first));
         }
-        // Of a surface about fifty points lie within; of a curve a number of spacings and a half, as lattices want.
+        // The radius contains about fifty points of a surface. On a curve it is not a multiple of half the spacing,
+        // which regular points need.
         let radius = if D == 2 { 2.25 } else { 2.0 } * first;
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(points.iter().copied(), radius);
@@ -233,12 +252,13 @@ impl<'a, const D: usize> Examined<'a, D> {
         Ok(found)
     }
 
-    /// A radius that holds the neighbours which tell a normal.
+    /// Radius of the neighborhood from which a normal is estimated.
     #[must_use]
     pub fn radius_of_normals(&self) -> f64 {
         NEAR * self.spacing
     }
 
+    /// Refuses points that almost coincide.
     fn almost_equal_points(&self) -> Result<(), Unusable> {
         let twin = |(i, x): (usize, &Vector<D>)| {
             let mut nearest = None;
@@ -250,29 +270,30 @@ impl<'a, const D: usize> Examined<'a, D> {
             nearest
         };
         let twins: Vec<Option<(usize, f64)>> = self.points.par_iter().with_min_len(64).enumerate().map(twin).collect();
-        let Some(points) = Named::those(twins.len(), |i| twins[i].is_some()) else { return Ok(()) };
+        let Some(points) = PointList::from_condition(twins.len(), |i| twins[i].is_some()) else { return Ok(()) };
         let i = points.first[0];
         let (j, square) = twins[i].unwrap_or((i, 0.0));
         Err(Unusable::Duplicates { points, pair: [i, j], distance: square.sqrt() })
     }
 
-    /// What is wrong with the points and their unit normals for operators with supports of a radius. Inconsistent normals are
-    /// replaced by estimated ones that face where most neighbours' do.
+    /// Flaws of the points and their unit normals, for operators with supports of the given radius.
+    ///
+    /// Inconsistent normals are replaced by estimated ones that agree with most of their neighbors.
     pub fn flaws(&self, normals: &mut [Vector<D>], source: NormalSource, radius: f64) -> Vec<Flaw> {
-        let at = |(i, _): (usize, &Vector<D>)| self.about(i, normals, source, radius);
+        let at = |(i, _): (usize, &Vector<D>)| self.inspect(i, normals, source, radius);
         let seen: Vec<Seen<D>> = self.points.par_iter().with_min_len(64).enumerate().map(at).collect();
         for (normal, seen) in normals.iter_mut().zip(&seen) {
             *normal = seen.instead.unwrap_or(*normal);
         }
-        let those = |holds: fn(&Seen<D>) -> bool| Named::those(seen.len(), |i| holds(&seen[i]));
-        let holes = those(|seen| seen.is_at_edge).map(Flaw::Holes);
-        let sheets = those(|seen| seen.has_sheet).map(|points| Flaw::CloseSheets { points, radius });
-        let inconsistent = those(|seen| seen.instead.is_some()).map(Flaw::InconsistentNormals);
+        let from_condition = |holds: fn(&Seen<D>) -> bool| PointList::from_condition(seen.len(), |i| holds(&seen[i]));
+        let holes = from_condition(|seen| seen.is_at_edge).map(Flaw::Holes);
+        let sheets = from_condition(|seen| seen.has_sheet).map(|points| Flaw::CloseSheets { points, radius });
+        let inconsistent = from_condition(|seen| seen.instead.is_some()).map(Flaw::InconsistentNormals);
         [holes, sheets, inconsistent].into_iter().flatten().collect()
     }
 
-    /// What can be seen from a point.
-    fn about(&self, i: usize, normals: &[Vector<D>], source: NormalSource, radius: f64) -> Seen<D> {
+    /// Inspects the neighborhood of point `i`.
+    fn inspect(&self, i: usize, normals: &[Vector<D>], source: NormalSource, radius: f64) -> Seen<D> {
         let (x, n) = (&self.points[i], &normals[i]);
         let near = NEAR * self.local[i];
         let [first, second] = tangents(n);
@@ -281,7 +302,8 @@ impl<'a, const D: usize> Examined<'a, D> {
         self.cells.for_each_within(x, near.max(radius), |j, dx, square| {
             let turn = n.dot(&normals[j]);
             if dx.dot(n).abs() > ASIDE * square.sqrt() {
-                // Facing the same way it is a sheet too; across, it is the other side of a bend.
+                // A parallel or opposite normal belongs to another sheet, an orthogonal one to the other side of a
+                // bend.
                 has_sheet |= turn.abs() > 0.5 && square <= radius * radius;
             } else if j != i && square <= near * near {
                 angles.push(dx.dot(&second).atan2(dx.dot(&first)));
@@ -293,7 +315,8 @@ impl<'a, const D: usize> Examined<'a, D> {
         });
         let across = || plane(&self.cells, i, x, near).map(|n| if n.dot(&facing) < 0.0 { -n } else { n }).ok();
         let estimated = if source == NormalSource::Given { across() } else { None };
-        // The plane through two sheets tells nothing of either, a gap across a wrong normal nothing of the surface.
+        // A plane through two sheets says nothing about either, and a gap around a wrong normal says nothing about the
+        // surface.
         let is_off = |across: &Vector<D>| !has_sheet && across.dot(n).abs() < 0.5;
         let instead = estimated.filter(|across| 2 * opposing > angles.len() || is_off(across));
         let is_at_edge = instead.is_none() && widest_gap(angles) > WIDEST_GAP[D - 2];
@@ -301,22 +324,22 @@ impl<'a, const D: usize> Examined<'a, D> {
     }
 }
 
-/// What can be seen from a point.
+/// Flaws at a point.
 struct Seen<const D: usize> {
     is_at_edge: bool,
     has_sheet: bool,
-    /// The normal to be taken in the place of an inconsistent one.
+    /// The estimated normal that replaces an inconsistent one.
     instead: Option<Vector<D>>,
 }
 
-/// Normals of length one.
+/// Normalizes given normals.
 ///
 /// # Errors
-/// [`Unusable::ZeroNormals`]: some have none.
+/// [`Unusable::ZeroNormals`] names normals of length zero and normals that are not finite.
 pub fn unit_normals<const D: usize>(given: &[Vector<D>]) -> Result<Vec<Vector<D>>, Unusable> {
-    // By the largest component, whose square may be no number; NaN is not the largest.
+    // Dividing by the largest component first avoids overflow. `amax` ignores NaN, hence the separate test.
     let has_length = |i: usize| given[i].iter().all(|c| c.is_finite()) && given[i].amax() >= f64::MIN_POSITIVE;
-    match Named::those(given.len(), |i| !has_length(i)) {
+    match PointList::from_condition(given.len(), |i| !has_length(i)) {
         Some(points) => Err(Unusable::ZeroNormals(points)),
         None => Ok(given.iter().map(|n| (n / n.amax()).normalize()).collect()),
     }
@@ -334,12 +357,12 @@ fn equal_points<const D: usize>(points: &[Vector<D>]) -> Result<(), Unusable> {
         twin[pair[1]] = Some(pair[0]);
         twin[pair[0]].get_or_insert(pair[1]);
     }
-    let Some(found) = Named::those(points.len(), |i| twin[i].is_some()) else { return Ok(()) };
+    let Some(found) = PointList::from_condition(points.len(), |i| twin[i].is_some()) else { return Ok(()) };
     let i = found.first[0];
     Err(Unusable::Duplicates { points: found, pair: [i, twin[i].unwrap_or(i)], distance: 0.0 })
 }
 
-/// The median distance from some points to their `nearest`-th neighbour.
+/// Median distance of some of the points to their `nearest`-th neighbor.
 fn typical_distance<const D: usize>(points: &[Vector<D>], nearest: usize, extent: f64) -> f64 {
     let guess = extent * (nearest as f64 / points.len() as f64).powf(1.0 / (D as f64 - 1.0));
     let mut cells = CellList::new(Domain::unbounded());
@@ -361,21 +384,21 @@ fn typical_distance<const D: usize>(points: &[Vector<D>], nearest: usize, extent
     median(points.iter().step_by(points.len().div_ceil(SAMPLES)).map(distance).collect())
 }
 
-/// The middle one of numbers, 0 of none.
+/// Median of numbers; 0 for an empty list.
 fn median(mut numbers: Vec<f64>) -> f64 {
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The point that is farthest along the axes from the point in the middle of all along each.
+/// Index and position of the point that is farthest, in the maximum norm, from the median of the coordinates.
 fn farthest<const D: usize>(points: &[Vector<D>]) -> (usize, Vec<f64>) {
     let middle = Vector::<D>::from_fn(|d, _| median(points.iter().map(|x| x[d]).collect()));
-    let away = |x: &Vector<D>| (x - middle).amax();
-    let most = points.iter().enumerate().max_by(|a, b| away(a.1).total_cmp(&away(b.1)).then(b.0.cmp(&a.0)));
-    most.map_or((0, Vec::new()), |(i, x)| (i, x.iter().copied().collect()))
+    let distance = |x: &Vector<D>| (x - middle).amax();
+    let farthest = points.iter().enumerate().max_by(|a, b| distance(a.1).total_cmp(&distance(b.1)).then(b.0.cmp(&a.0)));
+    farthest.map_or((0, Vec::new()), |(i, x)| (i, x.iter().copied().collect()))
 }
 
-/// Two unit vectors across a unit normal and each other; in the plane there is one, and the other is zero.
+/// Two unit vectors that are orthogonal to a unit normal and to each other. In the plane the second one is zero.
 fn tangents<const D: usize>(n: &Vector<D>) -> [Vector<D>; 2] {
     let mut axis = Vector::<D>::zeros();
     axis[n.abs().imin()] = 1.0;
@@ -385,7 +408,7 @@ fn tangents<const D: usize>(n: &Vector<D>) -> [Vector<D>; 2] {
     [first, Vector::<D>::from_fn(|d, _| across(d))]
 }
 
-/// The widest angle without a direction; all of them where there is none.
+/// The widest gap (rad) between directions; the full circle without directions.
 fn widest_gap(mut angles: Vec<f64>) -> f64 {
     angles.sort_by(f64::total_cmp);
     let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return std::f64::consts::TAU };

@@ -1,5 +1,7 @@
-//! Unit normals of a surface that is known by its points alone: the plane of least spread through the neighbours of a
-//! point, and signs carried along the tree that turns least.
+//! Unit normals of a surface that is known by points alone.
+//!
+//! A normal is the direction of least variance of the neighbors of its point. Its sign is propagated along the spanning
+//! tree whose edges turn least.
 
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
@@ -7,25 +9,35 @@ use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, ParallelI
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// A point has too few neighbours to tell a plane.
+/// A point has too few neighbors to determine a plane.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("point {point} at {at:?} has {neighbors} neighbours within {radius:.4e}: too few for a plane")]
+#[error("point {point} at {at:?} has {neighbors} neighbors within {radius:.4e}, which is too few for a tangent plane")]
 pub struct NoPlane {
-    /// Which.
+    /// Index of the point.
     pub point: usize,
-    /// Where.
+    /// Position of the point.
     pub at: Vec<f64>,
-    /// Neighbours.
+    /// Number of neighbors.
     pub neighbors: usize,
-    /// Of the search.
+    /// Radius of the search, a length.
     pub radius: f64,
 }
 
-/// Normals by planes of least spread within `radius`, oriented alike on each connected part: outward where a part is farthest
-/// along its last axis.
+/// Estimates unit normals from the neighbors within `radius`.
+///
+/// Normals are oriented consistently on each connected part. They point outward where the part is farthest along the
+/// last axis.
 ///
 /// # Errors
-/// [`NoPlane`].
+/// [`NoPlane`] names the first point with too few neighbors.
+///
+/// ```
+/// use meniscus::{geometry::fibonacci, point_clouds::normals};
+///
+/// let points = fibonacci::sphere(500);
+/// let normals = normals::estimate(&points, 0.4).unwrap();
+/// assert!(points.iter().zip(&normals).all(|(x, n)| x.dot(n) > 0.99));
+/// ```
 pub fn estimate<const D: usize>(points: &[Vector<D>], radius: f64) -> Result<Vec<Vector<D>>, NoPlane> {
     let mut cells = CellList::new(Domain::unbounded());
     cells.rebuild(points.iter().copied(), radius);
@@ -36,7 +48,7 @@ pub fn estimate<const D: usize>(points: &[Vector<D>], radius: f64) -> Result<Vec
     Ok(normals)
 }
 
-/// The direction of least spread of the neighbours about their mean, weighted by (1 − r²/R²)².
+/// The direction of least variance of the neighbors of point `i` at `x`, weighted by (1 − r²/R²)² with R = `radius`.
 pub(super) fn plane<const D: usize>(
     cells: &CellList<D>,
     i: usize,
@@ -65,7 +77,7 @@ pub(super) fn plane<const D: usize>(
             spread[a][b] -= mean[a] * mean[b] / weight;
         }
     }
-    // In the plane the third axis must not be the one of least spread.
+    // In the plane, the third axis must not be the direction of least variance.
     let whole: f64 = (0..D).map(|a| spread[a][a]).sum();
     for (a, row) in spread.iter_mut().enumerate().skip(D) {
         row[a] = 2.0 * whole;
@@ -76,8 +88,9 @@ pub(super) fn plane<const D: usize>(
     Ok(Vector::<D>::from_fn(|d, _| eigen.eigenvectors[(d, least)]).normalize())
 }
 
-/// An edge to a point not yet oriented; the heap gives the one that turns least.
+/// An edge to a point that is not yet oriented. The heap returns the edge that turns least.
 struct Edge {
+    /// 1 − |cos| of the angle between the normals.
     turn: f64,
     from: usize,
     to: usize,
@@ -103,10 +116,10 @@ impl PartialEq for Edge {
 
 impl Eq for Edge {}
 
-/// Gives neighbours the same sign, along the edges that turn least first.
+/// Orients normals consistently, along the edges that turn least first.
 fn orient<const D: usize>(points: &[Vector<D>], cells: &CellList<D>, radius: f64, normals: &mut [Vector<D>]) {
     let mut order: Vec<usize> = (0..points.len()).collect();
-    // Parts begin at their highest point, where outward is up.
+    // Each part starts at its highest point, where the outward direction is up.
     order.sort_by(|a, b| points[*b][D - 1].total_cmp(&points[*a][D - 1]).then(a.cmp(b)));
     let mut is_done = vec![false; points.len()];
     let mut heap = BinaryHeap::new();

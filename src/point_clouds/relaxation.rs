@@ -1,4 +1,4 @@
-//! Points spread at random over a surface, and relaxed: each is pushed away from its neighbours until they are about equally far.
+//! Random points on a surface, and their relaxation: neighbors repel each other until they are about equally far apart.
 
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Domain, Surface, Vector};
@@ -6,11 +6,18 @@ use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::Interrupt;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
-/// Points of a surface in space that are uniform by its area, to a good approximation: uniform points of a thin shell about it,
-/// moved to their closest points; `layer` is the half width of the shell, well below the radii of curvature. Ends with fewer
-/// when interrupted.
+/// `count` random points on a surface in space, approximately uniform over its area.
+///
+/// Uniform points in a thin shell around the surface are moved to their closest points. `layer` is the half width of
+/// the shell, which must be well below the radii of curvature. An interrupt ends the search with fewer points.
 #[must_use]
-pub fn random(surface: &dyn Surface<3>, count: usize, layer: f64, seed: u64, interrupt: &Interrupt) -> Vec<Vector<3>> {
+pub fn random_points(
+    surface: &dyn Surface<3>,
+    count: usize,
+    layer: f64,
+    seed: u64,
+    interrupt: &Interrupt,
+) -> Vec<Vector<3>> {
     let random = CounterRandom::new(seed);
     let (low, high) = surface.bounding_box();
     let (low, high) = (low.add_scalar(-layer), high.add_scalar(layer));
@@ -30,15 +37,17 @@ pub fn random(surface: &dyn Surface<3>, count: usize, layer: f64, seed: u64, int
     found
 }
 
-/// Rounds of pushing.
+/// Number of rounds of repulsion.
 const ROUNDS: usize = 80;
-/// Reach of the push, by the mean spacing.
-const REACH: f64 = 1.8;
-/// Length of a move, by the mean spacing, for a neighbour at no distance.
+/// Cutoff radius of the repulsion, in mean spacings.
+const CUTOFF: f64 = 1.8;
+/// Displacement per neighbor at zero distance, in mean spacings.
 const PUSH: f64 = 0.25;
 
-/// Pushes points along their surface, ρ = 1.8 δn, by PUSH δn Σ (1 − r/ρ)² (x_i − x_j)/r a round, and back onto it. Ends early when
-/// interrupted.
+/// Relaxes points with the mean spacing δ_n = `spacing`, and projects them back onto their surface with `onto`.
+///
+/// A round moves point i by about [`PUSH`] δ_n Σ_j (1 − r/ρ)² (x_i − x_j)/r over its neighbors within ρ = 1.8 δ_n. An
+/// interrupt ends the relaxation early.
 pub fn relax(
     points: &mut Vec<Vector<3>>,
     spacing: f64,
@@ -46,22 +55,22 @@ pub fn relax(
     interrupt: &Interrupt,
 ) {
     let mut cells = CellList::new(Domain::unbounded());
-    let reach = REACH * spacing;
+    let cutoff = CUTOFF * spacing;
     let mut moved = points.clone();
     for round in 0..ROUNDS {
         if interrupt.is_raised() {
             return;
         }
-        cells.rebuild(points.iter().copied(), reach);
-        // Moves become smaller towards the end, so that points come to rest.
+        cells.rebuild(points.iter().copied(), cutoff);
+        // Displacements decrease toward the end, so that points come to rest.
         let push = PUSH * spacing * (1.0 - 0.8 * round as f64 / ROUNDS as f64);
         moved.par_iter_mut().with_min_len(64).enumerate().for_each(|(i, moved)| {
             let x = points[i];
             let mut shift = Vector::<3>::zeros();
-            cells.for_each_within(&x, reach, |j, dx, square| {
+            cells.for_each_within(&x, cutoff, |j, dx, square| {
                 if j != i && square > 0.0 {
                     let r = square.sqrt();
-                    shift -= dx * ((1.0 - r / reach).powi(2) / r);
+                    shift -= dx * ((1.0 - r / cutoff).powi(2) / r);
                 }
             });
             *moved = onto(&(x + shift * push));
@@ -72,14 +81,14 @@ pub fn relax(
 
 #[cfg(test)]
 mod tests {
-    use super::{Interrupt, Surface, Vector, random, relax};
+    use super::{Interrupt, Surface, Vector, random_points, relax};
     use crate::geometry::surfaces::Torus;
 
     #[test]
     fn relaxed_points_keep_their_distance_and_their_surface() {
         let torus = Torus { center: Vector::<3>::zeros(), major_radius: 1.0, minor_radius: 0.4 };
         let count = 1500;
-        let mut points = random(&torus, count, 0.02, 7, &Interrupt::default());
+        let mut points = random_points(&torus, count, 0.02, 7, &Interrupt::default());
         let area = 4.0 * std::f64::consts::PI.powi(2) * 0.4;
         let spacing = (area / count as f64).sqrt();
         relax(&mut points, spacing, |x| torus.nearest(x).point, &Interrupt::default());
@@ -96,6 +105,6 @@ mod tests {
         let torus = Torus { center: Vector::<3>::zeros(), major_radius: 1.0, minor_radius: 0.4 };
         let interrupt = Interrupt::default();
         interrupt.raise();
-        assert!(random(&torus, 1_000_000, 0.02, 7, &interrupt).is_empty());
+        assert!(random_points(&torus, 1_000_000, 0.02, 7, &interrupt).is_empty());
     }
 }

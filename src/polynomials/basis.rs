@@ -1,9 +1,9 @@
 //! Polynomial bases as products of one-dimensional Newton factors u_k(x) = ∏_{j<k} (x − p_j).
 //!
-//! Monomials are the case p_j = 0. The minter basis (PCP paper, section 3.1) is the Lagrange basis of the unisolvent
-//! nodes, which is a triangular combination of Newton factors. Regressions use the values of the basis; what they
-//! find is expanded into monomials of the centred, scaled coordinates, for which one fast evaluator serves all bases.
-//! Because indices are graded, dropping the trailing terms gives the basis of lower degree.
+//! Monomials are the case p_j = 0. The minter basis (PCP 3.1; Hecht 2020) is the Lagrange basis of the unisolvent
+//! nodes, a triangular combination of Newton factors. A regression uses the values of its basis. Its result is expanded
+//! into monomials of the centered and scaled coordinates, so that one fast evaluation serves all bases. Since indices
+//! are graded, the leading terms form the basis of lower degree.
 
 use super::horner::nested_indices;
 use super::multi_index::MultiIndexSet;
@@ -11,18 +11,29 @@ use super::unisolvent_nodes::{lagrange_in_newton_form, leja_ordered_chebyshev_lo
 use super::{MAX_DEGREE, MAX_TERMS};
 use crate::geometry::Vector;
 
-/// Which basis a regression solves in.
+/// The basis in which a regression is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BasisKind {
     /// Lagrange polynomials on Chebyshev–Lobatto unisolvent nodes of total degree, in Newton form.
     Minter,
-    /// Monomials of the centred coordinates scaled by the radius of the neighbourhood.
+    /// Monomials of coordinates that are centered and scaled by the radius of the neighborhood.
     Monomial,
-    /// Monomials of the raw coordinates, neither centred nor scaled: for the comparison of PCP fig. 6.
+    /// Monomials of raw coordinates, for the comparison of PCP fig. 6.
     MonomialUnscaled,
 }
 
-/// A basis of all polynomials of `D` variables up to a total degree.
+/// A basis of all polynomials in `D` variables up to a total degree.
+///
+/// ```
+/// use meniscus::geometry::Vector;
+/// use meniscus::polynomials::{BasisKind, PolynomialBasis};
+///
+/// let basis = PolynomialBasis::<2>::new(BasisKind::Minter, 2);
+/// let mut row = [0.0; 6];
+/// basis.row(&Vector::<2>::new(0.3, -0.2), 2, &mut row);
+/// // Lagrange polynomials sum to one.
+/// assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+/// ```
 #[derive(Debug, Clone)]
 pub struct PolynomialBasis<const D: usize> {
     kind: BasisKind,
@@ -30,19 +41,19 @@ pub struct PolynomialBasis<const D: usize> {
     set: MultiIndexSet<D>,
     /// Generating nodes p_0 … p_{n−1}.
     nodes: [f64; MAX_DEGREE],
-    /// Row α: the coefficients of the Lagrange polynomial L_α in Newton form. Empty for monomials.
+    /// Matrix whose row α is the Lagrange polynomial L_α in Newton factors; empty for monomials.
     lagrange: Vec<f64>,
-    /// Row β: the Newton factor N_β in monomials. Empty for monomials.
+    /// Matrix whose row β is the Newton factor N_β in monomials; empty for monomials.
     expansion: Vec<f64>,
-    /// The nested place (see [`super::horner`]) of each graded index.
+    /// Position in nested order (see [`super::horner`]) of each graded index.
     nested: Vec<usize>,
 }
 
-/// One-dimensional factors u_0 … u_n at one coordinate, with derivatives.
+/// Values of the one-dimensional factors u_0 … u_n at one coordinate.
 type Factors = [f64; MAX_DEGREE + 1];
 
 impl<const D: usize> PolynomialBasis<D> {
-    /// A basis of the given kind, `1 ≤ degree ≤ 8`.
+    /// The basis of the given kind and total degree, `1 ≤ degree ≤ 8`.
     #[must_use]
     pub fn new(kind: BasisKind, degree: usize) -> Self {
         let set = MultiIndexSet::total_degree(degree);
@@ -60,22 +71,24 @@ impl<const D: usize> PolynomialBasis<D> {
         Self { kind, degree, set, nodes, lagrange, expansion, nested }
     }
 
-    /// Which basis it is.
+    /// Kind of the basis.
     #[must_use]
     pub fn kind(&self) -> BasisKind {
         self.kind
     }
 
-    /// Total degree.
+    /// Total degree of the basis.
     #[must_use]
     pub fn degree(&self) -> usize {
         self.degree
     }
 
+    /// Multi-indices in graded order.
     fn indices(&self) -> &[[u8; D]] {
         self.set.indices()
     }
 
+    /// Newton factors of one coordinate up to a degree.
     fn factors(&self, x: f64, degree: usize) -> Factors {
         let mut u = [0.0; MAX_DEGREE + 1];
         u[0] = 1.0;
@@ -85,7 +98,10 @@ impl<const D: usize> PolynomialBasis<D> {
         u
     }
 
-    /// Values of the first `row.len()` basis functions at `x` (local coordinates), as a regression row needs them.
+    /// Writes the values of the first `row.len()` basis functions at the local coordinates `x`, one row of a
+    /// regression.
+    ///
+    /// `degree` is the total degree that belongs to `row.len()` terms.
     pub fn row(&self, x: &Vector<D>, degree: usize, row: &mut [f64]) {
         let terms = row.len();
         let mut newton = [0.0; MAX_TERMS];
@@ -99,14 +115,16 @@ impl<const D: usize> PolynomialBasis<D> {
         }
         let stride = self.indices().len();
         for (alpha, value) in row.iter_mut().enumerate() {
-            // L_α combines the Newton terms from α on; cut off at `terms` it is the Lagrange basis of lower degree.
+            // L_α combines the Newton factors from α on. Truncated at `terms` it is the Lagrange basis of lower degree.
             let coefficients = &self.lagrange[alpha * stride + alpha..alpha * stride + terms];
             *value = coefficients.iter().zip(&newton[alpha..terms]).map(|(c, v)| c * v).sum();
         }
     }
 
-    /// Writes the polynomial with the given coefficients in this basis (graded, possibly of a lower degree) in monomials
-    /// of the same coordinates, in nested order with zeros for terms beyond. The coefficients are used up.
+    /// Expands a polynomial into monomials of the same coordinates.
+    ///
+    /// - `coefficients`: in this basis and graded order, possibly of a lower degree; overwritten.
+    /// - `monomials`: receives the coefficients in nested order, with zeros beyond the degree.
     pub fn expand(&self, coefficients: &mut [f64], monomials: &mut [f64]) {
         let terms = coefficients.len();
         let stride = self.indices().len();
@@ -127,7 +145,8 @@ impl<const D: usize> PolynomialBasis<D> {
     }
 }
 
-/// Rows of the matrix that expands ∏_d ∏_{j < β_d} (x_d − p_j) in monomials: lower triangular for graded indices.
+/// Matrix, by rows, that expands the Newton factors ∏_d ∏_{j < β_d} (x_d − p_j) in monomials. It is lower triangular
+/// for graded indices.
 fn newton_factors_in_monomials<const D: usize>(set: &MultiIndexSet<D>, nodes: &[f64; MAX_DEGREE]) -> Vec<f64> {
     // One-dimensional factors: u_{k+1} = (x − p_k) u_k.
     let mut factors = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];

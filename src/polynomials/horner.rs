@@ -1,23 +1,23 @@
-//! Values and derivatives of polynomials of total degree by Horner's scheme, for single numbers and for lanes.
+//! Values and derivatives of polynomials by Horner's scheme, for single numbers and for lanes.
 //!
-//! Coefficients of t^α stand in nested order: the exponent of the last axis runs fastest, each exponent up to what the
-//! total degree leaves. So evaluation walks them once from end to start.
+//! The coefficients of t^α are in nested order: the exponent of the last axis runs fastest, and each exponent runs up
+//! to what the total degree leaves. An evaluation passes through them once, from the last to the first.
 
 use super::MAX_DEGREE;
 use crate::linear_algebra::number::Number;
 
-/// p, ∂p and ∂∂p in local coordinates.
+/// Value and derivatives of a polynomial p with respect to its local coordinates t.
 #[derive(Debug, Clone, Copy)]
 pub struct Derivatives<T, const D: usize> {
-    /// p.
+    /// Value p(t).
     pub value: T,
-    /// ∂p/∂t_d.
+    /// First derivatives ∂p/∂t_d.
     pub first: [T; D],
-    /// ∂²p/∂t_d∂t_e.
+    /// Second derivatives ∂²p/∂t_d∂t_e.
     pub second: [[T; D]; D],
 }
 
-/// The exponents in nested order.
+/// Multi-indices up to a total degree in nested order.
 #[must_use]
 pub fn nested_indices<const D: usize>(degree: usize) -> Vec<[u8; D]> {
     let mut indices = Vec::new();
@@ -38,7 +38,8 @@ pub fn nested_indices<const D: usize>(degree: usize) -> Vec<[u8; D]> {
     indices
 }
 
-/// Value, gradient and Hessian of the polynomial with `coefficient(a)` at nested place a.
+/// Value, gradient and Hessian at `t` of the polynomial of the given degree, whose coefficient at position a of the
+/// nested order is `coefficient(a)`.
 #[inline(always)]
 pub fn derivatives<T: Number, const D: usize>(
     degree: usize,
@@ -58,6 +59,7 @@ pub fn derivatives<T: Number, const D: usize>(
     }
 }
 
+/// [`derivatives`] for a degree N that is known to the compiler.
 #[inline(always)]
 fn unrolled<T: Number, const D: usize, const N: usize>(
     coefficient: impl Fn(usize) -> T,
@@ -68,7 +70,8 @@ fn unrolled<T: Number, const D: usize, const N: usize>(
     let (y, z) = (t[D - 2], t[D - 1]);
     let outer = if D == 3 { N } else { 0 };
     let mut place = super::multi_index::term_count::<D>(N);
-    // Halves of second derivatives on the diagonal; suffixes name the axes, x being the outermost of three.
+    // Suffixes name the axes, of which x is the outermost of three. `vxx`, `vyy` and `vzz` are halves of second
+    // derivatives.
     let [mut v, mut vx, mut vy, mut vz] = [zero; 4];
     let [mut vxx, mut vxy, mut vxz, mut vyy, mut vyz, mut vzz] = [zero; 6];
     for i in (0..=outer).rev() {

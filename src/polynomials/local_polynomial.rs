@@ -1,35 +1,45 @@
-//! A polynomial of local coordinates t = (x − centre)/scale, with exact derivatives.
+//! Polynomials of local coordinates t = (x − center)/scale with exact derivatives.
 
 use super::horner::{Derivatives, derivatives};
 use crate::geometry::Vector;
-use crate::linear_algebra::number::{Number, add_scaled, dot, times};
+use crate::linear_algebra::number::{Number, add_scaled, dot, multiply_symmetric};
 
-/// A fitted polynomial, viewed over storage that belongs to someone else.
+/// A fitted polynomial whose coefficients are borrowed.
+///
+/// ```
+/// use meniscus::geometry::Vector;
+/// use meniscus::polynomials::LocalPolynomial;
+///
+/// // p = 1 + 2 t₁ + 3 t₀ in nested order, around the origin.
+/// let center = Vector::<2>::zeros();
+/// let p = LocalPolynomial { degree: 1, coefficients: &[1.0, 2.0, 3.0], center, scale: 1.0 };
+/// assert_eq!(p.jet(&Vector::<2>::new(1.0, 1.0)).gradient, [3.0, 2.0]);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct LocalPolynomial<'a, const D: usize> {
-    /// Total degree that the coefficients are laid out for; terms of a lower one are zero beyond it.
+    /// Total degree for which the coefficients are laid out.
     pub degree: usize,
-    /// Coefficients of the monomials of t in nested order.
+    /// Coefficients of the monomials of t in nested order; zero beyond the degree of the fit.
     pub coefficients: &'a [f64],
     /// Origin of the local coordinates.
-    pub centre: Vector<D>,
+    pub center: Vector<D>,
     /// Length of one local unit.
     pub scale: f64,
 }
 
-/// Value, gradient and Hessian at a point, of one number or lanes.
+/// Value, gradient and Hessian of a polynomial p at a point x, as single numbers or lanes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jet<T, const D: usize> {
-    /// p(x).
+    /// Value p(x).
     pub value: T,
-    /// ∇p(x).
+    /// Gradient ∇p(x).
     pub gradient: [T; D],
-    /// ∇∇p(x).
+    /// Hessian ∇∇p(x).
     pub hessian: [[T; D]; D],
 }
 
 impl<T: Number, const D: usize> Jet<T, D> {
-    /// From derivatives in local coordinates of `1/inverse_scale` length units.
+    /// The jet from derivatives with respect to local coordinates whose unit has the length `1/inverse_scale`.
     #[inline(always)]
     pub fn from_local(local: &Derivatives<T, D>, inverse_scale: T) -> Self {
         let squared = inverse_scale * inverse_scale;
@@ -40,20 +50,20 @@ impl<T: Number, const D: usize> Jet<T, D> {
         }
     }
 
-    /// |∇p|.
+    /// Slope ‖∇p‖.
     #[inline(always)]
     pub fn slope(&self) -> T {
         dot(&self.gradient, &self.gradient).sqrt()
     }
 
-    /// The unit normal ∇p/|∇p| (PCP eq. 16), outward where p rises outward.
+    /// Unit normal ∇p/‖∇p‖ (PCP eq. 16), outward where p increases outward.
     #[inline(always)]
     pub fn normal(&self) -> [T; D] {
         let inverse = T::splat(1.0) / self.slope();
         self.gradient.map(|g| g * inverse)
     }
 
-    /// ∇·(∇p/|∇p|) = (tr H − nᵀ H n)/|∇p| (PCP eq. 17), in any dimension.
+    /// Curvature ∇·(∇p/‖∇p‖) = (tr H − nᵀ H n)/‖∇p‖ with the Hessian H (PCP eq. 17), in any dimension.
     #[inline(always)]
     pub fn curvature(&self) -> T {
         let n = self.normal();
@@ -61,14 +71,14 @@ impl<T: Number, const D: usize> Jet<T, D> {
         for d in 1..D {
             trace = trace + self.hessian[d][d];
         }
-        (trace - dot(&n, &times(&self.hessian, &n))) / self.slope()
+        (trace - dot(&n, &multiply_symmetric(&self.hessian, &n))) / self.slope()
     }
 
-    /// The jet of the quadratic part a small way off.
+    /// The jet of the second-order Taylor polynomial at the displacement `way`.
     #[inline(always)]
     #[must_use]
-    pub fn moved(&self, way: &[T; D]) -> Self {
-        let change = times(&self.hessian, way);
+    pub fn translated(&self, way: &[T; D]) -> Self {
+        let change = multiply_symmetric(&self.hessian, way);
         let half = T::splat(0.5);
         Self {
             value: self.value + dot(&self.gradient, way) + half * dot(&change, way),
@@ -79,7 +89,7 @@ impl<T: Number, const D: usize> Jet<T, D> {
 }
 
 impl<const D: usize> LocalPolynomial<'_, D> {
-    /// p, ∇p and ∇∇p at the displacement `dx = x − centre`.
+    /// Value, gradient and Hessian at the displacement `dx = x − center`.
     #[must_use]
     #[inline]
     pub fn jet(&self, dx: &Vector<D>) -> Jet<f64, D> {
@@ -88,7 +98,7 @@ impl<const D: usize> LocalPolynomial<'_, D> {
         Jet::from_local(&derivatives(self.degree, |place| self.coefficients[place], &t), inverse)
     }
 
-    /// p(x) at the displacement `dx = x − centre`.
+    /// Value at the displacement `dx = x − center`.
     #[must_use]
     pub fn value(&self, dx: &Vector<D>) -> f64 {
         self.jet(dx).value
@@ -105,8 +115,8 @@ mod tests {
         let random = CounterRandom::new(9);
         let indices = nested_indices::<D>(degree);
         let coefficients: Vec<f64> = (0..indices.len()).map(|k| random.symmetric(&[k as i64])).collect();
-        let centre = Vector::<D>::zeros();
-        let p = LocalPolynomial { degree, coefficients: &coefficients, centre, scale: 0.7 };
+        let center = Vector::<D>::zeros();
+        let p = LocalPolynomial { degree, coefficients: &coefficients, center, scale: 0.7 };
         let x = Vector::<D>::from_fn(|d, _| [0.2, -0.1, 0.35][d]);
         let jet = p.jet(&x);
         let plain: f64 = indices
@@ -121,8 +131,8 @@ mod tests {
             e[d] = step;
             let (ahead, behind) = (p.jet(&(x + e)), p.jet(&(x - e)));
             assert!(((ahead.value - behind.value) / (2.0 * step) - jet.gradient[d]).abs() < 1e-7);
-            let bend = (Vector::<D>::from(ahead.gradient) - Vector::<D>::from(behind.gradient)) / (2.0 * step);
-            assert!((bend - Vector::<D>::from(jet.hessian[d])).norm() < 1e-6);
+            let column = (Vector::<D>::from(ahead.gradient) - Vector::<D>::from(behind.gradient)) / (2.0 * step);
+            assert!((column - Vector::<D>::from(jet.hessian[d])).norm() < 1e-6);
         }
     }
 
@@ -146,7 +156,7 @@ mod tests {
                 _ => 0.0,
             })
             .collect();
-        let p = LocalPolynomial { degree: 2, coefficients: &coefficients, centre: Vector::<3>::zeros(), scale: 1.0 };
+        let p = LocalPolynomial { degree: 2, coefficients: &coefficients, center: Vector::<3>::zeros(), scale: 1.0 };
         assert!((p.jet(&Vector::<3>::zeros()).curvature() + 3.5).abs() < 1e-15);
     }
 }

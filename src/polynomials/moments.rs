@@ -1,8 +1,9 @@
 //! Regressions by moments, one in each vector lane.
 //!
-//! The Gram matrix of the weighted monomials holds nothing but moments, G_αβ = Σ_j w_j t_j^(α+β): 45 sums instead of
-//! 120 for degree 4 in the plane, 165 instead of 630 in space. Beyond [`REFINED_FROM`] one step of iterative refinement
-//! with the residuals of the data brings back the digits that squaring the condition costs.
+//! The entries of the Gram matrix of the weighted monomials are moments, G_αβ = Σ_j w_j t_j^(α+β). For degree 4 these
+//! are 45 sums instead of 120 in the plane, and 165 instead of 630 in space. From [`REFINEMENT_MIN_DEGREE`] on, one
+//! step of iterative refinement with the residuals of the data restores the digits that squaring the condition number
+//! costs.
 
 use super::MAX_DEGREE;
 use super::horner::nested_indices;
@@ -10,32 +11,33 @@ use super::multi_index::term_count;
 use crate::linear_algebra::normal_equations::{LaneSystems, packed_row};
 use crate::linear_algebra::number::{LANES, Lanes};
 
-/// The degree from which on solutions are refined.
-pub const REFINED_FROM: usize = 5;
+/// Smallest degree whose solutions are refined.
+pub const REFINEMENT_MIN_DEGREE: usize = 5;
 
-/// Neighbours that one pass over the sums takes together, so that a sum is loaded and stored once for all.
-const TOGETHER: usize = 4;
+/// Number of neighbors that one pass adds to the sums, so that each sum is loaded and stored once for all of them.
+const NEIGHBORS_PER_PASS: usize = 4;
 
-/// Powers t⁰ … t^(2 n) of the last coordinate of the neighbours of one pass.
-type Powers = [[Lanes; TOGETHER]; 2 * MAX_DEGREE + 1];
+/// Powers t⁰ … t^(2n) of the last coordinate, for the neighbors of one pass.
+type Powers = [[Lanes; NEIGHBORS_PER_PASS]; 2 * MAX_DEGREE + 1];
 
-/// Regressions of one degree.
+/// Solver for regressions of one total degree.
 #[derive(Debug, Clone)]
 pub struct Moments<const D: usize> {
     degree: usize,
-    /// The place of the moment of each entry of the packed Gram matrix.
+    /// Index of the moment that each entry of the packed Gram matrix equals.
     gram: Vec<u16>,
 }
 
-/// Data of the regressions of one batch, and room to solve them.
+/// Data of a batch of regressions, one per lane, with the workspace of their solution.
 #[derive(Debug, Clone)]
 pub struct LaneBatch<const D: usize> {
-    /// Neighbours a lane; lanes with fewer are filled up with weight 0.
+    /// Number of neighbors per lane. Lanes with fewer are padded with rows of weight 0.
     rows: usize,
+    /// Local coordinates of the neighbors.
     coordinates: [Vec<[f64; LANES]>; D],
-    /// One for a neighbour, zero for a row that fills a lane up; then the weights.
+    /// Weights of the neighbors.
     weights: Vec<[f64; LANES]>,
-    /// Right-hand sides, quantity by quantity.
+    /// Values of the neighbors, quantity by quantity.
     values: Vec<[f64; LANES]>,
     moments: Vec<Lanes>,
     systems: LaneSystems,
@@ -57,15 +59,15 @@ impl<const D: usize> Default for LaneBatch<D> {
             solution: Vec::new(),
             correction: Vec::new(),
             residuals: Vec::new(),
-            powers: [[Lanes::splat(1.0); TOGETHER]; 2 * MAX_DEGREE + 1],
+            powers: [[Lanes::splat(1.0); NEIGHBORS_PER_PASS]; 2 * MAX_DEGREE + 1],
         }
     }
 }
 
 impl<const D: usize> LaneBatch<D> {
-    /// Forgets the last batch and makes room for `rows` neighbours a lane.
+    /// Starts a batch with up to `rows` neighbors per lane and the given number of quantities.
     pub fn reset(&mut self, rows: usize, quantities: usize) {
-        let rows = rows.next_multiple_of(TOGETHER);
+        let rows = rows.next_multiple_of(NEIGHBORS_PER_PASS);
         self.rows = rows;
         let clear = |numbers: &mut Vec<[f64; LANES]>, length: usize| {
             numbers.clear();
@@ -78,7 +80,7 @@ impl<const D: usize> LaneBatch<D> {
         clear(&mut self.values, rows * quantities);
     }
 
-    /// Writes one neighbour: local coordinates and base weight. The values follow by [`Self::set_value`].
+    /// Writes the local coordinates `t` and the weight of a neighbor. Its values are written by [`Self::set_value`].
     #[inline(always)]
     pub fn set_row(&mut self, lane: usize, row: usize, t: &[f64; D], weight: f64) {
         for (axis, t) in self.coordinates.iter_mut().zip(t) {
@@ -87,14 +89,14 @@ impl<const D: usize> LaneBatch<D> {
         self.weights[row][lane] = weight;
     }
 
-    /// Writes a right-hand side.
+    /// Writes the value of a quantity at a neighbor.
     #[inline(always)]
     pub fn set_value(&mut self, lane: usize, row: usize, quantity: usize, value: f64) {
         self.values[quantity * self.rows + row][lane] = value;
     }
 
-    /// Multiplies every weight by exp(−k |t|²).
-    pub fn weigh(&mut self, k: f64) {
+    /// Multiplies every weight by exp(−k ‖t‖²).
+    pub fn apply_weights(&mut self, k: f64) {
         if k == 0.0 {
             return;
         }
@@ -110,7 +112,7 @@ impl<const D: usize> LaneBatch<D> {
 }
 
 impl<const D: usize> Moments<D> {
-    /// For polynomials of a total degree.
+    /// The solver for polynomials of a total degree.
     #[must_use]
     pub fn new(degree: usize) -> Self {
         let (terms, moments) = (nested_indices::<D>(degree), nested_indices::<D>(2 * degree));
@@ -124,8 +126,9 @@ impl<const D: usize> Moments<D> {
         Self { degree, gram }
     }
 
-    /// Fits every quantity of a batch. Coefficients (nested order) come quantity by quantity; with them, for each lane,
-    /// the least pivot as a share of its diagonal.
+    /// Fits all quantities of a batch.
+    ///
+    /// Returns the smallest pivot ratio of each lane, and the coefficients, quantity by quantity, in nested order.
     pub fn solve<'b>(&self, batch: &'b mut LaneBatch<D>, quantities: usize) -> (Lanes, &'b [Lanes]) {
         match self.degree {
             1 => self.solve_unrolled::<1>(batch, quantities),
@@ -139,6 +142,7 @@ impl<const D: usize> Moments<D> {
         }
     }
 
+    /// [`Self::solve`] for a degree N that is known to the compiler.
     fn solve_unrolled<'b, const N: usize>(
         &self,
         batch: &'b mut LaneBatch<D>,
@@ -151,9 +155,9 @@ impl<const D: usize> Moments<D> {
         let rows = *rows;
         moments.clear();
         moments.resize(term_count::<D>(2 * N), zero);
-        for first in (0..rows).step_by(TOGETHER) {
-            let mut scale = [zero; TOGETHER];
-            for q in 0..TOGETHER {
+        for first in (0..rows).step_by(NEIGHBORS_PER_PASS) {
+            let mut scale = [zero; NEIGHBORS_PER_PASS];
+            for q in 0..NEIGHBORS_PER_PASS {
                 scale[q] = Lanes::new(weights[first + q]);
             }
             add_monomials::<D, N, true>(coordinates, first, &scale, powers, moments);
@@ -162,20 +166,20 @@ impl<const D: usize> Moments<D> {
         for (entry, place) in systems.matrix_mut().iter_mut().zip(&self.gram) {
             *entry = moments[*place as usize];
         }
-        let least = systems.factorise();
+        let least = systems.factorize();
         solution.clear();
         solution.resize(quantities * terms, zero);
         for (quantity, coefficients) in solution.chunks_exact_mut(terms).enumerate() {
             let values = &values[quantity * rows..(quantity + 1) * rows];
-            for first in (0..rows).step_by(TOGETHER) {
-                let mut scale = [zero; TOGETHER];
-                for q in 0..TOGETHER {
+            for first in (0..rows).step_by(NEIGHBORS_PER_PASS) {
+                let mut scale = [zero; NEIGHBORS_PER_PASS];
+                for q in 0..NEIGHBORS_PER_PASS {
                     scale[q] = Lanes::new(weights[first + q]) * Lanes::new(values[first + q]);
                 }
                 add_monomials::<D, N, false>(coordinates, first, &scale, powers, coefficients);
             }
             systems.solve(coefficients);
-            if N >= REFINED_FROM {
+            if N >= REFINEMENT_MIN_DEGREE {
                 residuals.clear();
                 residuals.extend((0..rows).map(|row| {
                     let mut t = [zero; D];
@@ -186,9 +190,9 @@ impl<const D: usize> Moments<D> {
                 }));
                 correction.clear();
                 correction.resize(terms, zero);
-                for first in (0..rows).step_by(TOGETHER) {
-                    let mut scale = [zero; TOGETHER];
-                    scale.copy_from_slice(&residuals[first..first + TOGETHER]);
+                for first in (0..rows).step_by(NEIGHBORS_PER_PASS) {
+                    let mut scale = [zero; NEIGHBORS_PER_PASS];
+                    scale.copy_from_slice(&residuals[first..first + NEIGHBORS_PER_PASS]);
                     add_monomials::<D, N, false>(coordinates, first, &scale, powers, correction);
                 }
                 systems.solve(correction);
@@ -201,25 +205,26 @@ impl<const D: usize> Moments<D> {
     }
 }
 
-/// Adds Σ_q scale_q t_q^α to the sums of all |α| ≤ N, or ≤ 2 N where `DOUBLE`, in nested order.
+/// Adds Σ_q scale_q t_q^α over the neighbors of one pass to the sums for all |α| ≤ N (|α| ≤ 2 N with `DOUBLE`), in
+/// nested order.
 #[inline(always)]
 fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
     coordinates: &[Vec<[f64; LANES]>; D],
     first: usize,
-    scale: &[Lanes; TOGETHER],
+    scale: &[Lanes; NEIGHBORS_PER_PASS],
     powers: &mut Powers,
     sums: &mut [Lanes],
 ) {
     let degree = if DOUBLE { 2 * N } else { N };
     let load = |d: usize, q: usize| Lanes::new(coordinates[d][first + q]);
     let mut x = *scale;
-    let (mut y, mut z) = ([Lanes::splat(0.0); TOGETHER], [Lanes::splat(0.0); TOGETHER]);
-    for q in 0..TOGETHER {
+    let (mut y, mut z) = ([Lanes::splat(0.0); NEIGHBORS_PER_PASS], [Lanes::splat(0.0); NEIGHBORS_PER_PASS]);
+    for q in 0..NEIGHBORS_PER_PASS {
         (y[q], z[q]) = (load(D - 2, q), load(D - 1, q));
         powers[0][q] = Lanes::splat(1.0);
     }
     for k in 1..=degree {
-        for q in 0..TOGETHER {
+        for q in 0..NEIGHBORS_PER_PASS {
             powers[k][q] = powers[k - 1][q] * z[q];
         }
     }
@@ -232,12 +237,12 @@ fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
             place += row.len();
             for (sum, power) in row.iter_mut().zip(powers.iter()) {
                 let mut s = *sum;
-                for q in 0..TOGETHER {
+                for q in 0..NEIGHBORS_PER_PASS {
                     s = a[q].mul_add(power[q], s);
                 }
                 *sum = s;
             }
-            for q in 0..TOGETHER {
+            for q in 0..NEIGHBORS_PER_PASS {
                 a[q] *= y[q];
             }
         }
@@ -249,7 +254,7 @@ fn add_monomials<const D: usize, const N: usize, const DOUBLE: bool>(
     }
 }
 
-/// p(t) with coefficients in nested order.
+/// Value p(t) of the polynomial with the given coefficients in nested order.
 #[inline(always)]
 fn value<const D: usize, const N: usize>(coefficients: &[Lanes], t: &[Lanes; D]) -> Lanes {
     let zero = Lanes::splat(0.0);

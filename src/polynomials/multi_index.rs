@@ -1,14 +1,22 @@
-//! Multi-indices α with |α| = Σ α_i ≤ n, graded by |α|: the terms of lower degree come first, so that a basis of
-//! lower degree is the beginning of one of higher degree.
+//! Multi-indices α with |α| = Σ α_i ≤ n, graded by |α|.
+//!
+//! Terms of lower degree come first, so that a basis of lower degree is the beginning of one of higher degree.
 
-/// All multi-indices of `D` entries up to a total degree.
+/// All multi-indices with `D` entries up to a total degree.
+///
+/// ```
+/// use meniscus::polynomials::MultiIndexSet;
+///
+/// let set = MultiIndexSet::<2>::total_degree(1);
+/// assert_eq!(set.indices(), [[0, 0], [1, 0], [0, 1]]);
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MultiIndexSet<const D: usize> {
     indices: Vec<[u8; D]>,
 }
 
 impl<const D: usize> MultiIndexSet<D> {
-    /// The set for total degree `degree`, of size C(degree + D, D).
+    /// The set of total degree `degree`, which has C(degree + D, D) indices.
     #[must_use]
     pub fn total_degree(degree: usize) -> Self {
         let mut indices = Vec::new();
@@ -26,6 +34,7 @@ impl<const D: usize> MultiIndexSet<D> {
     }
 }
 
+/// Appends all indices whose entries from `axis` on sum to `rest`, the first of these entries descending.
 fn push_grade<const D: usize>(indices: &mut Vec<[u8; D]>, index: &mut [u8; D], axis: usize, rest: usize) {
     if axis == D - 1 {
         index[axis] = rest as u8;
@@ -38,7 +47,7 @@ fn push_grade<const D: usize>(indices: &mut Vec<[u8; D]>, index: &mut [u8; D], a
     }
 }
 
-/// C(degree + D, D): how many terms a polynomial of total degree `degree` in `D` variables has.
+/// Number of terms C(degree + D, D) of a polynomial of total degree `degree` in `D` variables.
 #[must_use]
 pub fn term_count<const D: usize>(degree: usize) -> usize {
     (1..=D).fold(1, |product, k| product * (degree + k) / k)

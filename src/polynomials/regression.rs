@@ -1,5 +1,7 @@
-//! Local least-squares fits of scattered values (PCP paper, section 3.1, eqs. 7 and 8), with the fallbacks that keep
-//! a fit from being worse than none: the radius grows with the neighbour count, then the degree falls.
+//! Local weighted least-squares fits of scattered values (PCP 3.1, eqs. 7 and 8) and their fallbacks.
+//!
+//! Where there are too few neighbors, or where they lie badly, the radius grows. If that does not help, the degree is
+//! lowered.
 
 use super::basis::{BasisKind, PolynomialBasis};
 use super::local_polynomial::LocalPolynomial;
@@ -11,65 +13,65 @@ use crate::linear_algebra::least_squares::LeastSquares;
 use crate::linear_algebra::number::LANES;
 use crate::neighbors::{Neighbor, NeighborSearch};
 
-/// How a regression is solved.
+/// The method by which a regression is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Solver {
-    /// By the moments of scaled monomials, several fits at once; by orthogonal decomposition in the basis where pivots
-    /// fall below [`LEAST_PIVOT`]. The polynomial is the same in every basis.
+    /// By the moments of scaled monomials, several fits at once. Fits with a pivot ratio below [`MIN_PIVOT`] are solved
+    /// by orthogonal decomposition in the basis. The polynomial is the same in every basis.
     Moments,
     /// By orthogonal decomposition in the basis, one fit at a time.
     Orthogonal,
 }
 
-/// The parameters of all fits of one method.
+/// Parameters of all fits of a method.
 #[derive(Debug, Clone)]
 pub struct Regression<const D: usize> {
-    /// Basis of the full degree.
+    /// Polynomial basis of the full degree.
     pub basis: PolynomialBasis<D>,
-    /// Which particles take part.
+    /// Rule by which particles take part in a fit.
     pub neighborhood: Neighborhood,
-    /// k of the weight exp(−k r²/r_c²) on squared residuals; 0 weighs all the same.
+    /// Exponent k of the weight exp(−k r²/r_c²) of squared residuals; 0 gives all neighbors the same weight.
     pub weight: f64,
-    /// Least n_n/n_c: the radius grows until there are so many neighbours per coefficient.
+    /// Smallest number n_n/n_c of neighbors per coefficient, until which the radius grows.
     pub minimum_ratio: f64,
-    /// A length of the order of the particle spacing, where searches by count begin.
+    /// Typical distance of particles, from which searches by count start.
     pub spacing: f64,
-    /// None where every fit is an orthogonal decomposition.
+    /// Solver by moments; None where every fit is an orthogonal decomposition.
     moments: Option<Moments<D>>,
 }
 
-/// Geometry and quality of one fit; the coefficients stand beside it in the caller's storage.
+/// Geometry and quality of a fit. Its coefficients are stored by the caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit<const D: usize> {
     /// Origin of the local coordinates.
-    pub centre: Vector<D>,
+    pub center: Vector<D>,
     /// Length of one local unit.
     pub scale: f64,
-    /// Where the fit may be used: within `radius` of `middle`.
+    /// Center of the support: the fit is valid within `radius` of this point.
     pub middle: Vector<D>,
-    /// r_c after growth.
+    /// Cutoff radius r_c after growth, a length.
     pub radius: f64,
-    /// Degree after fallback.
+    /// Total degree, after it was lowered where necessary.
     pub degree: usize,
-    /// n_n.
+    /// Number n_n of neighbors.
     pub neighbors: usize,
-    /// How often the radius grew.
+    /// Number of times that the radius grew.
     pub enlargements: u32,
-    /// Condition estimate of the scaled matrix.
+    /// Estimate of the condition number of the scaled matrix.
     pub condition: f64,
-    /// Whether moments were asked for and could not do, so that it is an orthogonal decomposition.
+    /// Whether the solution by moments was too ill-conditioned, so that an orthogonal decomposition replaced it.
     pub decomposed: bool,
 }
 
 impl<const D: usize> Fit<D> {
-    /// The fitted polynomial over coefficients that are laid out for `degree`.
+    /// The fitted polynomial with its coefficients, which are laid out for `degree`.
     #[must_use]
     pub fn polynomial<'a>(&self, degree: usize, coefficients: &'a [f64]) -> LocalPolynomial<'a, D> {
-        LocalPolynomial { degree, coefficients, centre: self.centre, scale: self.scale }
+        LocalPolynomial { degree, coefficients, center: self.center, scale: self.scale }
     }
 }
 
-/// Storage that fits reuse.
+/// Buffers that fits reuse.
 #[derive(Debug, Clone, Default)]
 pub struct RegressionScratch<const D: usize> {
     neighbors: Vec<Neighbor<D>>,
@@ -80,26 +82,26 @@ pub struct RegressionScratch<const D: usize> {
     graded: Vec<f64>,
 }
 
-/// What is fitted, and among whom.
+/// The particles and the values that are fitted.
 #[derive(Debug, Clone, Copy)]
 pub struct FitData<'a, S, V, A> {
-    /// The particles.
+    /// Search over the particles.
     pub search: &'a S,
-    /// Particle and quantity to number.
+    /// Value of a quantity at a particle: `values(particle, quantity)`.
     pub values: V,
-    /// How many quantities.
+    /// Number of quantities.
     pub quantities: usize,
-    /// Whether a particle may take part in the fit of a lane.
+    /// Whether a particle may take part in the fit of a lane: `admit(lane, particle)`.
     pub admit: A,
 }
 
-/// Enlargements tried for a matrix of low rank before the degree falls.
+/// Number of enlargements of a rank-deficient fit before its degree is lowered.
 const RANK_ENLARGEMENTS: u32 = 8;
-/// Least pivot of the moments, as a share of its diagonal, that leaves enough digits.
-pub const LEAST_PIVOT: f64 = 1e-9;
+/// Smallest pivot ratio of the moments that leaves enough digits.
+pub const MIN_PIVOT: f64 = 1e-9;
 
 impl<const D: usize> Regression<D> {
-    /// Regressions of one method.
+    /// Regressions with the given basis, neighborhood, weight, ratio, spacing and solver.
     #[must_use]
     pub fn new(
         basis: PolynomialBasis<D>,
@@ -109,13 +111,13 @@ impl<const D: usize> Regression<D> {
         spacing: f64,
         solver: Solver,
     ) -> Self {
-        // Raw coordinates have no business with moments: their powers overflow every digit.
+        // Moments of raw coordinates would lose all digits.
         let by_moments = solver == Solver::Moments && basis.kind() != BasisKind::MonomialUnscaled;
         let moments = by_moments.then(|| Moments::new(basis.degree()));
         Self { basis, neighborhood, weight, minimum_ratio, spacing, moments }
     }
 
-    /// Total degree, for which coefficients are laid out.
+    /// Total degree for which coefficients are laid out.
     #[must_use]
     pub fn degree(&self) -> usize {
         self.basis.degree()
@@ -127,29 +129,33 @@ impl<const D: usize> Regression<D> {
         term_count::<D>(self.basis.degree())
     }
 
+    /// Number of neighbors until which the radius grows.
     fn needed(&self) -> usize {
         (self.minimum_ratio * self.terms() as f64).ceil() as usize
     }
 
-    /// Fits every quantity around up to [`LANES`] centres. Coefficients stand centre by centre, quantity by quantity, in
-    /// nested order.
+    /// Fits every quantity around up to [`LANES`] centers.
     ///
-    /// 1. Collect the neighbours of each centre, with as many as the method asks.
-    /// 2. Solve all by moments, where the method says so.
-    /// 3. What has too few neighbours or too small a pivot, or all: [`Self::fit`].
+    /// Coefficients are written center by center, quantity by quantity, in nested order. A fit is None where not even a
+    /// plane can be fitted.
+    ///
+    /// 1. Collect the neighbors of each center.
+    /// 2. With [`Solver::Moments`], solve all fits at once.
+    /// 3. Solve the fits that have too few neighbors or a small pivot, or all fits with [`Solver::Orthogonal`], by
+    ///    [`Self::fit`].
     pub fn fit_lanes<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
         data: &FitData<S, V, A>,
-        centres: &[Vector<D>],
+        centers: &[Vector<D>],
         scratch: &mut RegressionScratch<D>,
         coefficients: &mut [f64],
     ) -> [Option<Fit<D>>; LANES] {
         let size = data.quantities * self.terms();
         let mut fits = [None; LANES];
         if let Some(moments) = &self.moments {
-            fits = self.fit_by_moments(moments, data, centres, scratch, coefficients);
+            fits = self.fit_by_moments(moments, data, centers, scratch, coefficients);
         }
-        for (lane, (x, coefficients)) in centres.iter().zip(coefficients.chunks_exact_mut(size)).enumerate() {
+        for (lane, (x, coefficients)) in centers.iter().zip(coefficients.chunks_exact_mut(size)).enumerate() {
             if fits[lane].is_none() {
                 let decomposed = self.moments.is_some();
                 let fit = self.fit(data, lane, x, scratch, coefficients);
@@ -159,11 +165,12 @@ impl<const D: usize> Regression<D> {
         fits
     }
 
+    /// Steps 1 and 2 of [`Self::fit_lanes`]. A fit is None where the moments are not sufficient.
     fn fit_by_moments<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
         moments: &Moments<D>,
         data: &FitData<S, V, A>,
-        centres: &[Vector<D>],
+        centers: &[Vector<D>],
         scratch: &mut RegressionScratch<D>,
         coefficients: &mut [f64],
     ) -> [Option<Fit<D>>; LANES] {
@@ -171,7 +178,7 @@ impl<const D: usize> Regression<D> {
         let (terms, quantities) = (self.terms(), *quantities);
         let mut extents = [None; LANES];
         let mut rows = 0;
-        for (lane, x) in centres.iter().enumerate() {
+        for (lane, x) in centers.iter().enumerate() {
             let neighbors = &mut scratch.lanes[lane];
             let admit = |j: usize| admit(lane, j);
             extents[lane] = Some(self.neighborhood.collect(*search, x, self.needed(), self.spacing, &admit, neighbors));
@@ -189,22 +196,22 @@ impl<const D: usize> Regression<D> {
                 }
             }
         }
-        batch.weigh(self.weight);
+        batch.apply_weights(self.weight);
         let (least, solution) = moments.solve(batch, quantities);
         let least = least.to_array();
         let mut fits = [None; LANES];
-        for (lane, (x, extent)) in centres.iter().zip(extents).enumerate() {
+        for (lane, (x, extent)) in centers.iter().zip(extents).enumerate() {
             let Some(extent) = extent else { continue };
             let neighbors = scratch.lanes[lane].len();
-            // Written so that a NaN is refused too.
-            let is_sound = neighbors >= terms && least[lane] >= LEAST_PIVOT;
+            // The comparison also refuses a NaN.
+            let is_sound = neighbors >= terms && least[lane] >= MIN_PIVOT;
             let own = &mut coefficients[lane * quantities * terms..(lane + 1) * quantities * terms];
             for (c, lanes) in own.iter_mut().zip(solution) {
                 *c = lanes.as_array()[lane];
             }
             if is_sound && own.iter().all(|c| c.is_finite()) {
                 fits[lane] = Some(Fit {
-                    centre: *x,
+                    center: *x,
                     scale: extent.radius,
                     middle: *x,
                     radius: extent.radius,
@@ -219,13 +226,14 @@ impl<const D: usize> Regression<D> {
         fits
     }
 
-    /// Fits the values around `x`, the centre of a lane, by orthogonal decomposition and writes the coefficients in nested order (terms beyond
-    /// a lowered degree are 0).
+    /// Fits the values around `x`, the center of a lane, by orthogonal decomposition.
     ///
-    /// 1. Collect neighbours; grow the radius until n_n ≥ minimum_ratio · n_c.
-    /// 2. Solve; on a low rank grow further, then lower the degree one by one.
+    /// Coefficients are written in nested order; those beyond a lowered degree are 0.
     ///
-    /// None when not even a plane can be fitted.
+    /// 1. Collect neighbors. Enlarge the radius until n_n ≥ minimum_ratio · n_c.
+    /// 2. Solve. If the matrix is rank-deficient, enlarge the radius further, then lower the degree one by one.
+    ///
+    /// Returns None when not even a plane can be fitted.
     pub fn fit<S: NeighborSearch<D>, V: Fn(usize, usize) -> f64, A: Fn(usize, usize) -> bool>(
         &self,
         data: &FitData<S, V, A>,
@@ -245,7 +253,7 @@ impl<const D: usize> Regression<D> {
             if enough && let Some(condition) = self.solve(data, x, radius, degree, scratch, coefficients) {
                 let unscaled = self.basis.kind() == BasisKind::MonomialUnscaled;
                 return Some(Fit {
-                    centre: if unscaled { Vector::<D>::zeros() } else { *x },
+                    center: if unscaled { Vector::<D>::zeros() } else { *x },
                     scale: if unscaled { 1.0 } else { radius },
                     middle: *x,
                     radius,
@@ -270,7 +278,8 @@ impl<const D: usize> Regression<D> {
         }
     }
 
-    /// Least squares over the collected neighbours; None when the matrix is short of rank.
+    /// Solves the least-squares problem of the collected neighbors. Returns its condition number, or None when the
+    /// matrix is rank-deficient.
     fn solve<S, V: Fn(usize, usize) -> f64, A>(
         &self,
         data: &FitData<S, V, A>,
@@ -292,7 +301,7 @@ impl<const D: usize> Regression<D> {
                 self.basis.row(&local, degree, &mut scratch.row);
                 let mut value = (data.values)(neighbor.index, quantity);
                 if self.weight > 0.0 {
-                    // The square root of the weight multiplies the row.
+                    // A row is multiplied by the square root of its weight.
                     let w = (-0.5 * self.weight * neighbor.r2 * inverse * inverse).exp();
                     scratch.row.iter_mut().for_each(|a| *a *= w);
                     value *= w;
@@ -342,7 +351,7 @@ mod tests {
         regression.fit(&data, 0, x, &mut RegressionScratch::default(), coefficients)
     }
 
-    /// Moments against orthogonal decompositions, for every degree, dimension and two quantities at once.
+    /// Compares moments with orthogonal decompositions for two quantities at once.
     fn compare_solvers<const D: usize>(degree: usize, tolerance: f64) {
         let lattice = Lattice { spacing: 0.1, offset: 0.0, jitter: 0.49, seed: 4 };
         let corner = Vector::<D>::repeat(0.85);
@@ -362,10 +371,10 @@ mod tests {
         let mut scratch = RegressionScratch::default();
         let middle: Vec<Vector<D>> = points.iter().filter(|x| x.norm() < 0.3).take(15).copied().collect();
         let data = FitData { search: &cells, values: |j, q: usize| values[q][j], quantities: 2, admit: |_, _| true };
-        for centres in middle.chunks(LANES) {
+        for centers in middle.chunks(LANES) {
             let mut ours = vec![0.0; LANES * 2 * terms];
-            let fits = fast.fit_lanes(&data, centres, &mut scratch, &mut ours);
-            for (lane, x) in centres.iter().enumerate() {
+            let fits = fast.fit_lanes(&data, centers, &mut scratch, &mut ours);
+            for (lane, x) in centers.iter().enumerate() {
                 let mut exact = vec![0.0; 2 * terms];
                 let reference = oracle.fit(&data, lane, x, &mut scratch, &mut exact).unwrap();
                 let fit = fits[lane].unwrap();
@@ -403,10 +412,10 @@ mod tests {
                 let at = Vector::<2>::new(0.21, -0.33);
                 let fit = fit(&regression, &cells, &at, &values, &mut coefficients).unwrap();
                 assert_eq!(fit.degree, 4);
-                assert!(fit.neighbors >= 23, "{} neighbours", fit.neighbors);
+                assert!(fit.neighbors >= 23, "{} neighbors", fit.neighbors);
                 let x = Vector::<2>::new(0.25, -0.3);
                 let exact = 1.0 + x[0] - 2.0 * x[1] * x[0] + x[1].powi(4) - x[0].powi(3);
-                let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.centre));
+                let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.center));
                 assert!((value - exact).abs() < 1e-11, "{kind:?}: {value} for {exact}");
             }
         }
@@ -434,7 +443,7 @@ mod tests {
         let fit = fit(&regression, &cells, &points[2], &values, &mut coefficients).unwrap();
         assert!(fit.degree <= 2 && fit.enlargements > 0);
         let x = Vector::<2>::new(-0.8, -0.9);
-        let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.centre));
+        let value = fit.polynomial(regression.degree(), &coefficients).value(&(x - fit.center));
         assert!((value + 2.6).abs() < 1e-10);
     }
 }

@@ -1,4 +1,4 @@
-//! Unisolvent nodes of total degree on a Chebyshev–Lobatto grid (PCP paper section 3.1, its references 32 and 33).
+//! Unisolvent nodes of total degree on a Chebyshev–Lobatto grid (PCP 3.1; Hecht 2020).
 //!
 //! The one-dimensional generating nodes are the Chebyshev–Lobatto points of `[−1, 1]` in Leja order; the nodes
 //! q_α = (p_{α_1}, …, p_{α_D}), |α| ≤ n, determine every polynomial of total degree n. In Newton form
@@ -7,8 +7,9 @@
 use super::multi_index::MultiIndexSet;
 use std::f64::consts::PI;
 
-/// The Chebyshev–Lobatto points cos(kπ/n), k = 0…n, each next one where the product of distances to the ones before
-/// is largest (Leja order), which keeps Newton's form stable.
+/// The Chebyshev–Lobatto points cos(kπ/n), k = 0…n, in Leja order.
+///
+/// Each point has the largest product of distances to the points before it. This order keeps Newton's form stable.
 #[must_use]
 pub fn leja_ordered_chebyshev_lobatto(degree: usize) -> Vec<f64> {
     if degree == 0 {
@@ -16,7 +17,7 @@ pub fn leja_ordered_chebyshev_lobatto(degree: usize) -> Vec<f64> {
     }
     let mut rest: Vec<f64> = (0..=degree)
         .map(|k| {
-            // The sine form gives points that are symmetric to the last bit.
+            // In this form with a sine, the points are symmetric to the last bit.
             (PI * (degree as f64 - 2.0 * k as f64) / (2.0 * degree as f64)).sin()
         })
         .collect();
@@ -34,14 +35,15 @@ pub fn leja_ordered_chebyshev_lobatto(degree: usize) -> Vec<f64> {
     ordered
 }
 
-/// Rows of the matrix C with L_α = Σ_β C_{αβ} N_β, the Lagrange polynomials of the unisolvent nodes in Newton form.
+/// The matrix C with L_α = Σ_β C_{αβ} N_β, which gives the Lagrange polynomials of the unisolvent nodes in Newton form.
 ///
-/// C is the inverse transpose of N_β(q_α), upper triangular for graded indices; stored row by row, `terms × terms`.
+/// C is the inverse transpose of N_β(q_α) and upper triangular for graded indices. It is stored by rows, `terms ×
+/// terms`.
 #[must_use]
 pub fn lagrange_in_newton_form<const D: usize>(set: &MultiIndexSet<D>, nodes: &[f64]) -> Vec<f64> {
     let indices = set.indices();
     let n = indices.len();
-    // V[a][b] = N_b(q_a): lower triangular with a unit-free diagonal.
+    // The matrix V[a][b] = N_b(q_a) is lower triangular.
     let mut values = vec![0.0; n * n];
     for (a, alpha) in indices.iter().enumerate() {
         for (b, beta) in indices.iter().enumerate() {
@@ -50,7 +52,7 @@ pub fn lagrange_in_newton_form<const D: usize>(set: &MultiIndexSet<D>, nodes: &[
                 .product();
         }
     }
-    // L_α(q_γ) = δ means C Vᵀ = I, so column α of Cᵀ = V⁻¹ e_α by forward substitution.
+    // L_α(q_γ) = δ_αγ means C Vᵀ = I. Row α of C is therefore V⁻¹ e_α, by forward substitution.
     let mut matrix = vec![0.0; n * n];
     for alpha in 0..n {
         for row in alpha..n {

@@ -1,7 +1,7 @@
 //! Root-mean-square and maximum of errors, and the report entries that closest-point schemes share.
 
 use crate::closest_point::rescue::get;
-use crate::closest_point::{RescueCounts, Soundness};
+use crate::closest_point::{FitDiagnostics, RescueCounts};
 use crate::simulation::report::Newton;
 use crate::simulation::{ErrorEntry, Health, Report};
 use std::collections::BTreeMap;
@@ -79,12 +79,12 @@ pub fn rescued(counts: &RescueCounts) -> u64 {
 /// The report of a closest-point scheme from its parts.
 #[must_use]
 pub fn closest_point_report(
-    soundness: &Soundness,
+    fit_diagnostics: &FitDiagnostics,
     errors: Vec<ErrorEntry>,
     health: Health,
     method: BTreeMap<&'static str, String>,
 ) -> Report {
-    let counts = &soundness.counts;
+    let counts = &fit_diagnostics.counts;
     let entries = counts.entries();
     let some = |labels: &[&str]| {
         entries.iter().filter(|(name, count)| labels.contains(name) && *count > 0).copied().collect::<BTreeMap<_, _>>()
@@ -93,7 +93,7 @@ pub fn closest_point_report(
     Report {
         errors,
         health,
-        worst_condition: soundness.worst_condition,
+        worst_condition: fit_diagnostics.worst_condition,
         rescued_fits: some(&[
             "fits.larger_radius",
             "fits.lower_degree",

@@ -1,7 +1,7 @@
 //! The two halves of a redistancing with their phases booked: what every closest-point scheme does, each with points
 //! and answers of its own.
 
-use crate::closest_point::{Answers, LevelSurface};
+use crate::closest_point::{ClosestPoints, LevelSurface};
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::simulation::Phases;
@@ -30,7 +30,7 @@ pub fn query<const D: usize>(
     surface: &LevelSurface<D>,
     points: &[Vector<D>],
     reach: f64,
-    answers: &mut Answers<D>,
+    answers: &mut ClosestPoints<D>,
     interrupt: &Interrupt,
     phases: &mut Phases,
 ) -> Result<(), Interrupted> {

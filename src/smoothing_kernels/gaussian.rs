@@ -1,13 +1,13 @@
-//! The Gaussian, cut off (PCP eq. A.7): σ exp(−q²) for q = r/ε ≤ 3.
+//! The truncated Gaussian σ exp(−q²) for q = r/ε ≤ 3 (PCP eq. A.7).
 
 use super::SmoothingKernel;
 use crate::geometry::Vector;
 use std::f64::consts::PI;
 
-/// The kernel of smoothing length ε and support 3 ε; σ = π^(−D/2) ε^(−D).
+/// The truncated Gaussian with support 3 ε and σ = π^(−D/2) ε^(−D).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gaussian {
-    /// ε.
+    /// Smoothing length ε.
     pub smoothing_length: f64,
 }
 

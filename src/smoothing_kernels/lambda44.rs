@@ -1,18 +1,21 @@
-//! The remeshing kernel Λ₄,₄ (PCP appendix A): a product of one-dimensional pieces of degree 9, four times
-//! continuously differentiable, that keeps the first four moments.
+//! The remeshing kernel Λ₄,₄ (PCP appendix A), a product of one-dimensional piecewise polynomials of degree 9.
+//!
+//! It is four times continuously differentiable and keeps the moments 0 to 4.
 
 use super::SmoothingKernel;
 use crate::geometry::Vector;
 
-/// The kernel for particles and nodes of spacing h: ∏_d Λ(|dx_d|/h)/h.
+/// The kernel ∏_d Λ(|dx_d|/h)/h for particles and nodes of spacing h.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lambda44 {
-    /// h.
+    /// Spacing h of the particles and of the nodes.
     pub spacing: f64,
 }
 
-/// Coefficients of the three pieces in ascending powers of q. The second piece's cubic term is 28425/4: as printed, with
-/// 8, the kernel is not even continuous.
+/// Coefficients of the three pieces in ascending powers of q.
+///
+/// The cubic term of the second piece is 28425/4 (docs/errata.md, PCP A). With the printed 28425/8 the kernel is not
+/// continuous.
 const PIECES: [[f64; 10]; 3] = [
     [1.0, 0.0, -5.0 / 4.0, 0.0, 1.0 / 4.0, -100.0 / 3.0, 455.0 / 4.0, -295.0 / 2.0, 345.0 / 4.0, -115.0 / 6.0],
     [
@@ -41,7 +44,7 @@ const PIECES: [[f64; 10]; 3] = [
     ],
 ];
 
-/// Λ₄,₄(q) for q ≥ 0.
+/// The function Λ₄,₄(q) for q ≥ 0.
 fn piecewise(q: f64) -> f64 {
     let Some(piece) = PIECES.get(q as usize) else { return 0.0 };
     piece.iter().rev().fold(0.0, |sum, c| sum * q + c)
@@ -68,7 +71,7 @@ mod tests {
                 let moment: f64 =
                     (-4..=4).map(|k| f64::from(k) + shift).map(|x| x.powi(power) * piecewise(x.abs())).sum();
                 let expected = if power == 0 { 1.0 } else { 0.0 };
-                // Coefficients of 3e5 cost that many digits, and the fourth powers of 4 some more.
+                // Coefficients up to 3e5 cost five digits, and the fourth powers of 4 some more.
                 assert!((moment - expected).abs() < 1e-7, "moment {power} at {shift}: {moment}");
             }
         }

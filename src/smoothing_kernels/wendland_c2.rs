@@ -1,13 +1,13 @@
-//! Wendland's C² kernel (PCP eq. A.6): σ (1 − q/2)⁴ (1 + 2q) for q = r/ε < 2.
+//! Wendland's C² kernel σ (1 − q/2)⁴ (1 + 2q) for q = r/ε < 2 (Wendland 1995; PCP eq. A.6).
 
 use super::SmoothingKernel;
 use crate::geometry::Vector;
 use std::f64::consts::PI;
 
-/// The kernel of smoothing length ε and support 2 ε; σ = 7/(4π ε²) in the plane, 21/(16π ε³) in space.
+/// Wendland's C² kernel with support 2 ε, σ = 7/(4π ε²) in the plane and 21/(16π ε³) in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WendlandC2 {
-    /// ε.
+    /// Smoothing length ε.
     pub smoothing_length: f64,
 }
 

@@ -1,54 +1,64 @@
-//! Step number and scene time. With a fixed step t = n·dt by multiplication, so that no rounding accumulates.
+//! Step number and scene time.
+//!
+//! With a fixed step, t = n·dt is a product, so that rounding does not accumulate.
 
-/// Where a simulation stands.
+/// Step and time that a simulation has reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
-    /// Steps done.
+    /// Number of steps done.
     pub step: u64,
     /// Scene time reached.
     pub time: f64,
 }
 
-/// A run of equal steps.
+/// A sequence of equal time steps.
+///
+/// ```
+/// use meniscus::time::FixedStep;
+///
+/// let fixed = FixedStep::from_limit(1.0, 0.3);
+/// assert_eq!((fixed.steps, fixed.time_step), (4, 0.25));
+/// assert_eq!(fixed.clock(4).time, 1.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedStep {
-    /// Δt.
+    /// Time step Δt.
     pub time_step: f64,
     /// Number of steps to the end.
     pub steps: u64,
 }
 
-/// Share of a step by which rounding may miss a time and still count as having reached it.
+/// Fraction of a step by which a time may be missed through rounding and still counts as reached.
 pub const TIME_SLACK: f64 = 1e-9;
 
 impl FixedStep {
-    /// Steps given by a person: the run ends at the first n with n·dt ≥ end − dt·1e-9, and may overshoot.
+    /// Steps of a given length. The run ends at the first n with n·dt ≥ end − dt·1e-9 and may overshoot.
     #[must_use]
     pub fn from_time_step(end_time: f64, time_step: f64) -> Self {
         let steps = (end_time / time_step - TIME_SLACK).ceil().max(0.0) as u64;
         Self { time_step, steps }
     }
 
-    /// A number of equal steps that land on the end.
+    /// A given number of equal steps that land on the end.
     #[must_use]
     pub fn from_steps(end_time: f64, steps: u64) -> Self {
         Self { time_step: end_time / steps.max(1) as f64, steps }
     }
 
-    /// The longest step not above `limit` that lands on the end.
+    /// The longest equal steps not above `limit` that land on the end.
     #[must_use]
     pub fn from_limit(end_time: f64, limit: f64) -> Self {
         let steps = (end_time / limit - TIME_SLACK).ceil().max(1.0) as u64;
         Self::from_steps(end_time, steps)
     }
 
-    /// The clock after n steps.
+    /// The clock after `step` steps.
     #[must_use]
     pub fn clock(&self, step: u64) -> Clock {
         Clock { step, time: step as f64 * self.time_step }
     }
 
-    /// Whether `step` is the first with t ≥ `time` up to the slack.
+    /// Whether `step` is the first step with t ≥ `time`, up to [`TIME_SLACK`].
     #[must_use]
     pub fn reaches(&self, step: u64, time: f64) -> bool {
         let has_reached = |n: u64| n as f64 * self.time_step >= time - self.time_step * TIME_SLACK;

@@ -1,4 +1,4 @@
-//! Integration of the path of one point through a prescribed flow, dx/dt = u(x, t). One file a scheme.
+//! Integration of the path dx/dt = u(x, t) of one point in a prescribed flow, one file per scheme.
 
 pub mod dopri5;
 pub mod rk4;
@@ -6,22 +6,31 @@ pub mod tvd_rk2;
 
 use crate::geometry::{Flow, Vector};
 
-/// The choice of a scheme.
+/// An integration scheme for paths.
+///
+/// ```
+/// use meniscus::geometry::{Vector, flows::Translation};
+/// use meniscus::time::PathIntegrator;
+///
+/// let flow = Translation { velocity: Vector::<2>::new(1.0, 0.0) };
+/// let x = PathIntegrator::Rk4.advance(&flow, &Vector::<2>::zeros(), 0.0, 0.5);
+/// assert_eq!(x, Vector::<2>::new(0.5, 0.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PathIntegrator {
     /// The classical fourth-order Runge–Kutta scheme.
     Rk4,
     /// The second-order total-variation-diminishing Runge–Kutta scheme.
     TvdRk2,
-    /// Dormand and Prince's embedded pair of order 5(4) with error control inside each step.
+    /// The embedded pair of order 5(4) of Dormand 1980, with error control inside each step.
     Dopri5 {
-        /// Error of one inner step in absolute length.
+        /// Largest error of one inner step, an absolute length.
         tolerance: f64,
     },
 }
 
 impl PathIntegrator {
-    /// The point that flows from `x` at `time` to `time + step` (`step` may be negative).
+    /// The position at `time + step` of the point that is at `x` at `time`. A negative `step` goes back in time.
     #[must_use]
     pub fn advance<const D: usize>(self, flow: &dyn Flow<D>, x: &Vector<D>, time: f64, step: f64) -> Vector<D> {
         match self {

@@ -28,20 +28,6 @@ pub const CIRCLES: &[&[&str]] = &[
 
 /// Words for people that still stand for things, by file: at most so many.
 pub const WORDS: &[(&str, usize)] = &[
-    ("src/closest_point/detection.rs", 2),
-    ("src/closest_point/enclosed_measure.rs", 2),
-    ("src/closest_point/level_surface.rs", 3),
-    ("src/closest_point/material.rs", 3),
-    ("src/closest_point/queries.rs", 1),
-    ("src/closest_point/redistancing.rs", 2),
-    ("src/closest_point/surface_columns.rs", 4),
-    ("src/linear_algebra/krylov.rs", 2),
-    ("src/neighbors/cell_list.rs", 4),
-    ("src/neighbors/pencils/slabs.rs", 2),
-    ("src/neighbors/pencils.rs", 17),
-    ("src/parallel.rs", 3),
-    ("src/point_clouds/examination.rs", 1),
-    ("src/polynomials/neighborhood.rs", 1),
     ("src/scene/cloud.rs", 1),
     ("src/scenes/droplet/parameters.rs", 1),
     ("src/scenes/surface_pde/setup.rs", 2),
@@ -84,23 +70,10 @@ pub const WORDS: &[(&str, usize)] = &[
 /// Functions over 60 lines: file, name, lines, and why it is not cut.
 pub const LONG_FUNCTIONS: &[(&str, &str, usize, &str)] = &[
     (
-        "src/closest_point/newton.rs",
-        "closest_points",
-        94,
-        "one iteration in four lanes: its steps share the state of the lanes",
-    ),
-    ("src/closest_point/redistancing.rs", "fit_samples", 67, "not cut yet (issue 18)"),
-    (
         "src/linear_algebra/krylov/bicgstab.rs",
         "solve",
         68,
         "the recurrences of the paper in one piece: every line uses the vectors of the others",
-    ),
-    (
-        "src/linear_algebra/krylov/gmres.rs",
-        "solve",
-        88,
-        "restarted GMRES in one piece: basis, rotations and residual belong together",
     ),
     ("src/polynomials/horner.rs", "unrolled", 63, "unrolled by hand: an arm a degree"),
     ("src/scenes/droplet/rows.rs", "rows", 66, "it becomes files of cases (issue 18, item 6)"),

@@ -2,7 +2,7 @@
 //! count in the report.
 
 use meniscus::closest_point::method::NeighborhoodChoice;
-use meniscus::closest_point::{Answers, ClosestPoint, PcpMethod, Redistancing};
+use meniscus::closest_point::{ClosestPoint, ClosestPoints, PcpMethod, Redistancing};
 use meniscus::geometry::domain::Axis;
 use meniscus::geometry::lattice::Lattice;
 use meniscus::geometry::{Domain, Vector};
@@ -60,10 +60,10 @@ impl<const D: usize> Case<D> {
     /// The answers for all particles, and how many the report counts as rescued.
     fn solve(&self) -> (Vec<(usize, ClosestPoint<D>)>, u64) {
         let surface = self.surface();
-        let mut answers = Answers::default();
+        let mut answers = ClosestPoints::default();
         surface.closest_points(&self.points, f64::INFINITY, &mut answers, &Interrupt::default()).unwrap();
         let rescued = ["fits.lower_degree", "fits.none", "samples.not_projected", "queries.sample_distance"];
-        let entries = surface.soundness().counts.entries();
+        let entries = surface.fit_diagnostics().counts.entries();
         let count = entries.iter().filter(|(name, _)| rescued.contains(name)).map(|(_, count)| count).sum();
         let answers: Vec<_> = answers.iter().map(|(i, answer)| (i, *answer)).collect();
         // Every sample that stands in for a closest point is counted, and counted once.

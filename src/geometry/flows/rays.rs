@@ -5,7 +5,7 @@ use super::{Flow, Vector};
 /// dx/dt = c cos θ, dy/dt = c sin θ, dθ/dt = 0 (GBPM eq. 23 with a constant speed c).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rays {
-    /// c.
+    /// Speed c of the wave front.
     pub speed: f64,
 }
 

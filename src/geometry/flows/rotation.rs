@@ -3,12 +3,12 @@
 use super::{Flow, Vector};
 use std::f64::consts::PI;
 
-/// u = ω e_z × (x − c); points keep their z in 3D.
+/// The flow u = ω e_z × (x − c). In 3D, points keep their z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation<const D: usize> {
-    /// c.
+    /// Center c of the rotation.
     pub center: Vector<D>,
-    /// ω, counter-clockwise.
+    /// Angular velocity ω (rad per time), counter-clockwise.
     pub angular_velocity: f64,
 }
 

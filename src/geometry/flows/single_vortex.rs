@@ -1,12 +1,13 @@
-//! The spiraling vortex in the unit square (PCP eq. 23; without reversal GBPM eq. 21).
+//! The spiraling vortex in the unit square (LeVeque 1996; PCP eq. 23, and GBPM eq. 21 without reversal).
 
 use super::{Flow, Vector};
 use std::f64::consts::PI;
 
-/// u = 2 cos(π t/T) (−sin²(πx) sin(πy) cos(πy), sin²(πy) sin(πx) cos(πx)); without a period the cosine is 1.
+/// The flow u = 2 cos(π t/T) (−sin²(πx) sin(πy) cos(πy), sin²(πy) sin(πx) cos(πx)). Without a period the first cosine
+/// is 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SingleVortex {
-    /// T: the flow turns round at T/2 and is back at the start at T. None never turns.
+    /// Period T: the flow reverses at T/2 and has returned every point at T. With None it never reverses.
     pub period: Option<f64>,
 }
 

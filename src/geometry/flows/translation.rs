@@ -2,10 +2,10 @@
 
 use super::{Flow, Vector};
 
-/// u = v everywhere at all times.
+/// The flow u = v, the same everywhere and at all times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Translation<const D: usize> {
-    /// v.
+    /// Velocity v.
     pub velocity: Vector<D>,
 }
 

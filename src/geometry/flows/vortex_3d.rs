@@ -1,13 +1,14 @@
-//! The deforming flow in the unit cube (GBPM eq. 24).
+//! The deforming flow in the unit cube (LeVeque 1996; GBPM eq. 24).
 
 use super::{Flow, Stretch, Vector};
 use std::f64::consts::PI;
 
-/// u = cos(π t/T) (2 sin²(πx) sin(2πy) sin(2πz), −sin(2πx) sin²(πy) sin(2πz), −sin(2πx) sin(2πy) sin²(πz)); without a
-/// period the cosine is 1.
+/// The flow u = cos(π t/T) (2 sin²(πx) sin(2πy) sin(2πz), −sin(2πx) sin²(πy) sin(2πz), −sin(2πx) sin(2πy) sin²(πz)).
+///
+/// Without a period the cosine is 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vortex3d {
-    /// T: the flow turns round at T/2 and is back at the start at T. None never turns.
+    /// Period T: the flow reverses at T/2 and has returned every point at T. With None it never reverses.
     pub period: Option<f64>,
 }
 

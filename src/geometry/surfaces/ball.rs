@@ -6,9 +6,9 @@ use std::f64::consts::PI;
 /// All points at distance `radius` from `center`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ball<const D: usize> {
-    /// Centre.
+    /// Center of the circle or sphere.
     pub center: Vector<D>,
-    /// Radius, positive.
+    /// Radius R > 0.
     pub radius: f64,
 }
 
@@ -33,7 +33,7 @@ impl<const D: usize> Surface<D> for Ball<D> {
         (self.center.add_scalar(-self.radius), self.center.add_scalar(self.radius))
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         if D == 2 { PI * self.radius.powi(2) } else { 4.0 / 3.0 * PI * self.radius.powi(3) }
     }
 

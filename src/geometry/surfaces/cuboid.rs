@@ -1,18 +1,20 @@
-//! Box (rectangle in 2D) with faces across the coordinates.
+//! Box (rectangle in 2D) with faces perpendicular to the coordinate axes.
 
 use super::{Surface, SurfacePoint, Vector, join, line_points};
 
-/// |x_i − c_i| ≤ size_i / 2.
+/// The box |x_i − c_i| ≤ size_i / 2.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cuboid<const D: usize> {
-    /// Centre c.
+    /// Center c.
     pub center: Vector<D>,
     /// Full edge lengths, positive.
     pub size: Vector<D>,
 }
 
 impl<const D: usize> Cuboid<D> {
-    /// The axis of the face nearest to an inner point (centred frame) and its signed distance ≤ 0.
+    /// Axis of the face nearest to an inner point, and the signed distance ≤ 0 from it.
+    ///
+    /// `half` are half the edge lengths, `local` is the position relative to the center.
     pub(super) fn nearest_face(half: &Vector<D>, local: &Vector<D>) -> (usize, f64) {
         let mut axis = 0;
         for d in 1..D {
@@ -53,7 +55,7 @@ impl<const D: usize> Surface<D> for Cuboid<D> {
         (self.center - self.size * 0.5, self.center + self.size * 0.5)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         self.size.product()
     }
 
@@ -61,7 +63,7 @@ impl<const D: usize> Surface<D> for Cuboid<D> {
         let half = self.size * 0.5;
         let local = x - self.center;
         let (axis, depth) = Self::nearest_face(&half, &local);
-        // Inside, two faces are as near; outside every closest point is the only one.
+        // Inside, two faces are equally near on the medial axis. Outside, the closest point is unique.
         let second = (0..D).filter(|&d| d != axis).map(|d| local[d].abs() - half[d]).fold(f64::NEG_INFINITY, f64::max);
         depth < 0.0 && (depth - second <= tolerance || local[axis].abs() <= tolerance)
     }

@@ -1,13 +1,13 @@
 //! Dumbbell: two balls joined by a straight neck along x.
 //!
-//! The shape is a body of revolution about the x axis (mirror-symmetric in 2D), so the closest point lies in the
-//! half-plane through the axis and the query; there the boundary is two arcs and a line.
+//! The shape is a body of revolution about the x axis (mirror-symmetric in 2D). The closest point therefore lies in the
+//! half-plane through the axis and the query point. There the boundary consists of two arcs and a line.
 
 use super::profile::{Piece, nearest_of};
 use super::{Surface, SurfacePoint, Vector, arc_points, join, line_points};
 use std::f64::consts::PI;
 
-/// Balls of one radius whose centres lie `separation` apart, and a cylinder (strip in 2D) between them.
+/// Two balls of equal radius whose centers are `separation` apart, and a cylinder (strip in 2D) between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dumbbell<const D: usize> {
     center: Vector<D>,
@@ -18,7 +18,9 @@ pub struct Dumbbell<const D: usize> {
 }
 
 impl<const D: usize> Dumbbell<D> {
-    /// A dumbbell; the neck is thinner than the balls and longer than nothing.
+    /// A dumbbell with the given distance between the centers of its balls.
+    ///
+    /// The neck must be thinner than the balls, and the balls must not touch.
     #[must_use]
     pub fn new(center: Vector<D>, separation: f64, radius: f64, neck_radius: f64) -> Self {
         let half_separation = 0.5 * separation;
@@ -33,11 +35,12 @@ impl<const D: usize> Dumbbell<D> {
         Self { center, half_separation, radius, neck_radius, pieces }
     }
 
+    /// Half the angle (rad) under which the neck is seen from the center of a ball.
     fn opening(&self) -> f64 {
         (self.neck_radius / self.radius).asin()
     }
 
-    /// Axial coordinate, distance from the axis and the unit vector away from it.
+    /// Axial coordinate and distance from the axis, and the unit vector that points away from the axis.
     fn half_plane(&self, x: &Vector<D>) -> (Vector<2>, Vector<D>) {
         let mut radial = x - self.center;
         let axial = radial[0];
@@ -64,7 +67,7 @@ impl<const D: usize> Surface<D> for Dumbbell<D> {
         let in_balls = (plane[0].abs() - self.half_separation).hypot(plane[1]) < self.radius;
         let in_neck = plane[0].abs() < self.half_separation && plane[1] < self.neck_radius;
         let curvature =
-            if foot.bend > 0.0 { (D as f64 - 1.0) / self.radius } else { (D as f64 - 2.0) / self.neck_radius };
+            if foot.curvature > 0.0 { (D as f64 - 1.0) / self.radius } else { (D as f64 - 2.0) / self.neck_radius };
         SurfacePoint {
             distance: if in_balls || in_neck { -foot.distance } else { foot.distance },
             point: self.center + lift(&foot.point),
@@ -79,7 +82,7 @@ impl<const D: usize> Surface<D> for Dumbbell<D> {
         (self.center - half, self.center + half)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         let (r, a) = (self.radius, self.neck_radius);
         let depth = (r * r - a * a).sqrt();
         let neck = 2.0 * (self.half_separation - depth);

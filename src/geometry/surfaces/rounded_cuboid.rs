@@ -3,14 +3,14 @@
 use super::{Cuboid, Surface, SurfacePoint, Vector, arc_points, join, line_points};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// The Minkowski sum of a box and a ball; `size` is the outer size.
+/// The Minkowski sum of a box and a ball.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundedCuboid<const D: usize> {
-    /// Centre.
+    /// Center of the box.
     pub center: Vector<D>,
-    /// Outer edge lengths, each more than twice the corner radius.
+    /// Outer edge lengths, each above twice the corner radius.
     pub size: Vector<D>,
-    /// Radius of the rounding, positive.
+    /// Radius of the rounded edges and corners, positive.
     pub corner_radius: f64,
 }
 
@@ -49,8 +49,8 @@ impl<const D: usize> Surface<D> for RoundedCuboid<D> {
         (self.center - self.size * 0.5, self.center + self.size * 0.5)
     }
 
-    fn measure(&self) -> f64 {
-        // Steiner's formula for the inner box and a ball.
+    fn area_or_volume(&self) -> f64 {
+        // Steiner's formula for the sum of the inner box and a ball.
         let core = self.size.add_scalar(-2.0 * self.corner_radius);
         let r = self.corner_radius;
         if D == 2 {

@@ -1,4 +1,4 @@
-//! Properties that every shape must have, each checked against something independent of its formulas.
+//! Properties of every shape, each checked independently of the formulas of the shape.
 
 use super::{Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, Vector, ZalesakDisk};
 use crate::geometry::random::CounterRandom;
@@ -47,7 +47,7 @@ fn check<const D: usize>(name: &str, surface: &dyn Surface<D>) {
     let eps = 1e-6;
     for x in queries::<D>(3000) {
         let answer = surface.nearest(&x);
-        // The distance is the length of the way to the closest point, and that point lies on the surface.
+        // The distance is that to the closest point, and the closest point lies on the surface.
         assert!((answer.distance.abs() - (x - answer.point).norm()).abs() < 1e-13, "{name} at {x:?}");
         assert!(surface.signed_distance(&answer.point).abs() < 1e-13, "{name}: foot of {x:?} is off the surface");
         if surface.near_medial_axis(&x, 1e-3) {
@@ -120,7 +120,7 @@ fn outlines_run_round_the_measure_with_the_inside_on_the_left() {
                 area += 0.5 * (a[0] * b[1] - a[1] * b[0]);
             }
         }
-        assert!((area - surface.measure()).abs() < 1e-5, "{name}: {area} for {}", surface.measure());
+        assert!((area - surface.area_or_volume()).abs() < 1e-5, "{name}: {area} for {}", surface.area_or_volume());
     }
 }
 
@@ -133,7 +133,7 @@ fn measures_agree_with_counting() {
     }
     for (name, surface) in solid_shapes() {
         // Four standard deviations of the count.
-        assert!((count(surface.as_ref()) - surface.measure()).abs() < 0.045, "{name}");
+        assert!((count(surface.as_ref()) - surface.area_or_volume()).abs() < 0.045, "{name}");
     }
 }
 
@@ -143,7 +143,7 @@ fn hard_queries_of_the_ellipse() {
     assert!((ellipse.signed_distance(&Vector::<2>::zeros()) + 0.5).abs() < 1e-15);
     assert!((ellipse.signed_distance(&Vector::<2>::new(0.75, 0.0))).abs() < 1e-15);
     assert!((ellipse.signed_distance(&Vector::<2>::new(0.0, 2.0)) - 1.5).abs() < 1e-15);
-    // On the long axis inside the focal reach the closest points form a pair off the axis.
+    // On the long axis between the centers of curvature the closest points form a pair off the axis.
     let answer = ellipse.nearest(&Vector::<2>::new(0.2, 0.0));
     assert!((answer.point[0] - 0.2 * 0.5625 / 0.3125).abs() < 1e-14);
     assert!(answer.point[1].abs() > 0.3);

@@ -3,19 +3,19 @@
 use super::{Surface, SurfacePoint, Vector};
 use std::f64::consts::PI;
 
-/// All points at distance `minor_radius` from the circle of radius `major_radius` in the plane z = c_z.
+/// All points at the distance `minor_radius` from the circle of radius `major_radius` in the plane z = c_z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Torus {
-    /// Centre.
+    /// Center c of the torus.
     pub center: Vector<3>,
-    /// Radius of the core circle.
+    /// Radius R of the core circle.
     pub major_radius: f64,
-    /// Radius of the tube, less than the major radius.
+    /// Radius r < R of the tube.
     pub minor_radius: f64,
 }
 
 impl Torus {
-    /// Gauss curvature at a point of the surface: cos θ/(r ρ) with ρ = R + r cos θ its distance from the axis.
+    /// Gauss curvature cos θ/(r ρ) at a point of the surface, where ρ = R + r cos θ is the distance from the axis.
     #[must_use]
     pub fn gauss_curvature(&self, x: &Vector<3>) -> f64 {
         let local = x - self.center;
@@ -44,12 +44,12 @@ impl Surface<3> for Torus {
     }
 
     fn bounding_box(&self) -> (Vector<3>, Vector<3>) {
-        let reach = self.major_radius + self.minor_radius;
-        let half = Vector::<3>::new(reach, reach, self.minor_radius);
+        let outer_radius = self.major_radius + self.minor_radius;
+        let half = Vector::<3>::new(outer_radius, outer_radius, self.minor_radius);
         (self.center - half, self.center + half)
     }
 
-    fn measure(&self) -> f64 {
+    fn area_or_volume(&self) -> f64 {
         2.0 * PI * PI * self.major_radius * self.minor_radius * self.minor_radius
     }
 

@@ -1,28 +1,28 @@
-//! Several separate shapes taken together.
+//! Unions of separate shapes.
 
 use super::{Surface, SurfacePoint, Vector};
 
-/// The union of shapes that do not overlap: then every distance is the least of the parts' distances, inside too.
+/// The union of shapes that do not overlap. Each distance, also inside, is then the smallest of the parts' distances.
 pub struct Union<const D: usize> {
     parts: Vec<Box<dyn Surface<D>>>,
 }
 
-/// Two parts of a union overlap, where the union's inner distance is not that of its parts.
+/// Two parts of a union overlap, so that distances inside it are not those of its parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("parts {first} and {second} overlap; a union takes separate shapes")]
 pub struct Overlap {
-    /// Index of one part.
+    /// Index of the first part.
     pub first: usize,
-    /// Index of the other.
+    /// Index of the second part.
     pub second: usize,
 }
 
 impl<const D: usize> Union<D> {
-    /// A union of at least one part.
+    /// The union of at least one part.
     ///
     /// # Errors
-    /// [`Overlap`] when a lattice of 48 points a side over the common bounding box finds a point inside two parts;
-    /// overlaps thinner than that are not seen.
+    /// [`Overlap`] when two parts contain the same point of a lattice of 48 points per side over their common bounding
+    /// box. Thinner overlaps are not detected.
     pub fn new(parts: Vec<Box<dyn Surface<D>>>) -> Result<Self, Overlap> {
         for second in 1..parts.len() {
             for first in 0..second {
@@ -35,6 +35,7 @@ impl<const D: usize> Union<D> {
     }
 }
 
+/// Whether a lattice point of the common bounding box lies in both shapes.
 fn overlap<const D: usize>(a: &dyn Surface<D>, b: &dyn Surface<D>) -> bool {
     const SIDE: usize = 48;
     let (a_box, b_box) = (a.bounding_box(), b.bounding_box());
@@ -73,8 +74,8 @@ impl<const D: usize> Surface<D> for Union<D> {
         total
     }
 
-    fn measure(&self) -> f64 {
-        self.parts.iter().map(|part| part.measure()).sum()
+    fn area_or_volume(&self) -> f64 {
+        self.parts.iter().map(|part| part.area_or_volume()).sum()
     }
 
     fn near_medial_axis(&self, x: &Vector<D>, tolerance: f64) -> bool {

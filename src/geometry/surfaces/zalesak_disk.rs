@@ -1,17 +1,17 @@
-//! Zalesak's disk: a disk with a slot cut in from below (2D only).
+//! Zalesak's disk: a disk with a slot that is cut in from below (2D only; Zalesak 1979).
 
 use super::profile::{Piece, nearest_of};
 use super::{Surface, SurfacePoint, Vector, arc_points, join, line_points};
 use std::f64::consts::PI;
 
-/// A disk less a vertical slot that reaches `slot_depth` up from the lowest point of the circle.
+/// A disk without a vertical slot that extends by `slot_depth` up from the lowest point of the circle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZalesakDisk {
     center: Vector<2>,
     radius: f64,
     half_width: f64,
     top: f64,
-    /// Half the opening angle that the slot takes from the circle.
+    /// Half the angle (rad) that the slot takes from the circle.
     opening: f64,
     pieces: Vec<Piece>,
 }
@@ -27,7 +27,7 @@ impl ZalesakDisk {
         let at = |x: f64, y: f64| center + Vector::<2>::new(x, y);
         let pieces = vec![
             Piece::Arc { center, radius, middle: 0.5 * PI, half_width: PI - opening },
-            // The outside of the shape is the inside of the slot.
+            // Normals point into the slot, which is outside the shape.
             Piece::Line { from: at(-half_width, mouth), to: at(-half_width, top), normal: Vector::<2>::new(1.0, 0.0) },
             Piece::Line { from: at(-half_width, top), to: at(half_width, top), normal: Vector::<2>::new(0.0, -1.0) },
             Piece::Line { from: at(half_width, top), to: at(half_width, mouth), normal: Vector::<2>::new(-1.0, 0.0) },
@@ -49,7 +49,7 @@ impl Surface<2> for ZalesakDisk {
             distance: if self.is_inside(x) { -foot.distance } else { foot.distance },
             point: foot.point,
             normal: foot.normal,
-            curvature: foot.normal.map(|_| foot.bend),
+            curvature: foot.normal.map(|_| foot.curvature),
         }
     }
 
@@ -57,8 +57,8 @@ impl Surface<2> for ZalesakDisk {
         (self.center.add_scalar(-self.radius), self.center.add_scalar(self.radius))
     }
 
-    fn measure(&self) -> f64 {
-        // Disk less the slot's rectangle above the mouth less the circular segment below it.
+    fn area_or_volume(&self) -> f64 {
+        // Disk minus the slot's rectangle above the mouth minus the circular segment below it.
         let mouth = -(self.radius.powi(2) - self.half_width.powi(2)).sqrt();
         let segment = self.radius.powi(2) * (self.opening - self.opening.sin() * self.opening.cos());
         PI * self.radius.powi(2) - 2.0 * self.half_width * (self.top - mouth) - segment

@@ -1,33 +1,35 @@
-//! BiCGSTAB with right preconditioning (van der Vorst, SIAM J. Sci. Stat. Comput. 13, 1992).
+//! BiCGSTAB with right preconditioning (van der Vorst 1992).
 
 use super::{Convergence, IncompleteFactors, LinearMap, Stopping, add, dot, norm};
 
-/// Vectors of a solution, to be used again.
+/// Vectors of the recurrence, reused from one solution to the next.
 #[derive(Debug, Default)]
-pub struct Storage {
+pub struct Workspace {
     vectors: [Vec<f64>; 8],
 }
 
-/// Goes on from `x` to the solution of A x = b. A breakdown (a scalar that vanishes) begins anew from where it is; so does a
-/// residual of the recurrence that is small where the true one is not, as long as that helps.
+/// Improves `x` until it solves A x = b, the matrix A being `map` and its preconditioner `factors`.
+///
+/// The recurrence starts again from the true residual after a breakdown (a scalar that vanishes). It also does so when
+/// its own residual is small and the true one is not, as long as that helps.
 pub fn solve(
     map: &dyn LinearMap,
     factors: &IncompleteFactors,
     b: &[f64],
     x: &mut [f64],
     stopping: Stopping,
-    storage: &mut Storage,
+    workspace: &mut Workspace,
 ) -> Convergence {
     let n = b.len();
-    storage.vectors.iter_mut().for_each(|vector| vector.resize(n, 0.0));
-    let [r, shadow, p, v, s, t, hat, room] = &mut storage.vectors;
+    workspace.vectors.iter_mut().for_each(|vector| vector.resize(n, 0.0));
+    let [r, shadow, p, v, s, t, hat, scratch] = &mut workspace.vectors;
     let goal = stopping.tolerance * norm(b);
     let mut iterations = 0;
     let mut last = f64::INFINITY;
-    while iterations < stopping.most_iterations && !map.is_given_up() {
+    while iterations < stopping.max_iterations && !map.is_interrupted() {
         map.apply(x, r);
         r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
-        // Also where b is nothing.
+        // This also holds for b = 0.
         if norm(r) <= goal {
             break;
         }
@@ -35,15 +37,15 @@ pub fn solve(
         p.copy_from_slice(r);
         let mut rho = dot(shadow, r);
         let mut is_done = false;
-        while !is_done && iterations < stopping.most_iterations && !map.is_given_up() {
+        while !is_done && iterations < stopping.max_iterations && !map.is_interrupted() {
             iterations += 1;
             factors.solve(p, hat);
             map.apply(hat, v);
-            let across = dot(shadow, v);
-            if across.is_nan() || across.abs() <= f64::MIN_POSITIVE {
+            let shadow_v = dot(shadow, v);
+            if shadow_v.is_nan() || shadow_v.abs() <= f64::MIN_POSITIVE {
                 break;
             }
-            let alpha = rho / across;
+            let alpha = rho / shadow_v;
             add(x, alpha, hat);
             s.copy_from_slice(r);
             add(s, -alpha, v);
@@ -53,8 +55,8 @@ pub fn solve(
             }
             factors.solve(s, hat);
             map.apply(hat, t);
-            let size = dot(t, t);
-            let omega = if size > 0.0 { dot(t, s) / size } else { 0.0 };
+            let t_t = dot(t, t);
+            let omega = if t_t > 0.0 { dot(t, s) / t_t } else { 0.0 };
             add(x, omega, hat);
             r.copy_from_slice(s);
             add(r, -omega, t);
@@ -70,11 +72,11 @@ pub fn solve(
             }
         }
         if is_done {
-            let found = Convergence::of(map, b, x, iterations, room);
+            let found = Convergence::from_solution(map, b, x, iterations, scratch);
             if found.is_final(stopping, &mut last) {
                 return found;
             }
         }
     }
-    Convergence::of(map, b, x, iterations, room)
+    Convergence::from_solution(map, b, x, iterations, scratch)
 }

@@ -1,34 +1,35 @@
-//! Incomplete factors L U ≈ A with the pattern of A, ILU(0).
+//! The incomplete factorization L U ≈ A with the pattern of A, ILU(0), as a preconditioner.
 
 use crate::linear_algebra::SparseRows;
 
-/// The factors in the rows of A, 1 on the diagonal of L left out, and the inverse of the diagonal of U.
+/// The factors L and U in the pattern of A. The unit diagonal of L is not stored, and the diagonal of U is stored
+/// inverted.
 #[derive(Debug)]
 pub struct IncompleteFactors {
     rows: SparseRows,
-    /// How many entries of each row stand left of the diagonal.
+    /// Number of entries of each row to the left of the diagonal.
     left: Vec<u32>,
     inverse: Vec<f64>,
 }
 
-/// A row has no diagonal entry, or a pivot became zero or no number.
+/// A row has no diagonal entry, or its pivot became zero or not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("row {row} has no pivot that a factorization could divide by")]
 pub struct NoPivot {
-    /// Which.
+    /// Index of the row.
     pub row: usize,
 }
 
 impl IncompleteFactors {
-    /// Of sorted rows ([`SparseRows::sorted`]).
+    /// Factorizes a matrix whose rows are sorted ([`SparseRows::sorted`]).
     ///
     /// # Errors
-    /// [`NoPivot`].
-    pub fn of(a: &SparseRows) -> Result<Self, NoPivot> {
+    /// [`NoPivot`] names the first row without a usable pivot.
+    pub fn from_rows(a: &SparseRows) -> Result<Self, NoPivot> {
         let mut rows = a.clone();
         let n = rows.rows();
         let (mut left, mut inverse) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        // Where each column stands in the row in hand.
+        // Position of each column within the present row.
         let mut place = vec![u32::MAX; n];
         let mut finished = SparseRows::default();
         let mut broken = None;
@@ -68,7 +69,7 @@ impl IncompleteFactors {
         }
     }
 
-    /// x = (L U)⁻¹ b.
+    /// Writes (L U)⁻¹ b to `x`.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) {
         for i in 0..b.len() {
             let (columns, weights) = self.rows.row(i);
@@ -97,7 +98,7 @@ mod tests {
         let exact = [1.0, -2.0, 3.0];
         let b: Vec<f64> = a.iter().map(|row| row.iter().zip(&exact).map(|(a, x)| a * x).sum()).collect();
         let mut x = [0.0; 3];
-        IncompleteFactors::of(&rows).unwrap().solve(&b, &mut x);
+        IncompleteFactors::from_rows(&rows).unwrap().solve(&b, &mut x);
         assert!(x.iter().zip(&exact).all(|(x, e): (&f64, &f64)| (x - e).abs() < 1e-12));
     }
 
@@ -106,6 +107,6 @@ mod tests {
         let mut rows = SparseRows::default();
         rows.push_row(&[0], &[1.0]);
         rows.push_row(&[0], &[1.0]);
-        assert_eq!(IncompleteFactors::of(&rows).unwrap_err(), NoPivot { row: 1 });
+        assert_eq!(IncompleteFactors::from_rows(&rows).unwrap_err(), NoPivot { row: 1 });
     }
 }

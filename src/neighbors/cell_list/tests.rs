@@ -59,7 +59,7 @@ fn agrees_with_brute_force_in_2d_and_3d() {
 }
 
 #[test]
-fn agrees_for_lattices_whose_neighbours_lie_exactly_on_the_radius() {
+fn agrees_for_lattices_whose_neighbors_lie_exactly_on_the_radius() {
     let points: Vec<Vector<2>> =
         (0..256).map(|k| Vector::<2>::new(f64::from(k % 16) / 8.0 - 1.0, f64::from(k / 16) / 8.0 - 1.0)).collect();
     compare::<2>(&points, &points[..64], 0.25);

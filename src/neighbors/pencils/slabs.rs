@@ -1,38 +1,43 @@
-//! Pencils make slabs across the last axis, each as thick as the reach: points of one find those of it and of the next alone.
-//! All even slabs are summed at once, then all odd ones, so that nobody writes where another does, and the order of every
-//! sum is the same for any number of threads. The first slab stands once more behind the last, as what closes the ring.
+//! Sums over pairs in parallel, slab by slab in two colors.
+//!
+//! A slab is a layer of pencils across the last axis, at least as thick as the cutoff. Its points have neighbors in the
+//! slab itself and in the next one only. All even slabs are summed in parallel, then all odd ones, so that no two
+//! threads write to the same slot. The order of every sum is the same for any number of threads. The first slab is
+//! repeated after the last one, which closes the ring.
 
-use super::{Near, Pencils, Slab};
+use super::{NeighborGroups, Pencils, Slab};
 use crate::parallel::{Interrupt, Interrupted};
 use std::ops::Range;
 
-/// What a slab writes to: `N` columns, of its own places and those of the next slab.
+/// The part of `N` columns to which a slab adds: its own slots and those of the next slab.
 #[derive(Debug)]
 pub struct Window<'a, const N: usize> {
-    /// The place that the columns begin at.
+    /// Slot of the first entry of the columns.
     pub begin: usize,
-    /// Columns of one length.
+    /// Columns of equal length.
     pub columns: [&'a mut [f64]; N],
 }
 
 impl<const D: usize> Pencils<D> {
-    /// Sets `sums`, one number a place (the same where a place stands twice), to what `work` adds: it is called with every place that
-    /// lists anybody, whom it lists and the window of its slab, in parallel.
+    /// Sets `sums`, columns with one number per slot, to what `work` adds to them.
+    ///
+    /// `work` is called in parallel for every slot with neighbors. It gets the slot, its neighbors and the window of
+    /// its slab. Repeated slots of the first slab get equal sums.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the interrupt is raised.
     pub fn sum<const N: usize>(
         &self,
         mut sums: [&mut [f64]; N],
         interrupt: &Interrupt,
-        work: impl Fn(usize, &Near<'_, D>, &mut Window<'_, N>) + Sync,
+        work: impl Fn(usize, &NeighborGroups<'_, D>, &mut Window<'_, N>) + Sync,
     ) -> Result<(), Interrupted> {
         sums.iter_mut().for_each(|column| column.fill(0.0));
         for color in 0..2 {
-            let begin = self.slabs.get(color).map_or(0, |slab| slab.places.start);
+            let begin = self.slabs.get(color).map_or(0, |slab| slab.slots.start);
             let columns = sums.each_mut().map(|column| &mut column[begin..]);
-            let of_color = self.slabs.len().saturating_sub(color).div_ceil(2);
-            self.sum_slabs(color, 0..of_color, Window { begin, columns }, interrupt, &work);
+            let slabs_of_color = self.slabs.len().saturating_sub(color).div_ceil(2);
+            self.sum_slabs(color, 0..slabs_of_color, Window { begin, columns }, interrupt, &work);
         }
         let once = self.sorted.len();
         for column in sums {
@@ -43,18 +48,18 @@ impl<const D: usize> Pencils<D> {
         interrupt.check()
     }
 
-    /// Slabs of a colour, halved until one is left.
+    /// Sums the slabs of one color: halves their range recursively, in parallel, until one slab is left.
     fn sum_slabs<const N: usize>(
         &self,
         color: usize,
         numbers: Range<usize>,
         mut window: Window<'_, N>,
         interrupt: &Interrupt,
-        work: &(impl Fn(usize, &Near<'_, D>, &mut Window<'_, N>) + Sync),
+        work: &(impl Fn(usize, &NeighborGroups<'_, D>, &mut Window<'_, N>) + Sync),
     ) {
         if numbers.len() > 1 {
             let middle = numbers.start + numbers.len() / 2;
-            let cut = self.slabs[2 * middle + color].places.start;
+            let cut = self.slabs[2 * middle + color].slots.start;
             let Window { begin, columns } = window;
             let mut right: [&mut [f64]; N] = std::array::from_fn(|_| Default::default());
             let mut halves = right.iter_mut();
@@ -76,16 +81,17 @@ impl<const D: usize> Pencils<D> {
             return;
         }
         let (mut first, mut begin) = (0, 0);
-        for (place, end) in slab.places.clone().zip(&slab.ends) {
+        for (slot, end) in slab.slots.clone().zip(&slab.ends) {
             let runs = &slab.runs[first..*end as usize];
             first = *end as usize;
             let Some(last) = runs.last() else { continue };
-            work(place, &Near { groups: &slab.groups, runs, begin, shifts: &self.shifts }, &mut window);
+            work(slot, &NeighborGroups { groups: &slab.groups, runs, begin, shifts: &self.shifts }, &mut window);
             begin = last.end;
         }
     }
 
-    /// Slabs of as many layers of pencils as the reach may span; what is left over belongs to the last.
+    /// Cuts the slots into slabs of as many layers of pencils as the cutoff can span. The last slab takes the remaining
+    /// layers.
     pub(super) fn cut(&self, slabs: &mut Vec<Slab>) {
         let (layers, thickness) = (self.counts[D - 1], self.spans[D - 1].max(1) as usize);
         let layer = self.starts.len().saturating_sub(1) / layers;
@@ -93,7 +99,7 @@ impl<const D: usize> Pencils<D> {
         slabs.resize_with(number, Slab::default);
         for (k, slab) in slabs.iter_mut().enumerate() {
             let last = if k + 1 == number { layers } else { (k + 1) * thickness };
-            slab.places = self.starts[k * thickness * layer] as usize..self.starts[last * layer] as usize;
+            slab.slots = self.starts[k * thickness * layer] as usize..self.starts[last * layer] as usize;
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Points of the plane or of space as they are: DC-PSE in flat space (Surface DC-PSE paper, section 2).
+//! DC-PSE in flat space (Surface DC-PSE, section 2), with the coordinates of the plane or of space.
 //!
-//! Windows are 1 − r²/r_c²: wide, as the paper's are. Narrow ones, which are more exact on surfaces at rest, make fits of moving
-//! particles follow few neighbours and flows unstable.
+//! The window 1 − r²/r_c² is wide, as in the paper. Narrow windows are more accurate on surfaces at rest. With moving
+//! particles they depend on few neighbors and make flows unstable.
 
-use super::{Chart, Functional, Heights, Node, in_space};
+use super::{Chart, Functional, Heights, Node, cartesian_terms};
 use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
 
-/// Points of a domain.
+/// The chart of points in a domain.
 #[derive(Debug)]
 pub struct FlatChart<'a, const D: usize> {
     points: &'a [Vector<D>],
@@ -15,7 +15,7 @@ pub struct FlatChart<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> FlatChart<'a, D> {
-    /// Of points and the cells that they were sorted into.
+    /// The chart of points with the cell list of these points.
     #[must_use]
     pub fn new(points: &'a [Vector<D>], cells: &'a CellList<D>) -> Self {
         Self { points, cells }
@@ -27,14 +27,14 @@ impl<const D: usize> Chart<D> for FlatChart<'_, D> {
         self.points.len()
     }
 
-    fn gather(&self, i: usize, reach: f64, _is_last_resort: bool, near: &mut Vec<Node<D>>) {
+    fn gather(&self, i: usize, radius: f64, _is_last_resort: bool, near: &mut Vec<Node<D>>) {
         near.clear();
-        let inverse = 1.0 / reach;
-        // `dx` is x_j − x_i, over the edge of a periodic domain where that is nearer.
-        self.cells.for_each_within(&self.points[i], reach, |j, dx, square| {
+        let inverse = 1.0 / radius;
+        // `dx` is the shortest displacement x_j − x_i in a periodic domain.
+        self.cells.for_each_within(&self.points[i], radius, |j, dx, square| {
             if j != i {
-                let rest = (1.0 - square * inverse * inverse).max(0.0);
-                near.push(Node { index: j as u32, at: (dx * inverse).into(), window: rest, height: 0.0 });
+                let window = (1.0 - square * inverse * inverse).max(0.0);
+                near.push(Node { index: j as u32, at: (dx * inverse).into(), window, height: 0.0 });
             }
         });
     }
@@ -46,6 +46,6 @@ impl<const D: usize> Chart<D> for FlatChart<'_, D> {
         _heights: Option<&Heights<D>>,
         terms: &mut Vec<([u8; D], f64)>,
     ) {
-        in_space(functional, terms);
+        cartesian_terms(functional, terms);
     }
 }

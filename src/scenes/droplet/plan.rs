@@ -483,7 +483,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let positions = self.positions();
         let (level, measure) = if self.clouds.is_empty() {
             let surface = self.shape.surface::<D>("/shape")?;
-            (self.levels(surface.as_ref(), &positions), surface.measure())
+            (self.levels(surface.as_ref(), &positions), surface.area_or_volume())
         } else {
             (self.levels_of_points(&context, &positions).map_err(|found| vec![found])?, f64::NAN)
         };
@@ -503,7 +503,7 @@ impl<const D: usize> DropletScene<D> {
     /// box where it is not known.
     fn near(&self, width: f64) -> f64 {
         let surface = self.shape.surface::<D>("/shape");
-        let measure = surface.map_or_else(|_| self.lengths().product() / 5.0, |surface| surface.measure());
+        let measure = surface.map_or_else(|_| self.lengths().product() / 5.0, |surface| surface.area_or_volume());
         let area = if D == 2 {
             2.0 * (std::f64::consts::PI * measure).sqrt()
         } else {

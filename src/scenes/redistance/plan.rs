@@ -64,7 +64,7 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     let initial = initial::<D>(&mut spec, &shape, points.is_some(), &mut errors);
     let band = band(&mut spec, &mut errors);
     if let (Some(surface), Some((method, _))) = (&surface, &method) {
-        let reach = (0.5 * band).max(method.reach_h::<D>() * spec.spacing);
+        let reach = (0.5 * band).max(method.fit_band_h::<D>() * spec.spacing);
         errors.extend(check_extent(surface.as_ref(), reach, spec.spacing));
         if initial == InitialLevel::Scaled && !is_scaling_positive(surface.as_ref(), reach) {
             let detail = "the factor 1 + 0.5 x + 0.3 y must be positive over the whole band";
@@ -195,7 +195,7 @@ impl<const D: usize> Scene for RedistanceScene<D> {
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
-        let reach = self.half_band.max(self.method.reach_h::<D>() * self.lattice.spacing) + beyond;
+        let reach = self.half_band.max(self.method.fit_band_h::<D>() * self.lattice.spacing) + beyond;
         let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
             self.shape.surface::<D>("/shape")
                 .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing))
@@ -217,7 +217,7 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
         let particles = particles as f64;
         let reach_h = self.half_band / self.lattice.spacing;
-        let reach_h = reach_h.max(self.method.reach_h::<D>());
+        let reach_h = reach_h.max(self.method.fit_band_h::<D>());
         let times = self.spec.repeat as f64;
         let mut work =
             work_estimate::redistancing::<D>(&self.method, particles, reach_h, 1.0, times, Course::EveryStep);

@@ -192,13 +192,13 @@ pub(super) fn choices(
     errors: &mut Vec<Violation>,
 ) -> (Option<Scheme>, Option<ProblemChoice>) {
     let metric = match &spec.normals {
-        Some(NormalsChoice::Exact) => Metric::OfNormals,
+        Some(NormalsChoice::Exact) => Metric::FromNormals,
         Some(NormalsChoice::Perturbed { metric, .. } | NormalsChoice::Given { metric })
             if *metric == MetricWord::Normals =>
         {
-            Metric::OfNormals
+            Metric::FromNormals
         }
-        _ => Metric::OfHeights,
+        _ => Metric::FromHeights,
     };
     let scheme = scheme(spec, Points { shape, sampling, count, metric }, errors);
     (scheme, problems::plan(spec, shape, metric, errors))
@@ -290,7 +290,7 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
             let (default_layers, default_spacing) = points.copies();
             let layers = *layers.get_or_insert(default_layers);
             let apart = *normal_spacing.get_or_insert(default_spacing);
-            if points.metric == Metric::OfHeights || matches!(points.shape, Shape::Bump(_) | Shape::Points(_)) {
+            if points.metric == Metric::FromHeights || matches!(points.shape, Shape::Bump(_) | Shape::Points(_)) {
                 let detail = "copies along normals want exact normals and a closed surface";
                 errors.push(Violation::new("/method/form", "conflict", detail, "copies", json!(["intrinsic"])));
             }

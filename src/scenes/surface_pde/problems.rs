@@ -184,7 +184,7 @@ pub(super) fn plan(
             let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
             Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
         }
-        ProblemSpec::Curvature => Some(ProblemChoice::Curvature { of_heights: metric == Metric::OfHeights }),
+        ProblemSpec::Curvature => Some(ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights }),
         ProblemSpec::ReactionDiffusion {
             model, diffusivity, second_diffusivity, noise, manufactured, end_time, time_step, tolerance
         } => {
@@ -231,7 +231,7 @@ fn explicit(tolerance: Option<f64>, time_step: Option<f64>) -> EvolutionIntegrat
 
 impl From<&StoppingSpec> for Stopping {
     fn from(spec: &StoppingSpec) -> Self {
-        Self { tolerance: spec.tolerance, most_iterations: spec.max_iterations }
+        Self { tolerance: spec.tolerance, max_iterations: spec.max_iterations }
     }
 }
 
@@ -363,7 +363,7 @@ impl ProblemChoice {
         match self.solver() {
             Some(Solver::SparseLu) => 70.0 * entries * points.ln(),
             Some(Solver::Gmres { restart, stopping }) => {
-                8.0 * (stopping.most_iterations.min(restart as u64) + 1) as f64
+                8.0 * (stopping.max_iterations.min(restart as u64) + 1) as f64
             }
             _ => 0.0,
         }

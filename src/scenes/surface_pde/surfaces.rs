@@ -266,7 +266,7 @@ pub(super) fn in_space(
         (Sampling::Random { is_relaxed }, _) => {
             let (low, high) = surface.bounding_box();
             // A shell as thin as the drawing of points allows.
-            let mut points = relaxation::random(surface, number, 0.02 * (high - low).min(), seed, interrupt);
+            let mut points = relaxation::random_points(surface, number, 0.02 * (high - low).min(), seed, interrupt);
             if is_relaxed {
                 relaxation::relax(&mut points, spacing, |x| surface.nearest(x).point, interrupt);
             }
@@ -276,7 +276,7 @@ pub(super) fn in_space(
             let (major, minor) = (torus.major_radius, torus.minor_radius);
             let share = |s: f64| s + minor / major * (TAU * s).sin() / TAU;
             let profile = |s: f64| (major + minor * (TAU * s).cos(), minor * (TAU * s).sin());
-            fibonacci::of_revolution(number, share, profile)
+            fibonacci::surface_of_revolution(number, share, profile)
         }
         (_, Shape::Ellipsoid(ellipsoid)) => {
             fibonacci::sphere(number).into_iter().map(|u| u.component_mul(&ellipsoid.semi_axes)).collect()

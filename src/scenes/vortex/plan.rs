@@ -248,7 +248,7 @@ fn schedule(spec: &mut Vortex) -> (RedistanceWhen, Option<String>) {
 impl<const D: usize> VortexScene<D> {
     /// How far from the surface particles are made: over the band, and beyond a thin one what fits need.
     fn reach(&self) -> f64 {
-        self.half_band.max(self.method.even_reach_h::<D>() * self.lattice.spacing)
+        self.half_band.max(self.method.even_fit_band_h::<D>() * self.lattice.spacing)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::system::{AdvectedSystem, FieldChoice, RedistanceWhen};
 use crate::closest_point::LevelSurface;
-use crate::closest_point::enclosed_measure::enclosed_measure;
+use crate::closest_point::enclosed_moments::enclosed_area_or_volume;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::particles::Particles;
@@ -88,9 +88,9 @@ impl<const D: usize> AdvectedLevelSet<D> {
             || {
                 let copy = system.redistanced_copy(&system.interrupt);
                 // Whoever interrupts ends the run before its first step.
-                copy.and_then(|(_, surface)| enclosed_measure(&surface, &system.interrupt)).unwrap_or(f64::NAN)
+                copy.and_then(|(_, surface)| enclosed_area_or_volume(&surface, &system.interrupt)).unwrap_or(f64::NAN)
             },
-            crate::geometry::Surface::measure,
+            crate::geometry::Surface::area_or_volume,
         );
         let phases = Phases::new(cpu_clock);
         // What points from elsewhere bring is a level, and no distance yet.
@@ -165,7 +165,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
         for difference in differences {
             norms.add(difference);
         }
-        let (samples_mean, samples_max) = surface.over_samples(|x| distance(x).abs());
+        let (samples_mean, samples_max) = surface.mean_and_max(|x| distance(x).abs());
         interrupt.check()?;
         // Over an empty band there is no error, which is not an error of zero.
         let distances = (!norms.is_empty()).then(|| [norms.rms(), norms.max(), samples_mean, samples_max]);
@@ -184,8 +184,8 @@ impl<const D: usize> AdvectedLevelSet<D> {
                 return Err(StepError::InterfaceLost { step: now.step, time: now.time });
             }
             // What the copy could not do the plain way stands behind the errors that are reported.
-            self.system.redistancing.soundness_mut().take_over(surface.soundness());
-            self.measure = enclosed_measure(&surface, &self.system.interrupt)?;
+            self.system.redistancing.fit_diagnostics_mut().merge(surface.fit_diagnostics());
+            self.measure = enclosed_area_or_volume(&surface, &self.system.interrupt)?;
             self.measured = now.step;
             self.measure_errors(now.time, &particles, &surface, self.measure)?
         };
@@ -226,8 +226,9 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             self.redistanced = next.step;
             if self.is_error_due(next.step) || self.plan.is_series_due(&self.fixed, next.step) {
                 let system = &self.system;
-                self.measure =
-                    self.phases.measure("measure", || enclosed_measure(&system.redistancing, &system.interrupt))?;
+                self.measure = self
+                    .phases
+                    .measure("measure", || enclosed_area_or_volume(&system.redistancing, &system.interrupt))?;
                 self.measured = next.step;
             }
         }
@@ -252,7 +253,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             ("volume_drift", known(is_measured, (self.measure - exact) / exact)),
             ("band_particles", in_band),
             ("cfl", self.max_cfl),
-            ("rescued_fits", rescued(&self.system.redistancing.soundness().counts) as f64),
+            ("rescued_fits", rescued(&self.system.redistancing.fit_diagnostics().counts) as f64),
         ]
     }
 
@@ -285,10 +286,10 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let Clock { step, time } = self.clock();
         let mut state = State { step, time, ..State::default() };
         state.push_particles(&self.system.particles);
-        let soundness = self.system.redistancing.soundness();
-        state.push_counts("rescues", soundness.counts.entries().iter().map(|e| e.1).collect());
+        let fit_diagnostics = self.system.redistancing.fit_diagnostics();
+        state.push_counts("rescues", fit_diagnostics.counts.entries().iter().map(|e| e.1).collect());
         state.push_counts("redistanced", vec![self.redistanced, self.measured]);
-        state.push_reals("monitors", &[self.measure, self.max_cfl, soundness.worst_condition]);
+        state.push_reals("monitors", &[self.measure, self.max_cfl, fit_diagnostics.worst_condition]);
         let errors: Vec<f64> = self.errors.iter().flat_map(|e| e.to_numbers()).collect();
         state.push_reals("errors", &errors);
         state
@@ -298,16 +299,16 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         if state.step > self.fixed.steps {
             return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
         }
-        let soundness = self.system.redistancing.soundness_mut();
+        let fit_diagnostics = self.system.redistancing.fit_diagnostics_mut();
         let (rescues, redistanced) = (state.counts("rescues")?, state.counts("redistanced")?);
         let (monitors, errors) = (state.reals("monitors")?, state.reals("errors")?);
-        check_length("rescues", rescues.len(), soundness.counts.entries().len())?;
+        check_length("rescues", rescues.len(), fit_diagnostics.counts.entries().len())?;
         check_length("redistanced", redistanced.len(), 2)?;
         check_length("monitors", monitors.len(), 3)?;
         check_length("errors", errors.len(), errors.len() / MeasuredErrors::NUMBERS * MeasuredErrors::NUMBERS)?;
         state.pull_particles(&mut self.system.particles)?;
-        soundness.counts.restore(rescues);
-        soundness.worst_condition = monitors[2];
+        fit_diagnostics.counts.restore(rescues);
+        fit_diagnostics.worst_condition = monitors[2];
         self.measure = monitors[0];
         self.max_cfl = monitors[1];
         self.redistanced = redistanced[0];
@@ -319,7 +320,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
 
     fn report(&self) -> Report {
         let errors = self.errors.iter().flat_map(|e| e.entries(D)).collect();
-        closest_point_report(self.system.redistancing.soundness(), errors, self.health(), self.method.clone())
+        closest_point_report(self.system.redistancing.fit_diagnostics(), errors, self.health(), self.method.clone())
     }
 
     fn phases(&self) -> &Phases {
@@ -332,7 +333,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             finite: self.system.particles.positions().iter().all(|x| x.iter().all(|c| c.is_finite())),
             max_cfl: self.max_cfl,
             volume_drift: Some((self.measure - exact) / exact),
-            rescued_fits: rescued(&self.system.redistancing.soundness().counts),
+            rescued_fits: rescued(&self.system.redistancing.fit_diagnostics().counts),
         }
     }
 

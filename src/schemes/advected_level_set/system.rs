@@ -1,7 +1,7 @@
 //! The particles of an advected level set, their transport and their redistancing.
 
 use crate::closest_point::method::NeighborhoodChoice;
-use crate::closest_point::{Answers, LevelSurface, MaterialSurface, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{ClosestPoints, LevelSurface, MaterialSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
@@ -40,7 +40,7 @@ pub struct AdvectedSystem<const D: usize> {
     pub(super) psi: ScalarKey,
     pub(super) columns: SurfaceColumns,
     pub(super) redistancing: LevelSurface<D>,
-    pub(super) answers: Answers<D>,
+    pub(super) answers: ClosestPoints<D>,
     pub(super) interrupt: Interrupt,
 }
 
@@ -104,7 +104,7 @@ impl<const D: usize> AdvectedSystem<D> {
                 particles.scalar_mut(columns.curvature)[i] = exact.curvature.unwrap_or(0.0);
             }
         }
-        let answers = Answers::default();
+        let answers = ClosestPoints::default();
         let redistancing = if let NeighborhoodChoice::Material { .. } = method.neighborhood {
             let (positions, level) = (particles.positions(), particles.scalar(psi));
             let surface = MaterialSurface::new(method.clone(), spacing, positions, level, &interrupt);
@@ -175,7 +175,7 @@ impl<const D: usize> AdvectedSystem<D> {
                 LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.parts.spacing)))
             }
         };
-        let (mut answers, mut phases) = (Answers::default(), Phases::new(CpuClock::still()));
+        let (mut answers, mut phases) = (ClosestPoints::default(), Phases::new(CpuClock::still()));
         let Self { parts, psi, columns, .. } = self;
         ask(&mut surface, parts, &self.particles, *psi, columns, &mut answers, interrupt, &mut phases)?;
         columns.store(&mut particles, *psi, &answers, parts.half_band);
@@ -192,7 +192,7 @@ fn ask<const D: usize>(
     particles: &Particles<D>,
     psi: ScalarKey,
     columns: &SurfaceColumns,
-    answers: &mut Answers<D>,
+    answers: &mut ClosestPoints<D>,
     interrupt: &Interrupt,
     phases: &mut Phases,
 ) -> Result<(), Interrupted> {

@@ -1,7 +1,7 @@
 //! Motion of the foot-points (GBPM 3.2).
 
 use super::foot_points::FootPoints;
-use crate::geometry::frame::{across, tangents};
+use crate::geometry::frame::{normal_to, tangents};
 use crate::geometry::{Flow, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, one_by_one};
 use crate::time::PathIntegrator;
@@ -93,8 +93,8 @@ pub(super) fn carry<const D: usize, const M: usize>(
                 let carried = |t: Vector<D>| integrator.advance(flow, &(*x + t * offset), time, step) - next;
                 *n = if D - M == 1 {
                     let frame = tangents::<D, M>(n);
-                    let side = across(&frame).dot(n).signum();
-                    across(&frame.map(carried)) * side
+                    let side = normal_to(&frame).dot(n).signum();
+                    normal_to(&frame.map(carried)) * side
                 } else {
                     carried(*n).normalize()
                 };

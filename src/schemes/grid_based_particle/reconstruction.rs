@@ -8,7 +8,7 @@ use super::motion::Law;
 use super::segments::{Segments, turned};
 use super::topology::{height_over, may_pass};
 use crate::geometry::Vector;
-use crate::geometry::frame::{self, Frame};
+use crate::geometry::frame::Frame;
 use crate::linear_algebra::least_squares::LeastSquares;
 use crate::neighbors::{CellList, Neighbor, NeighborSearch};
 
@@ -272,9 +272,9 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         room: &mut Room<D, M>,
     ) -> Result<FootPoint<D>, Failure> {
         if D - M == 1 {
-            self.fit_across::<1>(p, base, (&frame::about_normal(direction), terms), unit, room)
+            self.fit_across::<1>(p, base, (&Frame::from_normal(direction), terms), unit, room)
         } else {
-            self.fit_across::<MOST_ACROSS>(p, base, (&frame::about_tangent(direction), terms), unit, room)
+            self.fit_across::<MOST_ACROSS>(p, base, (&Frame::from_tangent(direction), terms), unit, room)
         }
     }
 
@@ -291,8 +291,8 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let inverse = 1.0 / unit;
         let local = |x: &Vector<D>| -> LocalPoint<M> {
             let d = (x - origin) * inverse;
-            let mut point: LocalPoint<M> = (frame.along.map(|t| t.dot(&d)), Default::default());
-            for (height, up) in point.1.iter_mut().zip(&frame.across) {
+            let mut point: LocalPoint<M> = (frame.tangents.map(|t| t.dot(&d)), Default::default());
+            for (height, up) in point.1.iter_mut().zip(&frame.normals) {
                 *height = up.dot(&d);
             }
             point
@@ -327,10 +327,10 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
             return Err(Failure::Unresolved);
         }
         let mut position = origin;
-        for (up, jet) in frame.across.iter().zip(&jets) {
+        for (up, jet) in frame.normals.iter().zip(&jets) {
             position += up * (jet.value * unit);
         }
-        for (t, s) in frame.along.iter().zip(s) {
+        for (t, s) in frame.tangents.iter().zip(s) {
             position += t * (s * unit);
         }
         let most = if beyond > 0.0 { MOST_LONELY } else { self.law.widest_bridge() };
@@ -375,7 +375,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         if length < NO_WAY * unit || room.chosen.iter().any(|j| is_ahead(*j)) {
             return false;
         }
-        let order = self.cells.order();
+        let order = self.cells.permutation();
         let cosine = |place: usize| self.feet.normals[order[place]].dot(n);
         let goes_on = |place: usize| is_ahead(order[place]) && self.agrees(last, order[place]);
         let is_other_side = |place: usize| OPPOSITE < cosine(place) && cosine(place) <= self.method.cosine;
@@ -394,8 +394,8 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         }
         room.slopes.extend(room.chosen.iter().map(|j| {
             let n = &self.feet.normals[*j];
-            let up = frame.across[0].dot(n);
-            (up > STEEPEST).then(|| frame.along.map(|t| -t.dot(n) / up))
+            let up = frame.normals[0].dot(n);
+            (up > STEEPEST).then(|| frame.tangents.map(|t| -t.dot(n) / up))
         }));
     }
 
@@ -434,17 +434,17 @@ fn shape_of<const D: usize, const M: usize, const C: usize>(
     let jet = &jets[0];
     if C == 1 {
         let (flat, rise) = jet.normal();
-        let mut direction = frame.across[0] * rise;
-        for (t, part) in frame.along.iter().zip(flat) {
+        let mut direction = frame.normals[0] * rise;
+        for (t, part) in frame.tangents.iter().zip(flat) {
             direction += t * part;
         }
         let (curvature, gauss_curvature) = (jet.curvature(), jet.gauss_curvature());
         return LocalShape { direction, curvature, gauss_curvature, sharpest: jet.sharpest() };
     }
     // r′ = (1, f′), r″ = (0, f″); κ = |r″ across r′|/|r′|².
-    let mut direction = frame.along[0];
+    let mut direction = frame.tangents[0];
     let mut bend = Vector::<D>::zeros();
-    for (up, jet) in frame.across.iter().zip(jets) {
+    for (up, jet) in frame.normals.iter().zip(jets) {
         direction += up * jet.first[0];
         bend += up * jet.second[0][0];
     }

@@ -262,7 +262,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
         let Some(node) = self.refinement.leaf_at(grid, position) else { return false };
         let spacing = grid.spacing_of(node).max(grid.spacing_of(self.feet.nodes[i]));
         let covered = if self.at_gap[i] { SAME } else { COVERED[M - 1] };
-        let order = self.fresh_cells.order();
+        let order = self.fresh_cells.permutation();
         self.fresh_cells.any_within(position, covered * spacing, |place| {
             self.fresh.normals[order[place]].dot(normal) > self.parts.method.cosine
         })

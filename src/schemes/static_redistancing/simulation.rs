@@ -140,7 +140,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
     }
 
     fn observables(&self) -> Observables {
-        let counts = &self.system.redistancing.soundness().counts;
+        let counts = &self.system.redistancing.fit_diagnostics().counts;
         let errors = self.errors();
         let of_phi =
             |norm: &str| errors.iter().find(|e| e.quantity == "phi" && e.norm == norm).map_or(f64::NAN, |e| e.value);
@@ -164,9 +164,9 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let Clock { step, time } = self.clock();
         let mut state = State { step, time, ..State::default() };
         state.push_particles(&self.system.particles);
-        let soundness = self.system.redistancing.soundness();
-        state.push_counts("rescues", soundness.counts.entries().iter().map(|e| e.1).collect());
-        state.push_reals("worst_condition", &[soundness.worst_condition]);
+        let fit_diagnostics = self.system.redistancing.fit_diagnostics();
+        state.push_counts("rescues", fit_diagnostics.counts.entries().iter().map(|e| e.1).collect());
+        state.push_reals("worst_condition", &[fit_diagnostics.worst_condition]);
         if let Source::Grid(remeshing) = &self.system.source {
             state.push_reals("remeshed_level", remeshing.values());
         }
@@ -177,9 +177,9 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         if state.step > self.fixed.steps {
             return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
         }
-        let soundness = self.system.redistancing.soundness_mut();
+        let fit_diagnostics = self.system.redistancing.fit_diagnostics_mut();
         let (rescues, condition) = (state.counts("rescues")?, state.reals("worst_condition")?);
-        crate::simulation::state::check_length("rescues", rescues.len(), soundness.counts.entries().len())?;
+        crate::simulation::state::check_length("rescues", rescues.len(), fit_diagnostics.counts.entries().len())?;
         crate::simulation::state::check_length("worst_condition", condition.len(), 1)?;
         if let Source::Grid(remeshing) = &mut self.system.source {
             let values = state.reals("remeshed_level")?;
@@ -187,15 +187,15 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
             remeshing.restore(values);
         }
         state.pull_particles(&mut self.system.particles)?;
-        soundness.counts.restore(rescues);
-        soundness.worst_condition = condition[0];
+        fit_diagnostics.counts.restore(rescues);
+        fit_diagnostics.worst_condition = condition[0];
         self.step = state.step;
         Ok(())
     }
 
     fn report(&self) -> Report {
         let errors = self.errors();
-        closest_point_report(self.system.redistancing.soundness(), errors, self.health(), self.method.clone())
+        closest_point_report(self.system.redistancing.fit_diagnostics(), errors, self.health(), self.method.clone())
     }
 
     fn phases(&self) -> &Phases {
@@ -204,7 +204,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
 
     fn health(&self) -> Health {
         let finite = self.system.particles.scalar(self.system.columns.phi).iter().all(|v| v.is_finite());
-        let rescued_fits = rescued(&self.system.redistancing.soundness().counts);
+        let rescued_fits = rescued(&self.system.redistancing.fit_diagnostics().counts);
         Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits }
     }
 

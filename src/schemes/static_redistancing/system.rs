@@ -1,7 +1,7 @@
 //! The particles of a static redistancing and what is asked of them.
 
 use super::remeshing::{Remeshing, RemeshingKernel};
-use crate::closest_point::{Answers, LevelSurface, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{ClosestPoints, LevelSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::Interrupt;
@@ -40,7 +40,7 @@ pub struct StaticSystem<const D: usize> {
     pub(super) source: Source<D>,
     pub(super) initial: InitialLevel<D>,
     pub(super) redistancing: LevelSurface<D>,
-    pub(super) answers: Answers<D>,
+    pub(super) answers: ClosestPoints<D>,
     pub(super) interrupt: Interrupt,
 }
 
@@ -97,7 +97,7 @@ impl<const D: usize> StaticSystem<D> {
         interrupt: Interrupt,
     ) -> Self {
         let StaticParts { spacing, half_band, ref method, remeshing, .. } = parts;
-        let of_nodes = half_band.max(method.reach_h::<D>() * spacing);
+        let of_nodes = half_band.max(method.fit_band_h::<D>() * spacing);
         let reach = of_nodes + remeshing.map_or(0.0, |kernel| kernel.reach_h::<D>() * spacing);
         let (low, high) = surface.bounding_box();
         let margin = reach + spacing;
@@ -135,7 +135,7 @@ impl<const D: usize> StaticSystem<D> {
         let mut particles = Particles::new(points);
         let level = particles.add_scalar("level", 0.0);
         let columns = SurfaceColumns::add(&mut particles);
-        let answers = Answers::default();
+        let answers = ClosestPoints::default();
         Self {
             surface,
             spacing,
@@ -182,7 +182,7 @@ impl<const D: usize> StaticSystem<D> {
             source,
             initial: InitialLevel::Distance,
             redistancing,
-            answers: Answers::default(),
+            answers: ClosestPoints::default(),
             interrupt,
         }
     }

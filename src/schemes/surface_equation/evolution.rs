@@ -6,7 +6,7 @@ use super::cloud::SurfaceCloud;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
 use super::reactions::Reaction;
-use super::solver::{Factors, Solver, Storage};
+use super::solver::{Factors, Solver, Workspace};
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::Interruptible;
 use crate::parallel::Interrupt;
@@ -69,7 +69,7 @@ pub struct Evolution {
     inner_step: f64,
     pair: EmbeddedPair,
     implicit: Option<(f64, SparseRows, Factors)>,
-    storage: Storage,
+    storage: Workspace,
     right: Vec<f64>,
     /// Steps of the pair that were tried.
     attempts: u64,
@@ -91,7 +91,7 @@ impl Evolution {
             inner_step: 0.0,
             pair: EmbeddedPair::default(),
             implicit: None,
-            storage: Storage::default(),
+            storage: Workspace::default(),
             right: Vec::new(),
             attempts: 0,
             iterations: 0,
@@ -115,7 +115,7 @@ impl Evolution {
         let reaction = parts.reaction.as_ref();
         let mut slope = |u: &[f64], time: f64, out: &mut [f64]| slopes(operator, reaction, u, time, out);
         let EvolutionIntegrator::Controlled { tolerance } = parts.integrator else {
-            pair.attempt(values, from.time, to.time, &mut slope);
+            pair.try_step(values, from.time, to.time, &mut slope);
             pair.accept(values);
             *attempts += 1;
             return Ok(());
@@ -132,7 +132,7 @@ impl Evolution {
             // Two equal steps rather than a whole one and a sliver.
             let end = if is_last { to.time } else { time + inner_step.min(0.5 * rest) };
             let length = end - time;
-            let error = pair.attempt(values, time, end, &mut slope);
+            let error = pair.try_step(values, time, end, &mut slope);
             *attempts += 1;
             // What is no number may become one in a shorter step.
             let factor = if error.is_nan() { 0.2 } else { SAFETY * (tolerance / error.max(1e-300)).powf(0.2) };
@@ -381,7 +381,7 @@ impl<const D: usize> Problem<D> for Evolution {
         self.peaks.copy_from_slice(peaks);
         (self.inner_step, self.rate) = (inner[0], rate[0]);
         (self.attempts, self.iterations) = (work[0], work[1]);
-        self.pair.forget();
+        self.pair.discard_slope();
         self.implicit = None;
         Ok(())
     }

@@ -4,7 +4,7 @@ use super::cloud::SurfaceCloud;
 use crate::linear_algebra::SparseRows;
 use crate::operators::charts::tangent::Metric;
 use crate::operators::{
-    Construction, Functional, NormalCopies, Soundness, Support, TangentChart, charts::Heights, construct,
+    Construction, Functional, NormalCopies, Support, SupportDiagnostics, TangentChart, charts::Heights, construct,
 };
 use crate::parallel::{Interrupt, Interrupted};
 
@@ -51,7 +51,7 @@ pub struct Operators {
     /// κ = ∇·n and the Gauss curvature of the fitted surface, where heights were fitted.
     pub curvatures: Option<Vec<[f64; 2]>>,
     /// What became of the points.
-    pub soundness: Soundness,
+    pub fit_diagnostics: SupportDiagnostics,
 }
 
 impl Method {
@@ -96,7 +96,7 @@ fn functionals<const M: usize>(wanted: &[Wanted]) -> Vec<Functional<M>> {
 }
 
 fn operators<const M: usize>(built: Construction<M>, curvatures: Option<Vec<[f64; 2]>>) -> Operators {
-    Operators { rows: built.operators, curvatures, soundness: built.soundness }
+    Operators { rows: built.operators, curvatures, fit_diagnostics: built.fit_diagnostics }
 }
 
 /// ∇·n = −g^ab h_ab/√det g and K = det h_ab/(det g)² of a graph over its plane.

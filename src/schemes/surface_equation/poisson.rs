@@ -3,7 +3,7 @@
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
-use super::solver::{Solver, Storage};
+use super::solver::{Solver, Workspace};
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::{Convergence, Interruptible, LinearMap, WithMean};
 use crate::schemes::measured_errors::{against_exact, entry};
@@ -96,7 +96,7 @@ impl<const D: usize> Problem<D> for Poisson {
         let factors = phases.measure("solver/factors", || self.solver.factors(&rows, alpha)).map_err(unsolved)?;
         let value = &mut self.value;
         self.convergence = phases
-            .measure("solver/solution", || self.solver.solve(map, &factors, &right, value, &mut Storage::default()));
+            .measure("solver/solution", || self.solver.solve(map, &factors, &right, value, &mut Workspace::default()));
         interrupt.check()?;
         if let Some(reason) = self.solver.failure(self.convergence) {
             return Err(unsolved(reason));

@@ -4,7 +4,7 @@ use super::cloud::SurfaceCloud;
 use super::method::{Form, Method, Operators};
 use super::problem::{Problem, Tools};
 use crate::linear_algebra::SparseRows;
-use crate::operators::{Soundness, Support};
+use crate::operators::{Support, SupportDiagnostics};
 use crate::parallel::Interrupt;
 use crate::simulation::report::Newton;
 use crate::simulation::state::check_length;
@@ -20,7 +20,7 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     method: Method,
     problem: Box<dyn Problem<D>>,
     operators: Option<Operators>,
-    soundness: Soundness,
+    fit_diagnostics: SupportDiagnostics,
     /// Points whose curvature is too large for their support.
     coarse: u64,
     fixed: FixedStep,
@@ -60,14 +60,14 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
         interrupt: Interrupt,
         cpu_clock: CpuClock,
     ) -> Self {
-        let soundness = Soundness::none();
+        let fit_diagnostics = SupportDiagnostics::default();
         let phases = Phases::new(cpu_clock);
         Self {
             cloud,
             method,
             problem,
             operators: None,
-            soundness,
+            fit_diagnostics,
             coarse: 0,
             fixed,
             step: 0,
@@ -97,7 +97,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
 
     /// 1. Operators, where there are none yet: a row for every point. 2. The problem's step. 3. A look at the numbers.
     fn step(&mut self) -> Result<(), StepError> {
-        let Self { cloud, method, problem, operators, phases, interrupt, soundness, coarse, fixed, .. } = self;
+        let Self { cloud, method, problem, operators, phases, interrupt, fit_diagnostics, coarse, fixed, .. } = self;
         let (from, to) = (fixed.clock(self.step), fixed.clock(self.step + 1));
         let operators = match operators {
             Some(operators) => operators,
@@ -105,9 +105,9 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
                 let wanted = problem.wanted();
                 let build = || method.build::<D, M>(cloud, &wanted, interrupt);
                 let built = phases.measure("operators/construction", build)?;
-                (*soundness, *coarse) = (built.soundness, coarse_points(cloud, method, &built));
-                if let Some(first) = soundness.first_failed {
-                    let (failed, Clock { step, time }) = (soundness.failed, to);
+                (*fit_diagnostics, *coarse) = (built.fit_diagnostics, coarse_points(cloud, method, &built));
+                if let Some(first) = fit_diagnostics.first_failed {
+                    let (failed, Clock { step, time }) = (fit_diagnostics.failed, to);
                     let reason = format!(
                         "the moment conditions of {failed} of {} points cannot be met, the first is point {first}; a larger \
                          cutoff_dn or relaxed sampling helps",
@@ -154,10 +154,10 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         let Clock { step, time } = self.clock();
         let mut state = State { step, time, ..State::default() };
         self.problem.save(&mut state);
-        let (counts, least_pivot) = self.soundness.to_numbers();
+        let (counts, min_pivot) = self.fit_diagnostics.to_numbers();
         state.push_counts("soundness", counts.to_vec());
         state.push_counts("coarse", vec![self.coarse]);
-        state.push_reals("least_pivot", &[least_pivot]);
+        state.push_reals("least_pivot", &[min_pivot]);
         state
     }
 
@@ -171,7 +171,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         check_length("coarse", coarse.len(), 1)?;
         check_length("least_pivot", pivot.len(), 1)?;
         self.problem.load(state)?;
-        self.soundness = Soundness::from_numbers([counts[0], counts[1], counts[2], counts[3]], pivot[0]);
+        self.fit_diagnostics = SupportDiagnostics::from_numbers([counts[0], counts[1], counts[2], counts[3]], pivot[0]);
         self.coarse = coarse[0];
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
@@ -189,7 +189,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
             Form::Intrinsic { .. } => "tangent planes".to_owned(),
             Form::Copies { layers, spacing } => format!("{layers} copies to either side, {spacing:.6} apart"),
         };
-        let Soundness { enlarged, low_rank, unresolved, failed, least_pivot, .. } = self.soundness;
+        let SupportDiagnostics { enlarged, low_rank, unresolved, failed, min_pivot, .. } = self.fit_diagnostics;
         let rescued = [
             ("supports.larger_radius", enlarged),
             ("supports.low_rank", low_rank),
@@ -207,7 +207,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         Report {
             errors: self.problem.errors(&self.cloud, self.clock()),
             health: self.health(),
-            worst_condition: 1.0 / least_pivot,
+            worst_condition: 1.0 / min_pivot,
             rescued_fits: rescued.into_iter().filter(|(_, count)| *count > 0).collect(),
             newton: Newton::default(),
             method,
@@ -220,7 +220,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
 
     fn health(&self) -> Health {
         let finite = self.problem.watched().iter().all(|(_, values)| values.iter().all(|value| value.is_finite()));
-        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits: self.soundness.rescued() }
+        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits: self.fit_diagnostics.rescued() }
     }
 
     fn particle_count(&self) -> usize {

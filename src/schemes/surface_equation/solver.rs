@@ -29,23 +29,23 @@ pub(super) enum Factors {
 
 /// Vectors of solutions, to be used again.
 #[derive(Debug, Default)]
-pub(super) struct Storage {
-    bicgstab: bicgstab::Storage,
-    gmres: gmres::Storage,
-    room: Vec<f64>,
+pub(super) struct Workspace {
+    bicgstab: bicgstab::Workspace,
+    gmres: gmres::Workspace,
+    scratch: Vec<f64>,
 }
 
 /// What a direct solution must leave at most: it has no iterations that could be stopped.
-const DIRECT: Stopping = Stopping { tolerance: 1e-10, most_iterations: 1 };
+const DIRECT: Stopping = Stopping { tolerance: 1e-10, max_iterations: 1 };
 
 impl Solver {
     /// Factors of A; a direct solver's are those of A + α 1 1ᵀ/n.
     pub(super) fn factors(&self, rows: &SparseRows, alpha: Option<f64>) -> Result<Factors, String> {
         match self {
-            Self::SparseLu => {
-                SparseLu::of(rows, alpha).map(|lu| Factors::Complete(Box::new(lu))).map_err(|failed| failed.to_string())
-            }
-            _ => IncompleteFactors::of(rows).map(Factors::Incomplete).map_err(|failed| failed.to_string()),
+            Self::SparseLu => SparseLu::from_rows(rows, alpha)
+                .map(|lu| Factors::Complete(Box::new(lu)))
+                .map_err(|failed| failed.to_string()),
+            _ => IncompleteFactors::from_rows(rows).map(Factors::Incomplete).map_err(|failed| failed.to_string()),
         }
     }
 
@@ -56,9 +56,9 @@ impl Solver {
         factors: &Factors,
         b: &[f64],
         x: &mut [f64],
-        storage: &mut Storage,
+        workspace: &mut Workspace,
     ) -> Convergence {
-        let Storage { bicgstab, gmres, room } = storage;
+        let Workspace { bicgstab, gmres, scratch } = workspace;
         match (self, factors) {
             (Self::Gmres { restart, stopping }, Factors::Incomplete(factors)) => {
                 gmres::solve(map, factors, b, x, *restart, *stopping, gmres)
@@ -66,7 +66,7 @@ impl Solver {
             (_, Factors::Incomplete(factors)) => bicgstab::solve(map, factors, b, x, self.stopping(), bicgstab),
             (_, Factors::Complete(factors)) => {
                 factors.solve(b, x);
-                Convergence::of(map, b, x, 1, room)
+                Convergence::from_solution(map, b, x, 1, scratch)
             }
         }
     }

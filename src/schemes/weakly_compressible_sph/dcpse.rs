@@ -3,7 +3,7 @@
 
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::CellList;
-use crate::operators::{Evaluation, FlatChart, Functional, Soundness, Support};
+use crate::operators::{Evaluation, FlatChart, Functional, Support, SupportDiagnostics};
 use crate::parallel::{Interrupt, Interrupted};
 
 /// Fits and their fields.
@@ -14,7 +14,7 @@ pub(super) struct DcpseFlow<const D: usize> {
     velocity: [Vec<f64>; D],
     /// Of a particle: ∂_a of the velocities and the pressure, axis by axis, then their Laplacians.
     found: Vec<f64>,
-    pub soundness: Soundness,
+    pub fit_diagnostics: SupportDiagnostics,
 }
 
 /// What is found at a particle.
@@ -37,7 +37,7 @@ impl<const D: usize> DcpseFlow<D> {
             found: vec![0.0; count * evaluation.numbers(D + 1)],
             evaluation,
             velocity: std::array::from_fn(|_| vec![0.0; count]),
-            soundness: Soundness::none(),
+            fit_diagnostics: SupportDiagnostics::default(),
         }
     }
 
@@ -59,7 +59,7 @@ impl<const D: usize> DcpseFlow<D> {
             *field = column;
         }
         let found = self.evaluation.evaluate(&chart, &fields[..=D], &mut self.found, interrupt)?;
-        self.soundness.add(&found);
+        self.fit_diagnostics.add(&found);
         Ok(())
     }
 

@@ -27,7 +27,7 @@ pub(super) struct Hydrodynamics<const D: usize> {
     epsilon: f64,
     kernel: KernelChoice,
     /// σ/ε^D.
-    normalisation: f64,
+    normalization: f64,
     /// The volume of a particle at rest, h^D.
     cell: f64,
     x: [Column; D],
@@ -50,7 +50,7 @@ impl<const D: usize> Hydrodynamics<D> {
             skin,
             epsilon,
             kernel: parts.kernel,
-            normalisation: parts.kernel.normalisation(D) / epsilon.powi(D as i32),
+            normalization: parts.kernel.normalization(D) / epsilon.powi(D as i32),
             cell,
             // Those that are used together are next to each other.
             x: from_fn(Column::new),
@@ -62,7 +62,7 @@ impl<const D: usize> Hydrodynamics<D> {
 
     /// Whether there are lists at all.
     pub fn is_listed(&self) -> bool {
-        self.pencils.places() > 0
+        self.pencils.slot_count() > 0
     }
 
     /// Whether the lists no longer cover everybody in reach.
@@ -75,7 +75,7 @@ impl<const D: usize> Hydrodynamics<D> {
     /// Lists neighbours anew, of the positions in `reference`.
     pub fn list(&mut self, reference: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
         self.pencils.rebuild(reference, interrupt)?;
-        let places = self.pencils.places();
+        let places = self.pencils.slot_count();
         for column in &mut self.sums {
             column.resize(places);
         }
@@ -86,7 +86,7 @@ impl<const D: usize> Hydrodynamics<D> {
     pub fn take_positions(&mut self, positions: &[Vector<D>], reference: &[Vector<D>]) {
         let (domain, inverse) = (&self.domain, 1.0 / self.epsilon);
         for (d, column) in self.x.iter_mut().enumerate() {
-            column.refill(self.pencils.by_place(FAR, |i| {
+            column.refill(self.pencils.by_slot(FAR, |i| {
                 let from = &reference[i];
                 (from[d] + domain.displacement(from, &positions[i])[d]) * inverse
             }));
@@ -95,7 +95,7 @@ impl<const D: usize> Hydrodynamics<D> {
 
     fn gather_vectors(&mut self, factor: f64, value: impl Fn(usize) -> Vector<D>) {
         for (d, column) in self.u.iter_mut().enumerate() {
-            column.refill(self.pencils.by_place(0.0, |i| value(i)[d] * factor));
+            column.refill(self.pencils.by_slot(0.0, |i| value(i)[d] * factor));
         }
     }
 
@@ -105,7 +105,7 @@ impl<const D: usize> Hydrodynamics<D> {
     }
 
     fn gather(&mut self, slot: usize, nobodys: f64, value: impl Fn(usize) -> f64) {
-        self.scalars[slot].refill(self.pencils.by_place(nobodys, value));
+        self.scalars[slot].refill(self.pencils.by_slot(nobodys, value));
     }
 
     /// The volume of every particle by summation, 1/Σ W.
@@ -115,7 +115,7 @@ impl<const D: usize> Hydrodynamics<D> {
         with_kernel!(self.kernel, K => sum_kernel::<K, D>(&self.pencils, &columns, inverse, &mut self.sums, interrupt))?;
         let own = self.kernel.value(0.0);
         for (place, i) in self.pencils.occupied() {
-            volume[i] = 1.0 / (self.normalisation * (own + self.sums[0][place]));
+            volume[i] = 1.0 / (self.normalization * (own + self.sums[0][place]));
         }
         Ok(())
     }
@@ -151,7 +151,7 @@ impl<const D: usize> Hydrodynamics<D> {
             sum_forces::<K, D, 3>(pencils, &columns, inverse, forces_of, interrupt)
         })?;
         // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
-        let factor = self.cell * self.cell * self.normalisation * self.kernel.slope() / self.epsilon;
+        let factor = self.cell * self.cell * self.normalization * self.kernel.slope() / self.epsilon;
         for (place, i) in pencils.occupied() {
             forces[i] = self.vector(place) * factor;
         }
@@ -197,7 +197,7 @@ impl<const D: usize> Hydrodynamics<D> {
             (false, 2) => sum_rates::<K, D, 6, 4>(pencils, &other, inverse, viscosity, rates, interrupt),
             (false, _) => sum_rates::<K, D, 6, 5>(pencils, &other, inverse, viscosity, rates, interrupt),
         })?;
-        let gradient = self.normalisation * self.kernel.slope() / self.epsilon;
+        let gradient = self.normalization * self.kernel.slope() / self.epsilon;
         for (place, i) in pencils.occupied() {
             let [compression, spread] = [self.sums[D][place], self.sums[D + 1][place]];
             let fluid = fluid(i);
@@ -226,7 +226,7 @@ impl<const D: usize> Hydrodynamics<D> {
         with_kernel!(self.kernel, K => {
             sum_concentration::<K, D>(pencils, &columns, inverse, at_spacing, sums, interrupt)
         })?;
-        let factor = self.cell * self.normalisation * self.kernel.slope() / self.epsilon;
+        let factor = self.cell * self.normalization * self.kernel.slope() / self.epsilon;
         for (place, i) in pencils.occupied() {
             found(i, self.vector(place) * factor);
         }
@@ -245,7 +245,7 @@ impl<const D: usize> Hydrodynamics<D> {
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         let (by_cell, inverse, slope) = (1.0 / self.cell, 1.0 / self.epsilon, self.kernel.slope());
-        let kernel = self.normalisation * self.cell;
+        let kernel = self.normalization * self.cell;
         self.gather(0, 0.0, |i| volume[i] * by_cell * f64::from(is_inside[i]));
         self.gather(1, 0.0, |i| volume[i] * by_cell);
         let columns = Columns { vectors: [slices(&self.x)], scalars: slices::<1>(&self.scalars) };

@@ -3,7 +3,7 @@
 //! Only particles near it take part: they are selected when neighbours are, with a margin that covers what anybody moves
 //! until the next time.
 
-use crate::closest_point::{Answers, LevelSurface, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{ClosestPoints, LevelSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::CellList;
 use crate::parallel::{Interrupt, Interrupted};
@@ -31,14 +31,14 @@ pub(super) struct Interface<const D: usize> {
     positions: Vec<Vector<D>>,
     level: Vec<f64>,
     normals: Vec<Vector<D>>,
-    answers: Answers<D>,
+    answers: ClosestPoints<D>,
     /// Curvatures that were cut to 1/h.
     pub bounded: u64,
 }
 
 impl<const D: usize> Interface<D> {
     pub fn new(method: PcpMethod, domain: &Domain<D>, spacing: f64, half_band: f64) -> Self {
-        let keep = half_band.max(method.reach_h::<D>() * spacing) + MARGIN_H * spacing;
+        let keep = half_band.max(method.fit_band_h::<D>() * spacing) + MARGIN_H * spacing;
         Self {
             surface: LevelSurface::Spatial(Box::new(Redistancing::new(method, domain.clone(), spacing))),
             spacing,
@@ -51,7 +51,7 @@ impl<const D: usize> Interface<D> {
             positions: Vec::new(),
             level: Vec::new(),
             normals: Vec::new(),
-            answers: Answers::default(),
+            answers: ClosestPoints::default(),
             bounded: 0,
         }
     }
@@ -72,13 +72,13 @@ impl<const D: usize> Interface<D> {
     pub fn select(&mut self, particles: &Particles<D>, columns: &SurfaceColumns, flags: &mut [u8]) {
         let (positions, phi) = (particles.positions(), particles.scalar(columns.phi));
         self.cells.rebuild(positions.iter().copied(), self.keep + NEAR_H * self.spacing);
-        let (starts, order) = (self.cells.starts(), self.cells.order());
+        let (starts, order) = (self.cells.starts(), self.cells.permutation());
         let near = NEAR_H * self.spacing;
         self.marks.clear();
         self.marks.extend(
             starts.windows(2).map(|ends| u8::from(order[ends[0]..ends[1]].iter().any(|i| phi[*i].abs() <= near))),
         );
-        self.cells.spread(&mut self.marks, &mut self.before);
+        self.cells.spread_marks(&mut self.marks, &mut self.before);
         flags.fill(0);
         for (cell, mark) in self.marks.iter().enumerate() {
             if *mark != 0 {

@@ -55,8 +55,8 @@ impl KernelChoice {
 
     /// σ_D.
     #[must_use]
-    pub fn normalisation(self, dimension: usize) -> f64 {
-        with_kernel!(self, K => K::normalisation(dimension))
+    pub fn normalization(self, dimension: usize) -> f64 {
+        with_kernel!(self, K => K::normalization(dimension))
     }
 
     /// The factor of its slopes.

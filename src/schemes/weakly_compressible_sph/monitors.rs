@@ -1,7 +1,7 @@
 //! What a series shows of two fluids, and what a report makes of it.
 
 use super::system::SphSystem;
-use crate::closest_point::enclosed_measure::{EnclosedMoments, enclosed_moments};
+use crate::closest_point::enclosed_moments::{EnclosedMoments, enclosed_moments};
 use crate::geometry::Vector;
 use crate::geometry::domain::Axis;
 use crate::neighbors::{CellList, NeighborSearch};
@@ -128,8 +128,8 @@ impl<const D: usize> SphSystem<D> {
         let (mean, deviation) = self.curvature_spread();
         row.extend([mean, deviation]);
         let nothing = Vector::<D>::repeat(f64::NAN);
-        row.push(moments.map_or(f64::NAN, |m| m.measure));
-        row.extend(moments.map_or(nothing, EnclosedMoments::centre).iter());
+        row.push(moments.map_or(f64::NAN, |m| m.area_or_volume));
+        row.extend(moments.map_or(nothing, EnclosedMoments::center).iter());
         row.extend(moments.map_or(nothing, |m| m.high - m.low).iter());
         row.push(moments.map_or(f64::NAN, deformation));
         let [(inside, inside_full), (outside, _)] = self.mean_pressures();

@@ -5,9 +5,9 @@ use super::monitors::{Row, deformation, names};
 use super::summary::Summary;
 use super::system::{EvaluationError, SphSystem};
 use super::time_step::longest_step;
-use crate::closest_point::Soundness;
+use crate::closest_point::FitDiagnostics;
 use crate::geometry::Vector;
-use crate::operators::Soundness as FitSoundness;
+use crate::operators::SupportDiagnostics;
 use crate::schemes::measured_errors::{closest_point_report, rescued};
 use crate::simulation::state::check_length;
 use crate::simulation::{
@@ -120,7 +120,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             && let Some(moments) = self.system.moments()?
         {
             // Of a drop that is known by its particles alone, the first quadrature says what is to be kept.
-            self.system.initial_measure = moments.measure;
+            self.system.initial_measure = moments.area_or_volume;
             self.system.renew_ball_curvatures();
             self.system.evaluate(0.0, false, &mut self.phases).map_err(|error| failed(error, start))?;
         }
@@ -150,7 +150,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let numbers = [jump, of("pressure_eos_jump"), of("curvature_mean"), of("curvature_std"), momentum];
         self.summary.take(time >= 0.8 * self.end().time, numbers);
         if let Some(moments) = moments {
-            let turned = self.summary.take_shape(time, moments.measure, deformation(&moments));
+            let turned = self.summary.take_shape(time, moments.area_or_volume, deformation(&moments));
             if let Some((name, message)) = turned {
                 self.findings.push(Finding { name, message, time });
             }
@@ -229,12 +229,12 @@ fn failed(error: EvaluationError, at: Clock) -> StepError {
 }
 
 /// What was counted of the fits of the flow.
-fn fits_of(state: &State) -> Result<FitSoundness, RestoreError> {
+fn fits_of(state: &State) -> Result<SupportDiagnostics, RestoreError> {
     let (counts, pivot) = (state.counts("flow")?, state.reals("flow_pivot")?);
     check_length("flow_pivot", pivot.len(), 1)?;
     let of_length: Result<[u64; 4], _> = counts.try_into();
     let length = |_| RestoreError::Length { name: "flow".to_owned(), got: counts.len(), expected: 4 };
-    Ok(FitSoundness::from_numbers(of_length.map_err(length)?, pivot[0]))
+    Ok(SupportDiagnostics::from_numbers(of_length.map_err(length)?, pivot[0]))
 }
 
 impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
@@ -325,9 +325,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         state.push_counts("droplet", flags(&system.droplet));
         state.push_reals("ball_curvatures", &system.ball_curvatures);
         let (counts, condition, bounded) = system.interface.as_ref().map_or((Vec::new(), 0.0, 0), |interface| {
-            let soundness = interface.surface.soundness();
-            let counts = soundness.counts.entries().iter().map(|e| e.1).collect();
-            (counts, soundness.worst_condition, interface.bounded)
+            let fit_diagnostics = interface.surface.fit_diagnostics();
+            let counts = fit_diagnostics.counts.entries().iter().map(|e| e.1).collect();
+            (counts, fit_diagnostics.worst_condition, interface.bounded)
         });
         state.push_counts("rescues", counts);
         state.push_counts("counters", vec![self.parts_of_step, self.resting, bounded, system.strays.absorbed]);
@@ -338,9 +338,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         // What is not known is no number, which a checkpoint's arrays of numbers would not hold: their bits are kept.
         state.push_counts("row", self.row.iter().map(|v| v.to_bits()).collect());
         if let Some(flow) = &system.dcpse {
-            let (counts, least_pivot) = flow.soundness.to_numbers();
+            let (counts, min_pivot) = flow.fit_diagnostics.to_numbers();
             state.push_counts("flow", counts.to_vec());
-            state.push_reals("flow_pivot", &[least_pivot]);
+            state.push_reals("flow_pivot", &[min_pivot]);
         }
         let summary = self.summary.to_numbers(self.pace.end_time);
         state.push_counts("summary", summary.iter().map(|v| v.to_bits()).collect());
@@ -372,7 +372,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         }
         let (rescues, counters, monitors) =
             (state.counts("rescues")?, state.counts("counters")?, state.reals("monitors")?);
-        let entries = self.system.interface.as_ref().map_or(0, |i| i.surface.soundness().counts.entries().len());
+        let entries = self.system.interface.as_ref().map_or(0, |i| i.surface.fit_diagnostics().counts.entries().len());
         check_length("rescues", rescues.len(), entries)?;
         check_length("counters", counters.len(), 4)?;
         check_length("monitors", monitors.len(), 3)?;
@@ -415,13 +415,13 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         system.initial_measure = monitors[2];
         system.strays.absorbed = counters[3];
         if let Some(interface) = &mut system.interface {
-            let soundness = interface.surface.soundness_mut();
-            soundness.counts.restore(rescues);
-            soundness.worst_condition = monitors[1];
+            let fit_diagnostics = interface.surface.fit_diagnostics_mut();
+            fit_diagnostics.counts.restore(rescues);
+            fit_diagnostics.worst_condition = monitors[1];
             interface.bounded = counters[2];
         }
         if let (Some(known), Some(flow)) = (flow, &mut system.dcpse) {
-            flow.soundness = known;
+            flow.fit_diagnostics = known;
         }
         // An interrupt ends the run before its next step.
         let _ = system.derive();
@@ -438,18 +438,19 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn report(&self) -> Report {
-        let nothing = Soundness::default();
-        let soundness = self.system.interface.as_ref().map_or(&nothing, |interface| interface.surface.soundness());
+        let nothing = FitDiagnostics::default();
+        let fit_diagnostics =
+            self.system.interface.as_ref().map_or(&nothing, |interface| interface.surface.fit_diagnostics());
         let whole = self.whole_curvature();
         let expected = (self.system.parts.tension * whole, whole, self.system.initial_measure);
         let errors = self.summary.entries(D, self.clock().time, expected);
-        let mut report = closest_point_report(soundness, errors, self.health(), self.method.clone());
+        let mut report = closest_point_report(fit_diagnostics, errors, self.health(), self.method.clone());
         if let Some(interface) = self.system.interface.as_ref().filter(|interface| interface.bounded > 0) {
             report.newton.rescued.insert("curvature.bounded", interface.bounded);
         }
         if let Some(flow) = &self.system.dcpse {
-            let found = &flow.soundness;
-            report.worst_condition = report.worst_condition.max(1.0 / found.least_pivot);
+            let found = &flow.fit_diagnostics;
+            report.worst_condition = report.worst_condition.max(1.0 / found.min_pivot);
             let counts = [
                 ("flow.larger_radius", found.enlarged),
                 ("flow.low_rank", found.low_rank),
@@ -469,13 +470,13 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn health(&self) -> Health {
-        let soundness = self.system.interface.as_ref().map(|interface| interface.surface.soundness());
-        let fits = self.system.dcpse.as_ref().map_or(0, |flow| flow.soundness.rescued());
+        let fit_diagnostics = self.system.interface.as_ref().map(|interface| interface.surface.fit_diagnostics());
+        let fits = self.system.dcpse.as_ref().map_or(0, |flow| flow.fit_diagnostics.rescued());
         Health {
             finite: self.system.velocity.iter().all(|u| u.iter().all(|c| c.is_finite())),
             max_cfl: self.max_cfl,
             volume_drift: self.summary.last_measure().map(|measure| measure / self.system.initial_measure - 1.0),
-            rescued_fits: fits + soundness.map_or(0, |soundness| rescued(&soundness.counts)),
+            rescued_fits: fits + fit_diagnostics.map_or(0, |fit_diagnostics| rescued(&fit_diagnostics.counts)),
         }
     }
 

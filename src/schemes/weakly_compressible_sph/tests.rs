@@ -68,7 +68,7 @@ impl<const D: usize> Setting<D> {
 
     fn w(&self, r: f64) -> f64 {
         let e = self.parts.smoothing_length;
-        self.parts.kernel.normalisation(D) / e.powi(D as i32) * self.parts.kernel.value(r / e)
+        self.parts.kernel.normalization(D) / e.powi(D as i32) * self.parts.kernel.value(r / e)
     }
 
     /// ∂W/∂r by a central difference of the value.

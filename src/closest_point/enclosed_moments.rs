@@ -1,85 +1,94 @@
-//! The area or volume inside the surface, its centre and second moments, by quadrature on the fitted polynomials.
+//! Area or volume inside the surface with its center and second moments, by quadrature on the fitted polynomials.
 //!
-//! A coarse grid of cells covers the samples. Cells away from the surface count whole or not at
-//! all; cells that it cuts are halved along every axis, and the smallest ones count the share that the
-//! tangent plane at the foot of their centre leaves inside, moved by the mean bend of the surface over the cell.
+//! A coarse grid covers the samples. Cells away from the surface count completely or not at all. Cells that the surface
+//! cuts are halved along every axis. The smallest cells count the share below the tangent plane at the foot point of
+//! their center, corrected by the mean curvature of the surface over the cell.
 
 use super::level_surface::LevelSurface;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
-/// Halvings of a cut cell: 2⁴ in 2D leaves a plane share with an error below (h/16)² per cut length; 3D stops earlier,
-/// since the number of cut cells grows with the square.
+/// Number of times that a cut cell is halved.
+///
+/// In 2D, 2⁴ parts leave an error below (h/16)² per length of the cut. In 3D there are fewer, since the number of cut
+/// cells grows with the square.
 const fn halvings(dimension: usize) -> u32 {
     if dimension == 2 { 4 } else { 1 }
 }
 
-/// Cells along the longest side of the samples' box before any is halved.
+/// Number of cells along the longest side of the bounding box of the samples, before any cell is halved.
 const COARSE_CELLS: f64 = 16.0;
 
-/// Moments of the inside.
+/// Moments of the enclosed area or volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnclosedMoments<const D: usize> {
-    /// Area or volume.
-    pub measure: f64,
-    /// ∫ x.
+    /// Enclosed area (2D) or volume (3D).
+    pub area_or_volume: f64,
+    /// First moments ∫ x dV.
     pub first: Vector<D>,
-    /// ∫ x_d², axis by axis.
+    /// Second moments ∫ x_d² dV, axis by axis.
     pub second: Vector<D>,
-    /// Lower corner of the box round the samples.
+    /// Lower corner of the bounding box of the samples.
     pub low: Vector<D>,
-    /// Upper corner.
+    /// Upper corner of the bounding box of the samples.
     pub high: Vector<D>,
 }
 
 impl<const D: usize> EnclosedMoments<D> {
-    fn nothing() -> Self {
+    /// The moments of an empty set.
+    fn zero() -> Self {
         let zero = Vector::<D>::zeros();
-        Self { measure: 0.0, first: zero, second: zero, low: zero, high: zero }
+        Self { area_or_volume: 0.0, first: zero, second: zero, low: zero, high: zero }
     }
 
+    /// Adds the moments of another set.
     fn add(&mut self, other: &Self) {
-        self.measure += other.measure;
+        self.area_or_volume += other.area_or_volume;
         self.first += other.first;
         self.second += other.second;
     }
 
-    /// Where it is.
+    /// Center of area or volume.
     #[must_use]
-    pub fn centre(&self) -> Vector<D> {
-        self.first / self.measure
+    pub fn center(&self) -> Vector<D> {
+        self.first / self.area_or_volume
     }
 
-    /// Central second moments, axis by axis, by the measure.
+    /// Central second moments divided by the area or volume, axis by axis.
     #[must_use]
     pub fn variance(&self) -> Vector<D> {
-        let centre = self.centre();
-        self.second / self.measure - centre.component_mul(&centre)
+        let center = self.center();
+        self.second / self.area_or_volume - center.component_mul(&center)
     }
 }
 
-/// The measure of all points with a negative level, for a bounded surface in an unbounded space.
+/// Area or volume of the set with negative level, for a bounded surface in an unbounded domain.
 ///
-/// Zero without samples. The sum runs over cells in a fixed order.
+/// It is zero without samples. The sum runs over cells in a fixed order.
 ///
 /// # Errors
-/// [`Interrupted`] when somebody asked to stop.
-pub fn enclosed_measure<const D: usize>(surface: &LevelSurface<D>, interrupt: &Interrupt) -> Result<f64, Interrupted> {
-    enclosed_moments(surface, |x| *x, interrupt).map(|moments| moments.measure)
+/// [`Interrupted`] when the interrupt is raised.
+pub fn enclosed_area_or_volume<const D: usize>(
+    surface: &LevelSurface<D>,
+    interrupt: &Interrupt,
+) -> Result<f64, Interrupted> {
+    enclosed_moments(surface, |x| *x, interrupt).map(|moments| moments.area_or_volume)
 }
 
-/// Measure and moments likewise. In a periodic space `unwrap` moves the points of the surface side by side again.
+/// Moments of the set with negative level.
+///
+/// In a periodic domain, `unwrap` must move the points of the surface to connected images.
 ///
 /// # Errors
-/// [`Interrupted`] when somebody asked to stop.
+/// [`Interrupted`] when the interrupt is raised.
 pub fn enclosed_moments<const D: usize>(
     surface: &LevelSurface<D>,
     unwrap: impl Fn(&Vector<D>) -> Vector<D>,
     interrupt: &Interrupt,
 ) -> Result<EnclosedMoments<D>, Interrupted> {
     if surface.is_lost() {
-        return Ok(EnclosedMoments::nothing());
+        return Ok(EnclosedMoments::zero());
     }
     let spacing = surface.spacing();
     let mut low = Vector::<D>::repeat(f64::INFINITY);
@@ -90,7 +99,7 @@ pub fn enclosed_moments<const D: usize>(
         high = high.sup(&x);
     }
     let extent = (low, high);
-    // Coarse cells that the surface does not cut are settled at one query each.
+    // A coarse cell that the surface does not cut costs a single query.
     let coarsening = ((high - low).max() / (COARSE_CELLS * spacing)).log2().ceil().max(0.0);
     let edge = spacing * coarsening.exp2();
     let halvings = halvings(D) + coarsening as u32;
@@ -106,7 +115,7 @@ pub fn enclosed_moments<const D: usize>(
                 corner[d] += (rest % counts[d]) as f64 * edge;
                 rest /= counts[d];
             }
-            let mut sum = EnclosedMoments::nothing();
+            let mut sum = EnclosedMoments::zero();
             for k in 0..counts[0] {
                 corner[0] = low[0] + k as f64 * edge;
                 if !interrupt.is_raised() {
@@ -117,7 +126,7 @@ pub fn enclosed_moments<const D: usize>(
         })
         .collect();
     interrupt.check()?;
-    let mut moments = EnclosedMoments::nothing();
+    let mut moments = EnclosedMoments::zero();
     for sum in &sums {
         moments.add(sum);
     }
@@ -125,7 +134,7 @@ pub fn enclosed_moments<const D: usize>(
     Ok(moments)
 }
 
-/// Adds the inside part of one cubic cell; a cut one counts at its centre.
+/// Adds the inside part of a cubic cell. The part of a cut cell is added at the center of the cell.
 fn inside_of_cell<const D: usize>(
     surface: &LevelSurface<D>,
     corner: &Vector<D>,
@@ -134,25 +143,26 @@ fn inside_of_cell<const D: usize>(
     sum: &mut EnclosedMoments<D>,
 ) {
     let whole = edge.powi(D as i32);
-    let centre = corner.add_scalar(0.5 * edge);
+    let center = corner.add_scalar(0.5 * edge);
     let half_diagonal = 0.5 * edge * (D as f64).sqrt();
-    let Some(foot) = surface.query(&centre, f64::INFINITY) else { return };
-    let mut add = |measure: f64| {
-        sum.measure += measure;
-        sum.first += centre * measure;
-        sum.second += centre.component_mul(&centre).add_scalar(edge * edge / 12.0) * measure;
+    let Some(foot) = surface.query(&center, f64::INFINITY) else { return };
+    let mut add = |area_or_volume: f64| {
+        sum.area_or_volume += area_or_volume;
+        sum.first += center * area_or_volume;
+        sum.second += center.component_mul(&center).add_scalar(edge * edge / 12.0) * area_or_volume;
     };
     if foot.distance >= half_diagonal {
-        if surface.is_inside(&centre, &foot) {
+        if surface.is_inside(&center, &foot) {
             add(whole);
         }
         return;
     }
     if halvings == 0 {
         let signed = if foot.is_outside { foot.distance } else { -foot.distance };
-        // The surface bends away from its tangent plane by κ ρ²/2, on the average over a section of the cell by κ edge²/24.
-        let bend = (foot.curvature * edge).clamp(-1.0, 1.0) / 24.0;
-        add(whole * share_below_plane(&foot.normal, signed / edge + bend));
+        // At the distance ρ the surface is κ ρ²/2 away from its tangent plane, on average κ edge²/24 over a section of
+        // the cell.
+        let mean_deviation = (foot.curvature * edge).clamp(-1.0, 1.0) / 24.0;
+        add(whole * share_below_plane(&foot.normal, signed / edge + mean_deviation));
         return;
     }
     let half = 0.5 * edge;
@@ -162,10 +172,10 @@ fn inside_of_cell<const D: usize>(
     }
 }
 
-/// The share of the unit cube about the origin with n·x + s < 0 for a unit normal n.
+/// Share of the unit cube, centered at the origin, with n·x + s < 0, where s = `signed`.
 ///
-/// By inclusion and exclusion over the corners: Σ ± max(0, −s − n·c)^D / (D! Π n_d), for the normal's components
-/// made positive; components near zero are lifted to keep the formula stable, at an error of their size.
+/// Inclusion and exclusion over the corners c gives Σ ± max(0, −s − n·c)^D / (D! Π n_d) for positive components of the
+/// normal. Components near zero are raised to 1e-4 to keep the formula stable, which costs an error of that size.
 fn share_below_plane<const D: usize>(normal: &Vector<D>, signed: f64) -> f64 {
     let n = normal.map(|c| c.abs().max(1e-4));
     let total: f64 = n.sum();
