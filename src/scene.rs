@@ -6,13 +6,11 @@
 pub mod check;
 pub mod cloud;
 pub mod json_schema;
-pub mod rows;
 pub mod schema;
 pub mod work;
 
 pub use check::{Violation, check};
 pub use cloud::{Cloud, CloudReference, CloudSizes, CloudSource, Clouds};
-pub use rows::Rows;
 pub use schema::{Default as DefaultValue, Kind, Parameter, Variant};
 pub use work::PhaseWork;
 
@@ -34,10 +32,8 @@ pub struct SceneKind {
     pub preset: fn(name: &str, given: &Map<String, Value>) -> Map<String, Value>,
     /// A small job body that runs in seconds.
     pub example: &'static str,
-    /// Short scenes by which a machine is measured: together they have every phase of the kind.
-    pub calibration: fn() -> Vec<Value>,
-    /// What the kind must show.
-    pub rows: fn() -> Rows,
+    /// Short scenes by which the speed of a machine is measured, as a JSON array. Together they have every phase of the kind.
+    pub calibration: &'static str,
     /// From checked parameters (all defaults present) to a scene.
     pub understand: fn(parameters: &Value) -> Understood,
 }

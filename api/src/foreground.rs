@@ -1,4 +1,7 @@
-//! `meniscus run` and `meniscus resume`: one job in this process, with a progress bar and no service.
+//! `meniscus run` and `meniscus resume`: one job, or the runs of a verification case, in this process, with a progress
+//! bar and no service.
+
+mod case;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus_jobs::formats::checkpoint;
@@ -7,9 +10,10 @@ use meniscus_jobs::spec::body::{self, Allowance, NoSources};
 use meniscus_jobs::spec::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
 use meniscus_jobs::spec::strict_json;
 use meniscus_jobs::system::process;
+use meniscus_jobs::verify::{self, CaseError};
 use meniscus_jobs::worker::attempt;
 use meniscus_jobs::worker::observers::Control;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -29,6 +33,9 @@ pub enum RunError {
     /// The body is not valid.
     #[error("{0}")]
     Invalid(String),
+    /// The file is not a valid verification case.
+    #[error(transparent)]
+    Case(#[from] CaseError),
     /// The target directory has something in it.
     #[error("{0} is not empty")]
     NotEmpty(String),
@@ -37,7 +44,7 @@ pub enum RunError {
     Io(#[from] io::Error),
 }
 
-/// Runs a job body, or a bare scene, from a file.
+/// Runs a job body, a bare scene or the runs of a verification case from a file.
 ///
 /// # Errors
 /// [`RunError`].
@@ -45,9 +52,14 @@ pub fn run(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCode, 
     let cannot = |cause: String| RunError::File { path: file.display().to_string(), cause };
     let bytes = std::fs::read(file).map_err(|error| cannot(error.to_string()))?;
     let value = strict_json::parse(&bytes).map_err(|error| cannot(error.to_string()))?;
-    // A scene names its kind, a job body its scene.
-    let spec = if value.get("kind").is_some() { json!({"scene": value}) } else { value };
-    start(&resolve(&spec, threads)?, Vec::new(), out)
+    if verify::case::is_case(&value) {
+        return case::run(file, &bytes, out, threads);
+    }
+    start(&resolve(&verify::case::job_body(&value), threads)?, Vec::new(), out).map(exit_code)
+}
+
+fn exit_code(has_succeeded: bool) -> ExitCode {
+    if has_succeeded { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Goes on from a checkpoint to the end of its scene.
@@ -66,7 +78,7 @@ pub fn resume(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCod
     let path = std::fs::canonicalize(file)?;
     let candidate =
         StartCheckpoint { id: file.display().to_string(), path, sha256: None, is_own: false, allow_other_isa: false };
-    start(&resolve(&spec, threads)?, vec![candidate], out)
+    start(&resolve(&spec, threads)?, vec![candidate], out).map(exit_code)
 }
 
 fn resolve(spec: &Value, threads: Option<usize>) -> Result<Value, RunError> {
@@ -90,7 +102,8 @@ fn resolve(spec: &Value, threads: Option<usize>) -> Result<Value, RunError> {
     Ok(body.resolved)
 }
 
-fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Result<ExitCode, RunError> {
+/// Runs a resolved body into a directory, new or empty, and prints its errors. Returns whether it succeeded.
+fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Result<bool, RunError> {
     std::fs::create_dir_all(out)?;
     if std::fs::read_dir(out)?.next().is_some() {
         return Err(RunError::NotEmpty(out.display().to_string()));
@@ -130,11 +143,11 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
                 report["cost"]["steps"]
             )?;
             writeln!(output, "results in {}", out.display())?;
-            Ok(ExitCode::SUCCESS)
+            Ok(true)
         }
         other => {
             writeln!(io::stderr(), "{other:?}")?;
-            Ok(ExitCode::FAILURE)
+            Ok(false)
         }
     }
 }

@@ -3,7 +3,6 @@
 mod cases;
 mod flow;
 mod parameters;
-mod rows;
 mod setup;
 
 use crate::scene::SceneKind;
@@ -17,6 +16,5 @@ pub static KIND: SceneKind = SceneKind {
     preset: parameters::preset,
     example: include_str!("droplet/example.json"),
     understand: setup::understand,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("droplet/calibration.json"),
 };

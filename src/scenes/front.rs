@@ -1,9 +1,6 @@
 //! `front`: geometric motion by the grid-based particle method (GBPM paper).
 
-mod cases;
-mod figures;
 mod parameters;
-mod rows;
 mod setup;
 mod wavefront;
 
@@ -21,6 +18,5 @@ pub static KIND: SceneKind = SceneKind {
     preset: parameters::preset,
     example: include_str!("front/example.json"),
     understand: setup::understand,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("front/calibration.json"),
 };

@@ -3,7 +3,6 @@
 mod parameters;
 mod points;
 mod problems;
-mod rows;
 mod setup;
 mod surfaces;
 
@@ -18,6 +17,5 @@ pub static KIND: SceneKind = SceneKind {
     preset: parameters::preset,
     example: include_str!("surface_pde/example.json"),
     understand: setup::understand,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("surface_pde/calibration.json"),
 };

@@ -1,7 +1,6 @@
 //! `vortex`: an interface in a prescribed flow (PCP paper, section 4.2).
 
 mod parameters;
-mod rows;
 mod setup;
 
 use crate::scene::SceneKind;
@@ -15,6 +14,5 @@ pub static KIND: SceneKind = SceneKind {
     preset: parameters::preset,
     example: include_str!("vortex/example.json"),
     understand: setup::understand,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("vortex/calibration.json"),
 };
