@@ -4,11 +4,9 @@
 //! spec to a [`Scene`], which returns everything that is wrong.
 
 pub mod cloud;
-pub mod rows;
 pub mod work;
 
 pub use cloud::{Cloud, CloudReference, CloudSizes, CloudSource, Clouds};
-pub use rows::Rows;
 pub use work::PhaseWork;
 
 use crate::parallel::Interrupt;
@@ -41,10 +39,8 @@ pub struct SceneKind {
     pub presets: &'static [NamedPreset],
     /// A small job body that runs in seconds.
     pub example: &'static str,
-    /// Short scenes by which a machine is measured: together they have every phase of the kind.
-    pub calibration: fn() -> Vec<Json>,
-    /// What the kind must show.
-    pub rows: fn() -> Rows,
+    /// Short scenes by which the speed of a machine is measured, as a JSON array. Together they have every phase of the kind.
+    pub calibration: &'static str,
     /// Its parameters, `kind` and `preset` excepted.
     pub declarations: fn() -> Vec<Declaration>,
     /// From its parameters as sent, and what is already known to be wrong, to a scene.

@@ -38,10 +38,10 @@ enum Command {
         #[command(flatten)]
         choices: Choices,
     },
-    /// Run one job in the foreground.
+    /// Run one job, or the runs of a verification case one after another, in the foreground.
     Run {
-        /// A job body or a scene, as JSON.
-        scene: PathBuf,
+        /// A job body, a scene or a verification case, as JSON.
+        file: PathBuf,
         /// Directory for the results; must be new or empty.
         #[arg(long)]
         out: PathBuf,
@@ -65,13 +65,16 @@ enum Command {
         /// Kinds of scenes, separated by commas; all by default.
         #[arg(long, value_delimiter = ',')]
         only: Vec<String>,
-        /// Include long cases, and write tables and pictures of the results.
+        /// Include long targets, and write documents and plots of the results.
         #[arg(long)]
         full: bool,
+        /// Directory of cases, KIND/NAME.json; those of the program by default.
+        #[arg(long)]
+        cases: Option<PathBuf>,
         /// Directory of the runs; runs of the same build are not repeated.
         #[arg(long, default_value = "verify-output")]
         runs: PathBuf,
-        /// Directory for tables and pictures, with --full.
+        /// Directory for documents and plots, with --full.
         #[arg(long, default_value = "docs/results")]
         results: PathBuf,
     },
@@ -155,14 +158,14 @@ pub fn main() -> ExitCode {
             runtime.shutdown_background();
             served.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
         }
-        Command::Run { scene, out, threads } => foreground::run(&scene, &out, threads).unwrap_or_else(|e| fail(&e)),
+        Command::Run { file, out, threads } => foreground::run(&file, &out, threads).unwrap_or_else(|e| fail(&e)),
         Command::Resume { checkpoint, out, threads } => {
             foreground::resume(&checkpoint, &out, threads).unwrap_or_else(|error| fail(&error))
         }
-        Command::Verify { only, full, runs, results } => {
-            let request = verify::Request { only, full, runs, results };
-            let shown = |outcome: &verify::Outcome| writeln!(std::io::stdout(), "{outcome}");
-            match verify::verify(&request, shown) {
+        Command::Verify { only, full, cases, runs, results } => {
+            let request = verify::Request { only, full, cases, runs, results };
+            let show = |outcome: &verify::Outcome| writeln!(std::io::stdout(), "{outcome}");
+            match verify::verify(&request, show) {
                 Ok(true) => ExitCode::SUCCESS,
                 Ok(false) => ExitCode::FAILURE,
                 Err(error) => fail(&error),

@@ -1,16 +1,20 @@
-//! `meniscus run` and `meniscus resume`: one job in this process, with a progress bar and no service.
+//! `meniscus run` and `meniscus resume`: one job, or the runs of a verification case, in this process, with a progress
+//! bar and no service.
+
+mod case;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus_jobs::formats::checkpoint;
 use meniscus_jobs::spec::attempt_spec::{Order, StartCheckpoint};
-use meniscus_jobs::spec::body::{self, Allowance, NoSources};
+use meniscus_jobs::spec::body::{self, Allowance, NoSources, ResolvedBody};
 use meniscus_jobs::spec::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
 use meniscus_jobs::spec::strict_json;
 use meniscus_jobs::system::process;
+use meniscus_jobs::verify::{self, CaseError};
 use meniscus_jobs::worker::attempt;
 use meniscus_jobs::worker::observers::Control;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -30,6 +34,9 @@ pub enum RunError {
     /// The body is not valid.
     #[error("{0}")]
     Invalid(String),
+    /// The file is not a valid verification case.
+    #[error(transparent)]
+    Case(#[from] CaseError),
     /// The directory for the results is not empty.
     #[error("the directory {0} is not empty; give --out a new or empty directory")]
     NotEmpty(String),
@@ -38,7 +45,7 @@ pub enum RunError {
     Io(#[from] io::Error),
 }
 
-/// Runs a job body, or a bare scene, from a file.
+/// Runs a job body, a bare scene or the runs of a verification case from a file.
 ///
 /// # Errors
 /// [`RunError`].
@@ -46,9 +53,14 @@ pub fn run(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCode, 
     let cannot = |cause: String| RunError::File { path: file.display().to_string(), cause };
     let bytes = std::fs::read(file).map_err(|error| cannot(error.to_string()))?;
     let value = strict_json::parse(&bytes).map_err(|error| cannot(error.to_string()))?;
-    // A scene names its kind, a job body its scene.
-    let spec = if value.get("kind").is_some() { json!({"scene": value}) } else { value };
-    start(&resolve(&spec, threads)?, Vec::new(), out)
+    if verify::case::is_case(&value) {
+        return case::run(file, &bytes, out, threads);
+    }
+    start(&resolve(&verify::case::job_body(&value), threads)?, Vec::new(), out).map(exit_code)
+}
+
+fn exit_code(has_succeeded: bool) -> ExitCode {
+    if has_succeeded { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Continues from a checkpoint to the end of its scene.
@@ -67,10 +79,10 @@ pub fn resume(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCod
     let path = std::fs::canonicalize(file)?;
     let candidate =
         StartCheckpoint { id: file.display().to_string(), path, sha256: None, is_own: false, allow_other_isa: false };
-    start(&resolve(&spec, threads)?, vec![candidate], out)
+    start(&resolve(&spec, threads)?, vec![candidate], out).map(exit_code)
 }
 
-fn resolve(spec: &Value, threads: Option<usize>) -> Result<Value, RunError> {
+fn resolve(spec: &Value, threads: Option<usize>) -> Result<ResolvedBody, RunError> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let allowance = Allowance {
         threads: threads.unwrap_or(cores) as u64,
@@ -91,7 +103,8 @@ fn resolve(spec: &Value, threads: Option<usize>) -> Result<Value, RunError> {
     Ok(body.resolved)
 }
 
-fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Result<ExitCode, RunError> {
+/// Runs a resolved body into a directory, new or empty, and prints its errors. Returns whether it succeeded.
+fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Result<bool, RunError> {
     std::fs::create_dir_all(out)?;
     if std::fs::read_dir(out)?.next().is_some() {
         return Err(RunError::NotEmpty(out.display().to_string()));
@@ -100,7 +113,7 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
     let order = Order {
         job: "foreground".to_owned(),
         epoch: 1,
-        body: resolved.clone(),
+        body: resolved.to_json(),
         attempts_directory: out.clone(),
         may_start_afresh: checkpoints.is_empty(),
         checkpoints,
@@ -109,7 +122,7 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
         reserve_bytes: 0,
         usage: Usage::default(),
     };
-    let keep = resolved["checkpoint"]["keep"].as_u64().unwrap_or(2) as usize;
+    let keep = resolved.options.checkpoint.keep as usize;
     let mut sink = Screen::new(out.clone(), keep);
     let verdict = attempt::run_attempt(&order, &out, &Control::default(), &mut sink);
     sink.bar.finish_and_clear();
@@ -125,7 +138,7 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
             let CostSummary { wall_s, cpu_s, steps } = report.cost;
             writeln!(output, "wall {wall_s:.2} s, cpu {cpu_s:.2} s, {steps} steps")?;
             writeln!(output, "results in {}", out.display())?;
-            Ok(ExitCode::SUCCESS)
+            Ok(true)
         }
         Verdict::Failed { reason, message } => stopped(&format!("the run failed ({}): {message}", reason.word())),
         Verdict::Paused { reason } => {
@@ -137,9 +150,9 @@ fn start(resolved: &Value, checkpoints: Vec<StartCheckpoint>, out: &Path) -> Res
 }
 
 /// Says on standard error why a run ended early.
-fn stopped(why: &str) -> Result<ExitCode, RunError> {
+fn stopped(why: &str) -> Result<bool, RunError> {
     writeln!(io::stderr(), "meniscus: {why}")?;
-    Ok(ExitCode::FAILURE)
+    Ok(false)
 }
 
 /// The part of `report.json` that is printed at the end of a run.

@@ -2,7 +2,6 @@
 
 mod cases;
 mod flow;
-mod rows;
 mod plan;
 pub mod spec;
 
@@ -17,6 +16,5 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("droplet/example.json"),
     declarations: spec::Droplet::declarations,
     parse: scene::parse_as::<spec::Droplet>,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("droplet/calibration.json"),
 };

@@ -1,8 +1,5 @@
 //! `front`: geometric motion by the grid-based particle method (GBPM paper).
 
-mod cases;
-mod figures;
-mod rows;
 mod plan;
 pub mod spec;
 mod wavefront;
@@ -21,6 +18,5 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("front/example.json"),
     declarations: spec::Front::declarations,
     parse: scene::parse_as::<spec::Front>,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("front/calibration.json"),
 };

@@ -1,7 +1,6 @@
 //! `redistance`: static geometry (PCP paper, section 4.1).
 
 mod plan;
-mod rows;
 pub mod spec;
 
 use crate::scene::{self, SceneKind};
@@ -15,6 +14,5 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("redistance/example.json"),
     declarations: spec::Redistance::declarations,
     parse: scene::parse_as::<spec::Redistance>,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("redistance/calibration.json"),
 };

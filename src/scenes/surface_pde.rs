@@ -2,7 +2,6 @@
 
 mod points;
 mod problems;
-mod rows;
 mod plan;
 pub mod spec;
 mod surfaces;
@@ -18,6 +17,5 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("surface_pde/example.json"),
     declarations: spec::SurfacePde::declarations,
     parse: scene::parse_as::<spec::SurfacePde>,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("surface_pde/calibration.json"),
 };

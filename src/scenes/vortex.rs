@@ -1,6 +1,5 @@
 //! `vortex`: an interface in a prescribed flow (PCP paper, section 4.2).
 
-mod rows;
 mod plan;
 pub mod spec;
 
@@ -15,6 +14,5 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("vortex/example.json"),
     declarations: spec::Vortex::declarations,
     parse: scene::parse_as::<spec::Vortex>,
-    calibration: rows::calibration,
-    rows: rows::rows,
+    calibration: include_str!("vortex/calibration.json"),
 };

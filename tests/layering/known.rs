@@ -2,8 +2,6 @@
 
 /// Circles of files.
 pub const CIRCLES: &[&[&str]] = &[
-    &["src/scenes/front/setup.rs", "src/scenes/front/wavefront.rs"],
-    &["src/scenes/surface_pde/points.rs", "src/scenes/surface_pde/setup.rs"],
     &[
         "src/schemes/grid_based_particle/corners.rs",
         "src/schemes/grid_based_particle/resampling.rs",
@@ -29,8 +27,6 @@ pub const CIRCLES: &[&[&str]] = &[
 /// Words for people that still stand for things, by file: at most so many.
 pub const WORDS: &[(&str, usize)] = &[
     ("src/scene/cloud.rs", 1),
-    ("src/scenes/droplet/parameters.rs", 1),
-    ("src/scenes/surface_pde/setup.rs", 2),
     ("src/scenes/surface_pde/surfaces.rs", 1),
     ("src/schemes/advected_level_set/simulation.rs", 2),
     ("src/schemes/advected_level_set/system.rs", 1),
@@ -76,25 +72,7 @@ pub const LONG_FUNCTIONS: &[(&str, &str, usize, &str)] = &[
         "the recurrences of the paper in one piece: every line uses the vectors of the others",
     ),
     ("src/polynomials/horner.rs", "unrolled", 63, "unrolled by hand: an arm a degree"),
-    ("src/scenes/droplet/rows.rs", "rows", 66, "it becomes files of cases (issue 18, item 6)"),
-    ("src/scenes/droplet/rows.rs", "figures", 67, "it becomes files of cases (issue 18, item 6)"),
-    ("src/scenes/droplet/setup.rs", "scene", 130, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/front/figures.rs", "figures", 167, "it becomes files of cases (issue 18, item 6)"),
-    ("src/scenes/front/rows.rs", "rows", 269, "it becomes files of cases (issue 18, item 6)"),
-    ("src/scenes/front/setup.rs", "scene", 125, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/gbpm_parameters.rs", "understand", 83, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/pcp_parameters.rs", "understand", 66, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/redistance/rows.rs", "rows", 223, "it becomes files of cases (issue 18, item 6)"),
-    ("src/scenes/redistance/setup.rs", "scene", 107, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/shapes.rs", "build", 142, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/surface_pde/problems.rs", "field", 74, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/surface_pde/problems.rs", "understand", 88, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/surface_pde/rows.rs", "figures", 93, "it becomes files of cases (issue 18, item 6)"),
-    ("src/scenes/surface_pde/setup.rs", "understand", 65, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/surface_pde/setup.rs", "scheme", 74, "the typed spec replaces it (issue 18, item 1)"),
     ("src/scenes/surface_pde/surfaces.rs", "in_space", 61, "the typed spec replaces it (issue 18, item 1)"),
-    ("src/scenes/vortex/rows.rs", "rows", 106, "it becomes files of cases (issue 18, item 6)"),
-    ("src/scenes/vortex/setup.rs", "scene", 135, "the typed spec replaces it (issue 18, item 1)"),
     ("src/schemes/embedding_closest_point/band.rs", "about", 71, "not cut yet (issue 18)"),
     ("src/schemes/grid_based_particle/exact.rs", "errors", 94, "not cut yet (issue 18)"),
     ("src/schemes/grid_based_particle/reconstruction.rs", "fit_across", 78, "not cut yet (issue 18)"),

@@ -1,6 +1,7 @@
 //! The papers' cases and the hard ones, against figures with their reasons.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod case_files;
 mod droplets;
 mod fronts;
 mod ring;

@@ -149,7 +149,12 @@ const ROUNDS: usize = 5;
 /// # Errors
 /// A sentence that names the run.
 pub fn measure_here(directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
-    let scenes: Vec<Value> = meniscus::scenes::SCENES.iter().flat_map(|kind| (kind.calibration)()).collect();
+    let mut scenes: Vec<Value> = Vec::new();
+    for kind in meniscus::scenes::SCENES {
+        let named: Vec<Value> = serde_json::from_str(kind.calibration)
+            .map_err(|error| format!("calibration scenes of {}: {error}", kind.kind))?;
+        scenes.extend(named);
+    }
     let mut rounds = Vec::new();
     for _ in 0..ROUNDS {
         let round: Result<Vec<_>, String> = scenes.iter().map(|scene| measure_run(scene, directory, threads)).collect();

@@ -1,22 +1,98 @@
-//! From reports to figures.
+//! From reports to the values that targets compare.
 
-use meniscus::scene::rows::{Measure, Quantity};
+use serde::Deserialize;
 use serde_json::Value;
 
-/// An error of a report; None where it has none of that name.
+/// An error as reports list it.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quantity {
+    /// `phi`, `closest_point`, …
+    pub quantity: String,
+    /// `rms`, `max`, `relative`, …
+    pub norm: String,
+    /// Scene time; the last one reported when not given.
+    pub time: Option<f64>,
+}
+
+/// How a value comes out of the reports of runs. "First" and "last" are those of the target's list of runs.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Measure {
+    /// The error of the last run.
+    Error(Quantity),
+    /// The largest error of all runs, each in multiples of its spacing.
+    LargestErrorInSpacings(Quantity),
+    /// The slope of the least-squares line through the logarithms of error and spacing.
+    Order {
+        /// Name of the error.
+        quantity: String,
+        /// Norm of the error.
+        norm: String,
+        /// Scene time; the last one reported when not given.
+        time: Option<f64>,
+        /// Errors below are round-off and left out.
+        floor: f64,
+    },
+    /// The error of the last run divided by that of the first.
+    Ratio(Quantity),
+    /// The absolute difference of the errors of the last run and the first.
+    Difference(Quantity),
+    /// Largest resident memory of the last run, bytes.
+    Memory {},
+    /// CPU seconds of the last run in cost spans whose names begin with `spans`, divided by its steps.
+    SecondsPerStep {
+        /// Beginning of the spans' names; empty for all but the computation of errors.
+        spans: String,
+    },
+    /// CPU seconds of the last run in such spans.
+    Seconds {
+        /// Beginning of the spans' names; empty for all but the computation of errors.
+        spans: String,
+    },
+    /// CPU seconds of the last run in such spans divided by those of the first.
+    SecondsRatio {
+        /// Beginning of the spans' names; empty for all but the computation of errors.
+        spans: String,
+    },
+    /// A count of the last run's diagnostics; zero when the report does not list it.
+    Diagnostic {
+        /// Name of the count, such as `fits.larger_radius`.
+        name: String,
+    },
+}
+
+impl Measure {
+    /// The fewest runs that it needs.
+    #[must_use]
+    pub fn least_runs(&self) -> usize {
+        match self {
+            Self::Order { .. } => LEAST_POINTS,
+            Self::Ratio(_) | Self::Difference(_) | Self::SecondsRatio { .. } => 2,
+            Self::Error(_)
+            | Self::LargestErrorInSpacings(_)
+            | Self::Memory {}
+            | Self::SecondsPerStep { .. }
+            | Self::Seconds { .. }
+            | Self::Diagnostic { .. } => 1,
+        }
+    }
+}
+
+/// An error of a report; `None` where it has none of that name, norm and time.
 #[must_use]
-pub fn error(report: &Value, quantity: Quantity) -> Option<f64> {
+pub fn error(report: &Value, of: &Quantity) -> Option<f64> {
     let entries = report["errors"].as_array()?;
-    let named = entries.iter().filter(|e| e["quantity"] == quantity.name && e["norm"] == quantity.norm);
+    let named = entries.iter().filter(|e| e["quantity"] == *of.quantity && e["norm"] == *of.norm);
     let time = |entry: &Value| entry["time"].as_f64().unwrap_or(f64::NEG_INFINITY);
-    let found = match quantity.time {
+    let found = match of.time {
         Some(wanted) => named.into_iter().find(|entry| (time(entry) - wanted).abs() < 1e-6),
         None => named.into_iter().max_by(|a, b| time(a).total_cmp(&time(b))),
     };
     found?["value"].as_f64()
 }
 
-/// The length that errors are held against: h, or where a scene has a number of points on a surface N^(−1/2), on a circle 1/N.
+/// The length to which errors are compared: the spacing h, or for N points N^(−1/2) on a surface and 1/N on a circle.
 #[must_use]
 pub fn spacing(scene: &Value) -> Option<f64> {
     let is_curve = [&scene["surface"], &scene["surface"]["type"]].iter().any(|surface| **surface == "circle");
@@ -24,45 +100,47 @@ pub fn spacing(scene: &Value) -> Option<f64> {
     scene["spacing"].as_f64().or_else(|| scene["count"].as_f64().map(apart))
 }
 
-/// CPU seconds in phases whose names begin so; without a name in all that are not errors and references.
+/// CPU seconds in cost spans whose names begin with `prefix`; with an empty one in all but the computation of errors.
 #[must_use]
 pub fn seconds(report: &Value, prefix: &str) -> f64 {
-    let phases = report["cost"]["phases"].as_object();
+    let spans = report["cost"]["phases"].as_object();
     let is_meant = |name: &str| if prefix.is_empty() { name != "errors" } else { name.starts_with(prefix) };
-    let own = phases.into_iter().flatten().filter(|(name, _)| is_meant(name));
+    let own = spans.into_iter().flatten().filter(|(name, _)| is_meant(name));
     own.filter_map(|(_, seconds)| seconds.as_f64()).sum()
 }
 
-/// The figure of a measure; NaN where reports do not have it.
+/// The value of a measure over runs (scenes and their reports); NaN where reports do not have it.
 #[must_use]
-pub fn measure(measure: Measure, scenes: &[Value], reports: &[Value]) -> f64 {
-    let nothing = Value::Null;
+pub fn evaluate(measure: &Measure, scenes: &[&Value], reports: &[&Value]) -> f64 {
+    let nothing = &Value::Null;
     let (first, last) = (reports.first().unwrap_or(&nothing), reports.last().unwrap_or(&nothing));
     let spacing = |scene: &Value| spacing(scene).unwrap_or(f64::NAN);
+    let error_of = |report: &Value, of: &Quantity| error(report, of).unwrap_or(f64::NAN);
     match measure {
-        Measure::Error(of) => error(last, of).unwrap_or(f64::NAN),
-        Measure::WorstInSpacings(of) => {
-            let ratio = |(scene, report): (&Value, &Value)| error(report, of).unwrap_or(f64::NAN) / spacing(scene);
+        Measure::Error(of) => error_of(last, of),
+        Measure::LargestErrorInSpacings(of) => {
+            let ratio = |(scene, report): (&&Value, &&Value)| error_of(report, of) / spacing(scene);
             // A NaN must not be lost in the maximum.
             scenes.iter().zip(reports).map(ratio).fold(0.0, |worst, r| if r <= worst { worst } else { r })
         }
-        Measure::Order { of, floor } => {
+        Measure::Order { quantity, norm, time, floor } => {
+            let of = Quantity { quantity: quantity.clone(), norm: norm.clone(), time: *time };
             let points: Vec<(f64, f64)> = scenes
                 .iter()
                 .zip(reports)
-                .filter_map(|(scene, report)| Some((spacing(scene).ln(), error(report, of)?)))
-                .filter(|(_, error)| *error > floor)
+                .filter_map(|(scene, report)| Some((spacing(scene).ln(), error(report, &of)?)))
+                .filter(|(_, error)| error > floor)
                 .map(|(x, error)| (x, error.ln()))
                 .collect();
             slope(&points)
         }
-        Measure::Growth(of) => error(last, of).unwrap_or(f64::NAN) / error(first, of).unwrap_or(f64::NAN),
-        Measure::Difference(of) => (error(last, of).unwrap_or(f64::NAN) - error(first, of).unwrap_or(f64::NAN)).abs(),
-        Measure::Memory => last["cost"]["peak_memory_bytes"].as_f64().unwrap_or(f64::NAN),
-        Measure::Seconds(prefix) => seconds(last, prefix),
-        Measure::SecondsPerStep(prefix) => seconds(last, prefix) / last["cost"]["steps"].as_f64().unwrap_or(f64::NAN),
-        Measure::SecondsShare(prefix) => seconds(last, prefix) / seconds(first, prefix),
-        Measure::Rescued(name) => {
+        Measure::Ratio(of) => error_of(last, of) / error_of(first, of),
+        Measure::Difference(of) => (error_of(last, of) - error_of(first, of)).abs(),
+        Measure::Memory {} => last["cost"]["peak_memory_bytes"].as_f64().unwrap_or(f64::NAN),
+        Measure::Seconds { spans } => seconds(last, spans),
+        Measure::SecondsPerStep { spans } => seconds(last, spans) / last["cost"]["steps"].as_f64().unwrap_or(f64::NAN),
+        Measure::SecondsRatio { spans } => seconds(last, spans) / seconds(first, spans),
+        Measure::Diagnostic { name } => {
             let stability = &last["stability"];
             let count =
                 stability["rescued_fits"][name].as_f64().or_else(|| stability["newton"]["rescued"][name].as_f64());
@@ -71,9 +149,12 @@ pub fn measure(measure: Measure, scenes: &[Value], reports: &[Value]) -> f64 {
     }
 }
 
-/// The slope of the least-squares line; NaN for fewer than four points, of which no line says much.
+/// A line through fewer points says little.
+const LEAST_POINTS: usize = 4;
+
+/// The slope of the least-squares line; NaN for fewer than four points.
 fn slope(points: &[(f64, f64)]) -> f64 {
-    if points.len() < 4 {
+    if points.len() < LEAST_POINTS {
         return f64::NAN;
     }
     let n = points.len() as f64;
@@ -85,10 +166,8 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Measure, Quantity, measure};
+    use super::{Measure, evaluate};
     use serde_json::{Value, json};
-
-    const RMS: Quantity = Quantity::at_end("phi", "rms");
 
     fn report(error: f64) -> Value {
         json!({
@@ -102,18 +181,29 @@ mod tests {
     }
 
     #[test]
-    fn figures_come_out_of_reports() {
-        let scenes: Vec<Value> = [0.1, 0.05, 0.025, 0.0125].iter().map(|h| json!({"spacing": h})).collect();
-        let reports: Vec<Value> = [0.1, 0.05, 0.025, 0.0125].iter().map(|h: &f64| report(h.powi(3))).collect();
-        let of = |m| measure(m, &scenes, &reports);
-        assert!((of(Measure::Order { of: RMS, floor: 0.0 }) - 3.0).abs() < 1e-12);
-        assert!(of(Measure::Order { of: RMS, floor: 1e-5 }).is_nan(), "three points are no line");
-        assert!((of(Measure::Error(RMS)) - 0.0125_f64.powi(3)).abs() < 1e-18);
-        assert!((of(Measure::Error(Quantity::at("phi", "rms", 0.5))) - 9.0).abs() < 1e-15);
-        assert!((of(Measure::Growth(RMS)) - 1.0 / 512.0).abs() < 1e-12);
-        assert!((of(Measure::SecondsPerStep("redistancing")) - 0.75).abs() < 1e-12);
-        assert!((of(Measure::SecondsShare("redistancing")) - 1.0).abs() < 1e-12);
-        assert!((of(Measure::Rescued("fits.larger_radius")) - 3.0).abs() < 1e-12);
-        assert!(of(Measure::Error(Quantity::at_end("area", "relative"))).is_nan());
+    fn values_come_out_of_reports() {
+        let spacings = [0.1, 0.05, 0.025, 0.0125_f64];
+        let scenes: Vec<Value> = spacings.iter().map(|h| json!({"spacing": h})).collect();
+        let reports: Vec<Value> = spacings.iter().map(|h| report(h.powi(3))).collect();
+        let (scenes, reports): (Vec<&Value>, Vec<&Value>) = (scenes.iter().collect(), reports.iter().collect());
+        let of = |measure: Value| {
+            let measure: Measure = serde_json::from_value(measure).unwrap();
+            evaluate(&measure, &scenes, &reports)
+        };
+        let rms = |kind: &str| json!({"type": kind, "quantity": "phi", "norm": "rms"});
+        let order = |floor: f64| of(json!({"type": "order", "quantity": "phi", "norm": "rms", "floor": floor}));
+        assert!((order(0.0) - 3.0).abs() < 1e-12);
+        assert!(order(1e-5).is_nan(), "three points are no line");
+        assert!((of(rms("error")) - 0.0125_f64.powi(3)).abs() < 1e-18);
+        assert!((of(json!({"type": "error", "quantity": "phi", "norm": "rms", "time": 0.5})) - 9.0).abs() < 1e-15);
+        assert!((of(rms("ratio")) - 1.0 / 512.0).abs() < 1e-12);
+        assert!((of(rms("difference")) - (1e-3 - 0.0125_f64.powi(3))).abs() < 1e-15);
+        assert!((of(rms("largest_error_in_spacings")) - 0.01).abs() < 1e-12);
+        assert!((of(json!({"type": "seconds", "spans": "redistancing"})) - 3.0).abs() < 1e-12);
+        assert!((of(json!({"type": "seconds_per_step", "spans": "redistancing"})) - 0.75).abs() < 1e-12);
+        assert!((of(json!({"type": "seconds_ratio", "spans": "redistancing"})) - 1.0).abs() < 1e-12);
+        assert!((of(json!({"type": "diagnostic", "name": "fits.larger_radius"})) - 3.0).abs() < 1e-12);
+        assert!(of(json!({"type": "error", "quantity": "area", "norm": "relative"})).is_nan());
+        assert!(of(json!({"type": "memory"})).is_nan());
     }
 }

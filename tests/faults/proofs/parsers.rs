@@ -124,7 +124,8 @@ fn words() -> Vec<String> {
 fn seeds() -> Vec<Value> {
     let mut seeds: Vec<Value> = SCENES.iter().map(|kind| serde_json::from_str(kind.example).unwrap()).collect();
     for kind in SCENES {
-        seeds.extend((kind.calibration)().into_iter().map(|scene| json!({"scene": scene})));
+        let scenes: Vec<Value> = serde_json::from_str(kind.calibration).unwrap();
+        seeds.extend(scenes.into_iter().map(|scene| json!({"scene": scene})));
         let bare = understand(&json!({"kind": kind.kind}), SCENES).ok().unwrap().resolved();
         seeds.push(
             json!({"scene": bare, "limits": {"threads": 1}, "output": {"every_time": 0.1}, "checkpoint": {"keep": 3}}),

@@ -1,0 +1,61 @@
+//! The results of full verifications as a Markdown document.
+
+use super::catalog::KindCases;
+use super::outcome::{Outcome, number};
+use crate::system::{build, clock, process};
+use std::fmt::Write;
+
+/// The outcomes of the targets of one kind, case by case.
+pub(super) struct KindOutcomes<'a> {
+    pub cases: &'a KindCases,
+    /// For each case its outcomes, in the order of its targets.
+    pub outcomes: Vec<Vec<Outcome>>,
+}
+
+/// The document of some kinds; `notes` names a file beside it that tells more.
+pub(super) fn compose(results: &[KindOutcomes], notes: Option<&str>) -> String {
+    let kinds: Vec<&str> = results.iter().map(|result| result.cases.kind).collect();
+    let kinds = kinds.join(",");
+    let all = || results.iter().flat_map(|result| result.outcomes.iter().flatten());
+    let (count, missed) = (all().count(), all().filter(|outcome| !outcome.is_met).count());
+    let date = clock::now();
+    let machine = process::cpu_name().unwrap_or_else(|| "unknown".to_owned());
+    let (build, isa) = (build::name(), build::isa());
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "# {kinds}: targets and measured values\n\n\
+         Written by `meniscus verify --only {kinds} --full` on {}; machine: {machine} ({isa}), one core; build {build}.\n\
+         {count} targets, {missed} missed. Times are CPU seconds of all runs of a target, set-up and references included.\n\
+         Each case is a file of `tests/validation/cases`; `meniscus run FILE --out DIR` runs it by itself.\n",
+        &date[..10.min(date.len())],
+    );
+    for result in results {
+        for ((name, case), outcomes) in result.cases.cases.iter().zip(&result.outcomes) {
+            let _ = write!(text, "\n## {}\n\n`{}/{name}`. {}.\n", case.title, result.cases.kind, case.source);
+            text.push_str(
+                "\n| target | paper | to reach | measured | time | verdict |\n| --- | --- | --- | --- | --- | --- |\n",
+            );
+            for outcome in outcomes {
+                let _ = writeln!(
+                    text,
+                    "| {} | {} | {} | {} | {:.1} s | {} |",
+                    outcome.title,
+                    outcome.paper(),
+                    outcome.bound,
+                    number(outcome.value),
+                    outcome.cpu_s,
+                    outcome.verdict()
+                );
+            }
+        }
+    }
+    if let Some(notes) = notes {
+        let _ = write!(text, "\nWhat was tried, and why targets are missed: [{notes}]({notes}).\n");
+    }
+    for (name, plot) in results.iter().flat_map(|result| &result.cases.plots) {
+        let _ = write!(text, "\n![{}]({name}.svg)\n", plot.title);
+    }
+    text
+}

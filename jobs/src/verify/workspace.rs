@@ -1,0 +1,42 @@
+//! Where the runs of a verification are kept. Runs of this build that are already there are not repeated.
+
+use crate::system::build;
+use crate::system::digest;
+use crate::worker::local_run::{self, Keep};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The directory of the runs of this build.
+pub(super) struct Workspace {
+    directory: PathBuf,
+}
+
+impl Workspace {
+    /// Below a directory that builds share: runs of another build are not taken for those of this one.
+    pub(super) fn new(runs: &Path) -> Self {
+        let own = std::env::current_exe().ok().and_then(|path| digest::of_file(&path).ok());
+        let build = own.map_or_else(build::name, |(digest, _)| digest[..16].to_owned());
+        Self { directory: runs.join(build) }
+    }
+
+    /// The report of a job body: of its earlier run with this build, or of one made now.
+    pub(super) fn report(&self, body: &Value) -> Result<Value, String> {
+        let directory = self.run(body, Keep::Report)?;
+        read_report(&directory).ok_or_else(|| "the run left no report".to_owned())
+    }
+
+    /// The directory of a run of this build: an earlier one, or one made now.
+    pub(super) fn run(&self, body: &Value, keep: Keep) -> Result<PathBuf, String> {
+        let key = format!("{body} {keep:?}");
+        let directory = self.directory.join(&digest::of_bytes(key.as_bytes())[..16]);
+        if read_report(&directory).is_none() {
+            local_run::run(body, &directory, 1, keep)?;
+        }
+        Ok(directory)
+    }
+}
+
+fn read_report(directory: &Path) -> Option<Value> {
+    serde_json::from_slice(&fs::read(directory.join("report.json")).ok()?).ok()
+}
