@@ -1,0 +1,123 @@
+//! Bodies of jobs and studies against the answers of build db9067b (0.1): all scenes of the tests, and two thousand bodies that
+//! were generated from the schemas, accepted and refused. The same JSON is accepted, the same defaults result, and every error
+//! is found at the same place.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use flate2::read::GzDecoder;
+use meniscus::spec::Violation;
+use meniscus_jobs::spec::body::{self, Allowance, NoSources, Origin, RestartSource, Sources};
+use meniscus_jobs::spec::calibration::Calibration;
+use meniscus_jobs::spec::study;
+use meniscus_jobs::spec::uploads::Purpose;
+use meniscus_jobs::system::build;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30, local_files: false };
+
+/// A body and what the build before answered.
+#[derive(Deserialize)]
+struct Recorded {
+    body: Value,
+    answer: Value,
+}
+
+/// An error: where, which, and the spelling that was suggested. Texts may change.
+type Place = (String, String, Option<String>);
+
+/// Knows one checkpoint of a vortex, and an upload of each purpose.
+struct Known;
+
+impl Sources for Known {
+    fn checkpoint(&self, id: &str) -> Option<RestartSource> {
+        let first = body::parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok()?;
+        let origin = Origin::Checkpoint("ckpt_1".into());
+        (id == "ckpt_1").then(|| RestartSource { origin, scene: first.resolved.scene, isa: build::isa(), step: 240 })
+    }
+
+    fn uploaded_checkpoint(&self, _: &str) -> Option<RestartSource> {
+        None
+    }
+
+    fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
+        match id {
+            "upl_points" => Some((Purpose::Points, 5000)),
+            "upl_surface" => Some((Purpose::Surface, 5000)),
+            "upl_places" => Some((Purpose::Queries, 5000)),
+            _ => None,
+        }
+    }
+}
+
+fn recorded() -> Vec<Recorded> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/answers_0_1.jsonl.gz");
+    let lines = BufReader::new(GzDecoder::new(std::fs::File::open(file).unwrap())).lines();
+    lines.map(|line| serde_json::from_str(&line.unwrap()).unwrap()).collect()
+}
+
+/// What is not given and what is null are the same.
+fn without_nulls(value: &Value) -> Value {
+    match value {
+        Value::Object(map) => {
+            let kept = map.iter().filter(|(_, value)| !value.is_null());
+            Value::Object(kept.map(|(name, value)| (name.clone(), without_nulls(value))).collect::<Map<_, _>>())
+        }
+        Value::Array(list) => list.iter().map(without_nulls).collect(),
+        // 2 and 2.0 are one number.
+        Value::Number(number) => json!(number.as_f64()),
+        other => other.clone(),
+    }
+}
+
+fn places(errors: &[Violation]) -> BTreeSet<Place> {
+    errors.iter().map(|e| (e.pointer.clone(), e.code.to_owned(), e.did_you_mean.clone())).collect()
+}
+
+fn recorded_places(answer: &Value) -> Option<BTreeSet<Place>> {
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let place = |e: &Value| (text(&e["pointer"]), text(&e["code"]), e["did_you_mean"].as_str().map(str::to_owned));
+    Some(answer.get("errors")?.as_array()?.iter().map(place).collect())
+}
+
+/// The answer of this build, as far as it is compared.
+fn answer(body: &Value) -> Result<Value, BTreeSet<Place>> {
+    if let Some(given) = body.get("study") {
+        let study = study::parse(given, ALLOWANCE, 2, &Known, &Calibration::default(), |_| ());
+        let study = study.map_err(|errors| places(&errors))?;
+        return Ok(json!({
+            "axes": study.axes, "points": study.points, "max_parallel": study.max_parallel, "on_failure": study.on_failure,
+            "name": study.name, "labels": study.labels,
+        }));
+    }
+    let job = body::parse(body, ALLOWANCE, &Known).map_err(|errors| places(&errors))?;
+    let estimate = job.forecast.estimate;
+    Ok(json!({
+        "resolved": job.resolved.to_json(), "kind": job.kind, "uploads": job.uploads, "particles": estimate.particles,
+        "steps": estimate.steps, "time_step": estimate.time_step, "end_time": estimate.end_time,
+        "memory_bytes": estimate.memory_bytes, "disk_bytes": job.forecast.disk_bytes, "family": job.forecast.family,
+    }))
+}
+
+#[test]
+fn bodies_are_answered_as_by_the_build_before() {
+    let all = recorded();
+    assert!(all.len() >= 2000);
+    let accepted = all.iter().filter(|one| recorded_places(&one.answer).is_none()).count();
+    assert!((900..1100).contains(&accepted), "{accepted} of {} were accepted", all.len());
+    let mut differing = Vec::new();
+    for Recorded { body, answer: before } in &all {
+        let now = answer(body);
+        let is_same = match (&now, recorded_places(before)) {
+            (Ok(now), None) => without_nulls(now) == without_nulls(before),
+            (Err(now), Some(before)) => *now == before,
+            _ => false,
+        };
+        if !is_same {
+            differing.push(format!("{body}\n  before: {before}\n  now: {now:?}"));
+        }
+    }
+    assert!(differing.is_empty(), "{} differ:\n{}", differing.len(), differing.join("\n"));
+}
