@@ -1,7 +1,6 @@
 //! The kinds of scenes, one folder each. Schemas, validation, documentation and the tests that every scene must pass
 //! come from [`SCENES`].
 
-mod curvature_stability;
 mod dimension;
 pub mod droplet;
 mod flow_work;
