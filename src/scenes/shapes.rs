@@ -1,9 +1,9 @@
 //! Shapes as parameters, and the surfaces they stand for.
 
 use crate::geometry::Vector;
+use crate::geometry::dimension::in_dimension;
 use crate::geometry::surfaces::{Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, ZalesakDisk};
 use crate::scene::cloud::{CloudReference, PointsSource};
-use crate::scenes::dimension::in_dimension;
 use crate::spec::{AtLeast, Choice, Coordinates, POSITIVE, Parameter, Sign, Violation};
 use serde_json::{Value, json};
 
