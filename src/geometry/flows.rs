@@ -178,3 +178,37 @@ mod sampling {
         largest
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{FlowChoice, Rotation};
+    use crate::geometry::{Flow, Vector};
+
+    #[test]
+    fn a_flow_exists_in_its_dimension_alone() {
+        let vortex = FlowChoice::SingleVortex { period: None };
+        assert!(vortex.flow::<2>().is_ok());
+        let found = vortex.flow::<3>().err().unwrap();
+        assert_eq!((found.pointer.as_str(), found.got.as_str()), ("/flow/type", Some("single_vortex")));
+        let rotation = FlowChoice::Rotation { center: [0.5, 0.5].into(), angular_velocity: 2.0 };
+        assert!(rotation.flow::<2>().is_ok() && rotation.flow::<3>().is_err());
+    }
+
+    #[test]
+    fn a_flow_that_says_nothing_has_the_neutral_answers() {
+        struct Shear;
+        impl Flow<2> for Shear {
+            fn velocity(&self, x: &Vector<2>, _time: f64) -> Vector<2> {
+                Vector::<2>::new(x[1], 0.0)
+            }
+
+            fn top_speed(&self, low: &Vector<2>, high: &Vector<2>) -> f64 {
+                low[1].abs().max(high[1].abs())
+            }
+        }
+        assert!(!Shear.is_rigid() && !Shear.is_back(0.0));
+        assert!(Shear.return_time().is_none() && Shear.typical_stretch().is_none());
+        let rotation = Rotation { center: Vector::<2>::zeros(), angular_velocity: 0.0 };
+        assert!(rotation.is_rigid() && rotation.return_time().is_none());
+    }
+}

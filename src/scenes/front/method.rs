@@ -168,3 +168,26 @@ pub(super) fn labels(chosen: &GbpmPlan, fixed: FixedStep, in_bends: Option<usize
     }
     labels
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{FixedStep, is_within_grid, landing_on_turns};
+    use crate::geometry::Vector;
+
+    #[test]
+    fn half_periods_end_at_steps() {
+        let fixed = FixedStep::from_steps(8.0, 33);
+        assert_eq!(landing_on_turns(fixed, 8.0, Some(8.0)).steps, 34);
+        assert_eq!(landing_on_turns(fixed, 8.0, Some(4.0)).steps, 36);
+        // Where the end is no whole number of half periods, and without a period, nothing changes.
+        assert_eq!(landing_on_turns(fixed, 8.0, Some(3.0)).steps, 33);
+        assert_eq!(landing_on_turns(fixed, 8.0, None).steps, 33);
+    }
+
+    #[test]
+    fn the_grid_ends_where_its_numbers_do() {
+        let unit = (Vector::<3>::zeros(), Vector::<3>::repeat(1.0));
+        assert!(is_within_grid(unit, 1e-3, 1) && !is_within_grid(unit, 1e-7, 1));
+        assert!(is_within_grid(unit, 1e-5, 1) && !is_within_grid(unit, 1e-5, 5));
+    }
+}

@@ -233,3 +233,53 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         Ok(Box::new(GridBasedParticles::new(system, exact, ball, *fixed, context.cpu_clock, labels)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::{CloudSizes, Scene, parse};
+    use crate::scenes::SCENES;
+    use serde_json::{Value, json};
+
+    fn scene(more: &Value) -> Box<dyn Scene> {
+        let mut body = json!({"kind": "front"});
+        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        parse(&body, SCENES).unwrap_or_else(|found| panic!("{body}: {found:?}"))
+    }
+
+    /// Calibrations of costs are kept under these names.
+    #[test]
+    fn families_are_those_of_the_laws() {
+        let ellipse = json!({"type": "ellipse", "center": [0, 0], "semi_axes": [2, 1]});
+        let optics = json!({"law": "geometrical_optics", "shape": ellipse, "spacing": 0.1});
+        let sphere = json!({"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.25});
+        let refined = json!({"law": "flow", "adaptivity": {"levels": 2}, "spacing": 0.02});
+        for (more, family) in [
+            (json!({}), "front/2/normal/4"),
+            (json!({"law": "mean_curvature", "end_time": 0.001}), "front/2/mean_curvature/4"),
+            (refined, "front/2/flow/4/refined"),
+            (json!({"shape": sphere, "spacing": 0.05}), "front/3/normal/2"),
+            (optics, "front/optics/4"),
+        ] {
+            assert_eq!(scene(&more).family(), family, "{more}");
+        }
+    }
+
+    #[test]
+    fn default_steps_are_those_of_the_laws() {
+        let step = |more: &Value| scene(more).estimate(&CloudSizes::new()).time_step;
+        let spacing = 1.0 / 128.0;
+        // Steps are rounded down to a whole number of them.
+        let is_about = |found: f64, limit: f64| found <= limit * (1.0 + 1e-9) && found > 0.8 * limit;
+        assert!(is_about(step(&json!({})), 0.75 * spacing));
+        assert!(is_about(step(&json!({"law": "mean_curvature"})), 0.5 * spacing * spacing));
+        assert!(is_about(step(&json!({"law": "flow", "end_time": 8})), 10.0 * spacing));
+        assert!((step(&json!({"time_step": 0.01})) - 0.01).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_flow_of_space_in_the_plane_is_refused_with_what_exists_there() {
+        let law = json!({"type": "flow", "flow": "vortex_3d"});
+        let found = parse(&json!({"kind": "front", "law": law}), SCENES).err().unwrap();
+        assert_eq!(found[0].pointer, "/law/flow/type");
+    }
+}
