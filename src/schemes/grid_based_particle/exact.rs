@@ -130,7 +130,7 @@ fn along_front(distances: &[f64], shares: impl Iterator<Item = f64>) -> [f64; 3]
     [sum / all, (squares / all).sqrt(), norms.max()]
 }
 
-/// [∫ d² dθ]^½ by the trapezoidal rule over the angles of the foot-points (GBPM eq. 18).
+/// [∫ d² dθ]^½ by the trapezoidal rule over the angles of the foot points (GBPM eq. 18).
 fn over_angle<const D: usize>(ball: &Ball<D>, positions: &[Vector<D>], distances: &[f64]) -> f64 {
     let angle = |x: &Vector<D>| (x[1] - ball.center[1]).atan2(x[0] - ball.center[0]);
     let mut sorted: Vec<(f64, f64)> = positions.iter().map(angle).zip(distances.iter().copied()).collect();
