@@ -266,3 +266,6 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         std::mem::take(&mut self.findings)
     }
 }
+
+#[cfg(test)]
+mod tests;
