@@ -3,6 +3,7 @@
 //! Surfaces give the distance, closest point, normal and curvature of any query point, exact to round-off. Scenes start
 //! from them, and errors are measured against them.
 
+pub mod dimension;
 pub mod domain;
 pub mod fibonacci;
 pub mod flows;

@@ -1,11 +1,9 @@
 //! The kinds of scenes, one folder each. Schemas, validation, documentation and the tests that every scene must pass
 //! come from [`SCENES`].
 
-mod curvature_stability;
-mod dimension;
 pub mod droplet;
 mod flow_work;
-pub mod flows;
+pub mod integrators;
 pub mod front;
 pub mod gbpm_spec;
 pub mod particle_estimate;

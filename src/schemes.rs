@@ -4,6 +4,7 @@
 pub mod advected_level_set;
 pub mod embedding_closest_point;
 pub mod exact_motion;
+pub mod front_stretch;
 pub mod grid_based_particle;
 pub mod measured_errors;
 pub mod measured_redistancing;

@@ -1,4 +1,4 @@
-//! Prescribed velocity fields u(x, t), one file per flow.
+//! Prescribed velocity fields u(x, t), one file per flow, and the parameter that chooses one.
 
 pub mod rays;
 pub mod rotation;
@@ -13,6 +13,9 @@ pub use translation::Translation;
 pub use vortex_3d::Vortex3d;
 
 use super::Vector;
+use super::dimension::in_dimension;
+use crate::spec::{Choice, Coordinates, POSITIVE, Parameter, Violation};
+use serde_json::json;
 
 /// How many times longer (or larger) a flow makes a front, relative to the front at time 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,6 +72,81 @@ pub trait Flow<const D: usize>: Send + Sync {
     }
 }
 
+crate::choice! {
+    /// A velocity field.
+    pub enum FlowChoice {
+        /// the spiraling vortex in the unit square (2D)
+        SingleVortex = "single_vortex" {
+            /// time T after which everything is back; null: the flow never turns
+            period: Option<f64> = Some(8.0), in POSITIVE;
+        }
+        /// the deforming flow in the unit cube (3D)
+        Vortex3d = "vortex_3d" {
+            /// time T after which everything is back; null: the flow never turns
+            period: Option<f64> = Some(2.0), in POSITIVE;
+        }
+        /// rigid rotation about a point in the x–y plane
+        Rotation = "rotation" {
+            /// fixed point
+            center: Coordinates;
+            /// angular velocity, counter-clockwise
+            angular_velocity: f64;
+        }
+        /// uniform motion
+        Translation = "translation" {
+            /// velocity
+            velocity: Coordinates;
+        }
+    }
+}
+
+/// Names of the flows that exist in the plane, and in space.
+const EXISTING: [&[&str]; 2] =
+    [&["single_vortex", "rotation", "translation"], &["vortex_3d", "rotation", "translation"]];
+
+impl FlowChoice {
+    /// The velocity field in `D` dimensions.
+    ///
+    /// # Errors
+    /// Where it does not exist in this dimension.
+    pub fn flow<const D: usize>(&self) -> Result<Box<dyn Flow<D>>, Violation> {
+        match self {
+            Self::SingleVortex { period } => self.in_plane(SingleVortex { period: *period }),
+            Self::Vortex3d { period } => self.in_space(Vortex3d { period: *period }),
+            Self::Rotation { center, angular_velocity } => {
+                Ok(Box::new(Rotation { center: vector("center", center)?, angular_velocity: *angular_velocity }))
+            }
+            Self::Translation { velocity } => Ok(Box::new(Translation { velocity: vector("velocity", velocity)? })),
+        }
+    }
+
+    /// A flow of the plane, where the scene has two dimensions.
+    fn in_plane<const D: usize>(&self, flow: impl Flow<2> + 'static) -> Result<Box<dyn Flow<D>>, Violation> {
+        let flow: Box<dyn Flow<2>> = Box::new(flow);
+        in_dimension(flow).ok_or_else(|| self.exists_elsewhere::<D>("the plane"))
+    }
+
+    /// A flow of space, where the scene has three dimensions.
+    fn in_space<const D: usize>(&self, flow: impl Flow<3> + 'static) -> Result<Box<dyn Flow<D>>, Violation> {
+        let flow: Box<dyn Flow<3>> = Box::new(flow);
+        in_dimension(flow).ok_or_else(|| self.exists_elsewhere::<D>("space"))
+    }
+
+    fn exists_elsewhere<const D: usize>(&self, place: &str) -> Violation {
+        let detail = format!("{} is a flow of {place}, the scene has {D} dimensions", self.name());
+        Violation::new("/flow/type", "conflict", detail, self.name(), json!(EXISTING[D - 2]))
+    }
+}
+
+/// A vector parameter, where it has the dimension of the scene.
+fn vector<const D: usize>(name: &str, numbers: &Coordinates) -> Result<Vector<D>, Violation> {
+    if numbers.len() == D {
+        return Ok(Vector::<D>::from_column_slice(numbers));
+    }
+    let (at, detail) = (format!("/flow/{name}"), format!("the scene has {D} dimensions"));
+    Err(Violation::new(at, "conflict", detail, numbers.to_json(), json!(format!("{D} numbers"))))
+}
+
 /// Support for the tests of flows.
 #[cfg(test)]
 mod sampling {
@@ -98,5 +176,39 @@ mod sampling {
             }
         }
         largest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FlowChoice, Rotation};
+    use crate::geometry::{Flow, Vector};
+
+    #[test]
+    fn a_flow_exists_in_its_dimension_alone() {
+        let vortex = FlowChoice::SingleVortex { period: None };
+        assert!(vortex.flow::<2>().is_ok());
+        let found = vortex.flow::<3>().err().unwrap();
+        assert_eq!((found.pointer.as_str(), found.got.as_str()), ("/flow/type", Some("single_vortex")));
+        let rotation = FlowChoice::Rotation { center: [0.5, 0.5].into(), angular_velocity: 2.0 };
+        assert!(rotation.flow::<2>().is_ok() && rotation.flow::<3>().is_err());
+    }
+
+    #[test]
+    fn a_flow_that_says_nothing_has_the_neutral_answers() {
+        struct Shear;
+        impl Flow<2> for Shear {
+            fn velocity(&self, x: &Vector<2>, _time: f64) -> Vector<2> {
+                Vector::<2>::new(x[1], 0.0)
+            }
+
+            fn top_speed(&self, low: &Vector<2>, high: &Vector<2>) -> f64 {
+                low[1].abs().max(high[1].abs())
+            }
+        }
+        assert!(!Shear.is_rigid() && !Shear.is_back(0.0));
+        assert!(Shear.return_time().is_none() && Shear.typical_stretch().is_none());
+        let rotation = Rotation { center: Vector::<2>::zeros(), angular_velocity: 0.0 };
+        assert!(rotation.is_rigid() && rotation.return_time().is_none());
     }
 }

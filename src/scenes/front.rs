@@ -1,10 +1,14 @@
 //! `front`: geometric motion by the grid-based particle method (GBPM paper).
 
+mod choice;
+mod law;
+mod method;
 mod plan;
 pub mod spec;
 mod wavefront;
 
-pub(super) use plan::{FrontChoice, plan_front};
+pub(super) use choice::FrontChoice;
+pub(super) use plan::plan_front;
 pub(super) use spec::Law;
 
 use crate::scene::{self, SceneKind};

@@ -6,11 +6,12 @@ use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{Interrupt, Interrupted};
 use crate::time::PathIntegrator;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+use std::sync::Arc;
 
 /// A surface and the flow that moves it.
 pub struct ExactMotion<const D: usize> {
     surface: Option<Box<dyn Surface<D>>>,
-    flow: Box<dyn Flow<D>>,
+    flow: Arc<dyn Flow<D>>,
 }
 
 /// The exact surface at one time.
@@ -18,38 +19,56 @@ pub struct ExactFront<'a, const D: usize> {
     motion: &'a ExactMotion<D>,
     surface: &'a dyn Surface<D>,
     time: f64,
-    /// None where the surface at this time is known by its formula (at the start, after a return, in rigid motion).
+    /// The carried surface; None where the surface at this time is known by a formula: at the start, after a return and in a
+    /// rigid motion.
     advected: Option<AdvectedFront<D>>,
 }
 
 struct AdvectedFront<const D: usize> {
     points: Vec<Vector<D>>,
-    /// Whether point k and k + 1 are joined.
+    /// Whether points k and k + 1 are joined.
     joined: Vec<bool>,
     cells: CellList<D>,
 }
 
-/// Error of one inner step of the reference paths.
-const TOLERANCE: PathIntegrator = PathIntegrator::Dopri5 { tolerance: 1e-12 };
-/// The same for paths of which only the rough end is wanted.
-const ROUGH: PathIntegrator = PathIntegrator::Dopri5 { tolerance: 1e-7 };
-/// Distance from the surface beyond which the end of a rough path is on the right side: a thousand times the error of
-/// such a path in the flows here.
-const ROUGH_SIDE: f64 = 1e-2;
-/// The same for distances to first order, and the offset of the points by which the gradient of the backward map is found.
-const NEARBY: PathIntegrator = PathIntegrator::Dopri5 { tolerance: 1e-9 };
-const OFFSET: f64 = 1e-5;
-/// Points of the front at most.
-const MOST_POINTS: f64 = 2e5;
-/// Points of the front per spacing of the particles, so that the chords' error stays far below the method's.
-const POINTS_PER_SPACING: f64 = 200.0;
-
-/// Distance of the points of the front about a shape of some extent.
-fn front_spacing(extent: f64, spacing: f64) -> f64 {
-    (spacing / POINTS_PER_SPACING).max(4.0 * extent / MOST_POINTS)
+/// Tuning constants of exact fronts.
+struct ExactTuning {
+    /// Integrator of the reference paths; the tolerance is the error of one inner step.
+    tight: PathIntegrator,
+    /// Integrator of paths whose ends may be rough.
+    rough: PathIntegrator,
+    /// Distance from the surface beyond which a rough path ends on the right side, in length: a thousand times the error of
+    /// such a path in the flows here.
+    rough_side: f64,
+    /// Integrator of paths for distances to first order.
+    nearby: PathIntegrator,
+    /// Offset of the points by which the gradient of the backward map is found, in length.
+    offset: f64,
+    /// Largest number of points of a front.
+    most_points: f64,
+    /// Points of a front per spacing of the particles, so that the error of its chords stays far below that of the method.
+    points_per_spacing: f64,
+    /// Edge of the cells for the search of the nearest point of a front, in spacings of the particles.
+    cell_edge: f64,
 }
 
-/// How many points a front will have, about: as many as that of a circle of this extent.
+const TUNING: ExactTuning = ExactTuning {
+    tight: PathIntegrator::Dopri5 { tolerance: 1e-12 },
+    rough: PathIntegrator::Dopri5 { tolerance: 1e-7 },
+    rough_side: 1e-2,
+    nearby: PathIntegrator::Dopri5 { tolerance: 1e-9 },
+    offset: 1e-5,
+    most_points: 2e5,
+    points_per_spacing: 200.0,
+    cell_edge: 0.25,
+};
+
+/// Spacing of the points of a front, from the extent of its shape.
+fn front_spacing(extent: f64, spacing: f64) -> f64 {
+    (spacing / TUNING.points_per_spacing).max(4.0 * extent / TUNING.most_points)
+}
+
+/// Estimated number of points of a front: that of a circle of this extent.
 #[must_use]
 pub fn front_points(extent: f64, spacing: f64) -> f64 {
     std::f64::consts::PI * extent / front_spacing(extent, spacing)
@@ -58,7 +77,7 @@ pub fn front_points(extent: f64, spacing: f64) -> f64 {
 impl<const D: usize> ExactMotion<D> {
     /// A surface at time 0, where it is known, and its flow.
     #[must_use]
-    pub fn new(surface: Option<Box<dyn Surface<D>>>, flow: Box<dyn Flow<D>>) -> Self {
+    pub fn new(surface: Option<Box<dyn Surface<D>>>, flow: Arc<dyn Flow<D>>) -> Self {
         Self { surface, flow }
     }
 
@@ -79,26 +98,26 @@ impl<const D: usize> ExactMotion<D> {
     #[must_use]
     pub fn distance_nearby(&self, x: &Vector<D>, time: f64) -> Option<f64> {
         let surface = self.surface()?;
-        let start = |x: &Vector<D>| surface.signed_distance(&NEARBY.advance(self.flow.as_ref(), x, time, -time));
+        let start = |x: &Vector<D>| surface.signed_distance(&TUNING.nearby.advance(self.flow.as_ref(), x, time, -time));
         let here = start(x);
         let gradient = Vector::<D>::from_fn(|d, _| {
             let mut aside = *x;
-            aside[d] += OFFSET;
-            (start(&aside) - here) / OFFSET
+            aside[d] += TUNING.offset;
+            (start(&aside) - here) / TUNING.offset
         });
         Some(here / gradient.norm())
     }
 
-    /// Roughly where a point of the start is at a time.
+    /// The approximate position at a time of a point of the surface at the start.
     #[must_use]
     pub fn place_about(&self, start: &Vector<D>, time: f64) -> Vector<D> {
-        ROUGH.advance(self.flow.as_ref(), start, 0.0, time)
+        TUNING.rough.advance(self.flow.as_ref(), start, 0.0, time)
     }
 
     /// The surface at a time, resolved for particles of a spacing; None where it is not known.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when the run is asked to stop.
     pub fn front(
         &self,
         time: f64,
@@ -121,12 +140,12 @@ impl<const D: usize> ExactMotion<D> {
             joined.extend((0..chain.len()).map(|k| k + 1 < chain.len()));
         }
         let end = |x: &Vector<D>| {
-            if interrupt.is_raised() { *x } else { TOLERANCE.advance(self.flow.as_ref(), x, 0.0, time) }
+            if interrupt.is_raised() { *x } else { TUNING.tight.advance(self.flow.as_ref(), x, 0.0, time) }
         };
         let points: Vec<Vector<D>> = starts.par_iter().map(end).collect();
         interrupt.check()?;
         let mut cells = CellList::new(Domain::unbounded());
-        cells.rebuild(points.iter().copied(), 0.25 * spacing);
+        cells.rebuild(points.iter().copied(), TUNING.cell_edge * spacing);
         let advected = Some(AdvectedFront { points, joined, cells });
         Ok(Some(ExactFront { motion: self, surface, time, advected }))
     }
@@ -156,7 +175,7 @@ impl<const D: usize> ExactFront<'_, D> {
         chains
     }
 
-    /// The place that a point of the surface at the start has reached, where that is known by a formula.
+    /// The position at this time of a point of the surface at the start, where that is known by a formula.
     #[must_use]
     pub fn place_by_formula(&self, start: &Vector<D>) -> Option<Vector<D>> {
         let is_known = self.advected.is_none();
@@ -168,7 +187,7 @@ impl<const D: usize> ExactFront<'_, D> {
     pub fn signed_distance(&self, x: &Vector<D>) -> f64 {
         let flow = self.motion.flow.as_ref();
         match &self.advected {
-            // A rigid motion keeps distances; whatever else has no front of its own is back at its start.
+            // A rigid motion keeps distances; every other surface known by a formula is back at its start.
             None => {
                 let start = flow.rigid_path(x, -self.time).unwrap_or(*x);
                 self.surface.signed_distance(&start)
@@ -177,9 +196,9 @@ impl<const D: usize> ExactFront<'_, D> {
                 let start_distance = |integrator: PathIntegrator| {
                     self.surface.signed_distance(&integrator.advance(flow, x, self.time, -self.time))
                 };
-                // Only the side is wanted: far from the surface a rough path tells it.
-                let rough = start_distance(ROUGH);
-                let side = if rough.abs() > ROUGH_SIDE { rough } else { start_distance(TOLERANCE) };
+                // Only the side matters here; far from the surface a rough path tells it.
+                let rough = start_distance(TUNING.rough);
+                let side = if rough.abs() > TUNING.rough_side { rough } else { start_distance(TUNING.tight) };
                 front.distance(x).copysign(side)
             }
         }
@@ -210,7 +229,7 @@ impl<const D: usize> AdvectedFront<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{ExactMotion, Interrupt};
+    use super::{Arc, ExactMotion, Interrupt};
     use crate::geometry::Vector;
     use crate::geometry::flows::{Rotation, SingleVortex};
     use crate::geometry::surfaces::Ball;
@@ -221,14 +240,14 @@ mod tests {
 
     #[test]
     fn a_returned_vortex_is_the_start() {
-        let motion = ExactMotion::new(ball(), Box::new(SingleVortex { period: Some(8.0) }));
+        let motion = ExactMotion::new(ball(), Arc::new(SingleVortex { period: Some(8.0) }));
         let front = motion.front(8.0, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         assert!((front.signed_distance(&Vector::<2>::new(0.5, 1.0)) - 0.1).abs() < 1e-15);
     }
 
     #[test]
     fn the_distance_nearby_agrees_with_the_advected_front() {
-        let motion = ExactMotion::new(ball(), Box::new(SingleVortex { period: Some(2.0) }));
+        let motion = ExactMotion::new(ball(), Arc::new(SingleVortex { period: Some(2.0) }));
         let front = motion.front(0.7, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         for k in 0..8 {
             let angle = 0.8 * f64::from(k);
@@ -243,7 +262,7 @@ mod tests {
     #[test]
     fn the_advected_front_agrees_with_a_nearly_returned_one() {
         // Just before the return the surface is displaced by less than 2e-8: speed vanishes with the cosine.
-        let motion = ExactMotion::new(ball(), Box::new(SingleVortex { period: Some(2.0) }));
+        let motion = ExactMotion::new(ball(), Arc::new(SingleVortex { period: Some(2.0) }));
         let front = motion.front(2.0 - 2e-8, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         for x in [Vector::<2>::new(0.5, 1.0), Vector::<2>::new(0.42, 0.7), Vector::<2>::new(0.655, 0.75)] {
             let exact = (x - Vector::<2>::new(0.5, 0.75)).norm() - 0.15;
@@ -254,7 +273,7 @@ mod tests {
     #[test]
     fn rigid_motion_is_exact() {
         let rotation = Rotation { center: Vector::<2>::new(0.5, 0.5), angular_velocity: 1.0 };
-        let motion = ExactMotion::new(ball(), Box::new(rotation));
+        let motion = ExactMotion::new(ball(), Arc::new(rotation));
         let front = motion.front(std::f64::consts::FRAC_PI_2, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         // A quarter turn takes the centre to (0.25, 0.5).
         assert!((front.signed_distance(&Vector::<2>::new(0.25, 0.8)) - 0.15).abs() < 1e-10);

@@ -1,33 +1,60 @@
-//! The grid-based particle method (GBPM paper): a moving front as foot-points of the grid points near it.
+//! The grid-based particle method (GBPM paper): a moving front as the foot points of the grid points near it.
 //!
-//! Foot-points move by a law; then every grid point near the front gets the closest point of a local reconstruction
-//! through the moved ones as its new foot-point.
+//! In each step the foot points move by a law. Then every grid point near the front gets a new foot point: the closest point
+//! of a local reconstruction through the moved ones.
+//!
+//! | file | content |
+//! | --- | --- |
+//! | `system`, `simulation` | the front and its steps; the simulation |
+//! | `config`, `method` | the configuration of a front; the parameters of the method |
+//! | `laws` | what moves a front, one file a law |
+//! | `placement`, `corners`, `wavefront` | foot points at the start; corners that open; wave fronts of optics |
+//! | `grid`, `tube`, `refinement` | the grid with its levels; grid points near a surface; which cells are split |
+//! | `resampling`, `gaps`, `removals` | new foot points after a motion; particles next to gaps; counts |
+//! | `reconstruction`, `reconstructor` | the closest point of a front to one place; to many places |
+//! | `local_graph`, `local_shape`, `support` | polynomials over a tangent plane; their curvatures; extent of their particles |
+//! | `segments`, `topology`, `sweep` | how segments are told apart; what happens where they meet; which particles are swept |
+//! | `exact_front`, `exact`, `coverage` | exact motions, one file a motion; errors; gaps |
 
+mod config;
 mod corners;
+pub mod curvature_stability;
+mod coverage;
 mod exact;
+mod exact_front;
+#[cfg(test)]
+mod fixtures;
 mod foot_points;
+mod gaps;
 mod grid;
+pub mod laws;
 mod local_graph;
+mod local_shape;
 mod method;
-mod motion;
+mod placement;
 mod reconstruction;
+mod reconstructor;
 mod refinement;
+mod removals;
 mod resampling;
 mod segments;
 mod simulation;
+mod support;
+mod sweep;
 mod system;
 mod topology;
+mod tube;
 mod wavefront;
 
-pub use exact::ExactFrontMotion;
+pub use config::FrontConfig;
+pub use exact_front::ExactFrontMotion;
 pub use foot_points::FootPoints;
 pub use grid::{Grid, MOST_LEVELS};
-pub use method::FrontMethod;
-pub use motion::Law;
-pub use refinement::Adaptivity;
-pub use resampling::Removals;
+pub use laws::FrontLaw;
+pub use method::{Adaptivity, FrontMethod};
+pub use removals::Removals;
 pub use segments::Segments;
 pub use simulation::GridBasedParticles;
-pub use system::{FrontParts, FrontSystem};
+pub use system::FrontSystem;
 pub use topology::Topology;
 pub use wavefront::EllipticalWavefront;

@@ -2,12 +2,6 @@
 
 /// Circles of files.
 pub const CIRCLES: &[&[&str]] = &[
-    &[
-        "src/schemes/grid_based_particle/corners.rs",
-        "src/schemes/grid_based_particle/resampling.rs",
-        "src/schemes/grid_based_particle/system.rs",
-    ],
-    &["src/schemes/grid_based_particle/method.rs", "src/schemes/grid_based_particle/refinement.rs"],
     &["src/schemes/weakly_compressible_sph/stepping.rs", "src/schemes/weakly_compressible_sph/system.rs"],
     &["jobs/src/service/store/studies.rs", "jobs/src/service/store/transitions.rs"],
     &[
@@ -30,9 +24,6 @@ pub const WORDS: &[(&str, usize)] = &[
     ("src/scenes/surface_pde/surfaces.rs", 1),
     ("src/schemes/advected_level_set/simulation.rs", 2),
     ("src/schemes/advected_level_set/system.rs", 1),
-    ("src/schemes/exact_motion.rs", 1),
-    ("src/schemes/grid_based_particle/resampling.rs", 2),
-    ("src/schemes/grid_based_particle/system.rs", 1),
     ("src/schemes/measured_redistancing.rs", 2),
     ("src/schemes/static_redistancing/remeshing.rs", 1),
     ("src/schemes/weakly_compressible_sph/components.rs", 1),
@@ -74,9 +65,6 @@ pub const LONG_FUNCTIONS: &[(&str, &str, usize, &str)] = &[
     ("src/polynomials/horner.rs", "unrolled", 63, "unrolled by hand: an arm a degree"),
     ("src/scenes/surface_pde/surfaces.rs", "in_space", 61, "the typed spec replaces it (issue 18, item 1)"),
     ("src/schemes/embedding_closest_point/band.rs", "about", 71, "not cut yet (issue 18)"),
-    ("src/schemes/grid_based_particle/exact.rs", "errors", 94, "not cut yet (issue 18)"),
-    ("src/schemes/grid_based_particle/reconstruction.rs", "fit_across", 78, "not cut yet (issue 18)"),
-    ("src/schemes/grid_based_particle/system.rs", "place_on", 62, "not cut yet (issue 18)"),
     (
         "src/schemes/weakly_compressible_sph/simulation.rs",
         "restore",

@@ -9,9 +9,7 @@ pub use restart::{Origin, RestartSource, RestartSpec};
 pub use sources::{NoSources, Sources};
 
 use crate::spec::forecast::{self, Forecast, WORKER_BASE_BYTES};
-use crate::spec::run_options::{
-    CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions,
-};
+use crate::spec::run_options::{CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions};
 use meniscus::scene::{self, CloudSizes, CloudSource, Estimate, Scene};
 use meniscus::scenes::SCENES;
 use meniscus::spec::{Given, Group, Json, Parameter, Raw, Violation, group};
@@ -252,8 +250,7 @@ fn check_memory(prefix: &str, scene: &dyn Scene, estimate: &Estimate, limit: u64
         estimate.particles
     );
     let at = format!("{prefix}/spacing");
-    (needed > limit)
-        .then(|| Violation::new(at, "memory", detail, json!(scene.spacing()), format!("≤ {limit} bytes")))
+    (needed > limit).then(|| Violation::new(at, "memory", detail, json!(scene.spacing()), format!("≤ {limit} bytes")))
 }
 
 /// An error where the checkpoint lies behind the end of the scene.

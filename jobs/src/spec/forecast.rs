@@ -2,9 +2,9 @@
 
 use crate::formats::hdf5_file::CHUNK_ROWS;
 use crate::spec::calibration::Calibration;
+use crate::spec::run_options::RunOptions;
 use meniscus::scene::{Estimate, PhaseWork};
 use meniscus::scenes::work_estimate;
-use crate::spec::run_options::RunOptions;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -80,11 +80,7 @@ impl Forecast {
 
 /// Bytes of all files of a run: its frames, its series, its picture, and its checkpoints: the last one, and where they come by
 /// steps as many as are kept.
-pub(crate) fn disk_bytes(
-    dimension: usize,
-    estimate: &Estimate,
-    options: &RunOptions,
-) -> u64 {
+pub(crate) fn disk_bytes(dimension: usize, estimate: &Estimate, options: &RunOptions) -> u64 {
     const FILE: u64 = 24 << 10;
     const CHUNK: u64 = CHUNK_ROWS as u64;
     let plan = options.plan();

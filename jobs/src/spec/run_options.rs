@@ -67,10 +67,7 @@ impl Parameter for FieldNames {
     }
 
     fn schema((): ()) -> Object {
-        Object::from_iter([
-            ("type".to_owned(), json!("array")),
-            ("items".to_owned(), json!({"type": "string"})),
-        ])
+        Object::from_iter([("type".to_owned(), json!("array")), ("items".to_owned(), json!({"type": "string"}))])
     }
 
     fn to_json(&self) -> Json {

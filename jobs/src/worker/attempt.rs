@@ -3,8 +3,8 @@
 use crate::formats::checkpoint::{self, CheckpointError, Counters, Meta};
 use crate::formats::{picture, vtkhdf};
 use crate::spec::attempt_spec::{Order, StartCheckpoint};
-use crate::spec::run_options::RunOptions;
 use crate::spec::records::{Record, RecordSink, Verdict};
+use crate::spec::run_options::RunOptions;
 use crate::spec::states::Reason;
 use crate::system::artifacts;
 use crate::system::process;

@@ -91,12 +91,7 @@ fn body_force<const D: usize>(force: &ForceChoice, errors: &mut Vec<Violation>) 
 }
 
 /// Where normals and curvatures come from; the spec gets what was left open.
-fn geometry(
-    spec: &mut Droplet,
-    case: &Case,
-    dimension: usize,
-    smoothing_h: f64,
-) -> Result<Geometry, Violation> {
+fn geometry(spec: &mut Droplet, case: &Case, dimension: usize, smoothing_h: f64) -> Result<Geometry, Violation> {
     let GeometryChoice::Pcp { band_h, method } = &mut spec.geometry else { return Ok(Geometry::ColorField) };
     if method.neighborhood.is_none() && method.cutoff_h.is_none() {
         method.neighborhood = Some(Neighborhood::Radius { cutoff_h: case.fits.1 });

@@ -1,7 +1,8 @@
 //! The parameters of a `front` scene.
 
-use crate::scenes::flows::{FlowChoice, IntegratorChoice};
+use crate::geometry::flows::FlowChoice;
 use crate::scenes::gbpm_spec::{GbpmSpec, TopologyWord};
+use crate::scenes::integrators::IntegratorChoice;
 use crate::scenes::shapes::{PlainShape, Shape};
 use crate::spec::{Given, POSITIVE, Preset, whole};
 

@@ -1,33 +1,61 @@
 //! A wave front of geometrical optics: a curve in (x, y, θ).
 
-use super::plan::{BYTES, FrontChoice, labels};
-use crate::geometry::flows::Rays;
+use super::choice::{Completed, FrontChoice, FrontPlan, Resolved};
+use super::method::{BYTES, FrontQuestion, is_within_grid, labels, plan_method};
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
-use crate::scene::{BuildContext, Estimate, Scene};
-use crate::scenes::gbpm_spec::GbpmPlan;
+use crate::scene::{BuildContext, Estimate, Planned, Scene};
+use crate::scenes::particle_estimate::check_extent;
 use crate::scenes::shapes::{PlainShape, Shape};
 use crate::scenes::work_estimate;
+use crate::schemes::grid_based_particle::laws::GeometricalOptics;
 use crate::schemes::grid_based_particle::{
-    EllipticalWavefront, ExactFrontMotion, FrontParts, FrontSystem, Grid, GridBasedParticles, Law,
+    EllipticalWavefront, FrontConfig, FrontLaw, FrontSystem, Grid, GridBasedParticles,
 };
 use crate::simulation::{OutputPlan, Simulation};
 use crate::spec::{Choice, Coordinates, Violation};
-use crate::time::FixedStep;
 use serde_json::{Value, json};
+use std::sync::Arc;
 
-pub(super) struct WavefrontScene {
-    /// The kind and the resolved parameters.
-    pub resolved: (&'static str, Value),
-    pub choice: FrontChoice,
-    pub chosen: GbpmPlan,
-    pub fixed: FixedStep,
-    pub front: EllipticalWavefront,
+/// The longest wave front, in spacings.
+const MOST_CURVE: f64 = 1e6;
+
+struct WavefrontScene {
+    choice: FrontChoice,
+    front: EllipticalWavefront,
+    law: Arc<GeometricalOptics>,
+    plan: FrontPlan,
+}
+
+/// A wave front that starts on a shape of D dimensions.
+pub(super) fn plan<const D: usize>(
+    choice: FrontChoice,
+    speed: f64,
+    complete: impl FnOnce(Completed) -> Resolved,
+) -> Planned {
+    let mut errors = Vec::new();
+    match choice.shape.surface::<D>("/shape") {
+        Ok(surface) => errors.extend(check_extent(surface.as_ref(), 4.0 * choice.spacing, choice.spacing)),
+        Err(found) => errors.extend(found),
+    }
+    let front = from_shape(&choice.shape, speed);
+    errors.extend(front.as_ref().err().cloned());
+    let law = GeometricalOptics::new(speed);
+    let is_within_grid = |levels: u32| {
+        front.as_ref().map_or(true, |front| {
+            let is_short = front.length() < MOST_CURVE * choice.spacing;
+            is_short && is_within_grid(front.bounding_box(choice.end_time), choice.spacing, levels)
+        })
+    };
+    let question = FrontQuestion { law: Some(&law), extent: None, dimension: D, is_within_grid: &is_within_grid };
+    let plan = plan_method(&choice, &question, complete, errors)?;
+    let front = front.map_err(|found| vec![found])?;
+    Ok(Box::new(WavefrontScene { choice, front, law: Arc::new(law), plan }))
 }
 
 /// The wave front that starts on a circle or an ellipse.
-pub(super) fn from_shape(shape: &Shape, speed: f64) -> Result<EllipticalWavefront, Violation> {
+fn from_shape(shape: &Shape, speed: f64) -> Result<EllipticalWavefront, Violation> {
     let pair = |numbers: &Coordinates| numbers.first().zip(numbers.get(1)).map(|(x, y)| [*x, *y]);
     let found = match shape {
         Shape::Plain(PlainShape::Circle { center, radius }) => Some((center, [*radius; 2])),
@@ -45,22 +73,23 @@ pub(super) fn from_shape(shape: &Shape, speed: f64) -> Result<EllipticalWavefron
 
 impl WavefrontScene {
     fn system(&self, interrupt: Interrupt) -> FrontSystem<3, 1> {
-        let parts = FrontParts {
+        let chosen = &self.plan.chosen;
+        let config = FrontConfig {
             grid: Grid { spacing: self.choice.spacing },
-            method: self.chosen.method,
-            law: Law::Flow(Box::new(Rays { speed: self.front.speed })),
+            method: chosen.method,
+            law: Arc::<GeometricalOptics>::clone(&self.law),
             integrator: self.choice.integrator,
-            topology: self.chosen.topology,
-            segments: self.chosen.segments,
+            topology: chosen.topology,
+            segments: chosen.segments,
             interrupt,
         };
-        FrontSystem::of(self.front.foot_points(&parts.grid, &parts.method), parts)
+        FrontSystem::new(self.front.foot_points(&config.grid, &config.method), config)
     }
 }
 
 impl Scene for WavefrontScene {
     fn kind(&self) -> &'static str {
-        self.resolved.0
+        self.plan.resolved.0
     }
 
     fn dimension(&self) -> usize {
@@ -72,12 +101,12 @@ impl Scene for WavefrontScene {
     }
 
     fn resolved(&self) -> Value {
-        self.resolved.1.clone()
+        self.plan.resolved.1.clone()
     }
 
     fn field_names(&self) -> Vec<&'static str> {
         let mut names = vec!["normal", "curvature", "velocity", "grid_point", "level", "segment", "particle_id"];
-        if self.chosen.segments.parameter.is_some() {
+        if self.plan.chosen.segments.parameter.is_some() {
             names.push("parameter");
         }
         names
@@ -87,15 +116,15 @@ impl Scene for WavefrontScene {
         let particles = self.system(Interrupt::default()).particle_count() as u64;
         Estimate {
             particles,
-            steps: self.fixed.steps,
-            time_step: self.fixed.time_step,
+            steps: self.plan.fixed.steps,
+            time_step: self.plan.fixed.time_step,
             end_time: self.choice.end_time,
             memory_bytes: particles.saturating_mul(2 * BYTES),
         }
     }
 
     fn family(&self) -> String {
-        format!("front/optics/{}", self.chosen.method.degree)
+        format!("front/{}/{}", self.law.name(), self.plan.chosen.method.degree)
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
@@ -103,7 +132,7 @@ impl Scene for WavefrontScene {
         let number = particles as f64 * steps as f64;
         let mut work = vec![
             PhaseWork::every_step("front/motion", number),
-            PhaseWork::every_step("front/resampling", number * self.chosen.method.neighbors as f64),
+            PhaseWork::every_step("front/resampling", number * self.plan.chosen.method.neighbors as f64),
             PhaseWork::at_moments("errors", particles as f64),
         ];
         work.extend(work_estimate::around(particles as f64, steps, end_time, plan));
@@ -116,8 +145,9 @@ impl Scene for WavefrontScene {
             let detail = "no grid point of this spacing has a foot-point on the curve";
             return Err(vec![Violation::new("/spacing", "range", detail, self.choice.spacing, Value::Null)]);
         }
-        let said = labels(&self.chosen, self.fixed, None);
-        let exact = ExactFrontMotion::Rays(self.front);
-        Ok(Box::new(GridBasedParticles::new(system, exact, None, self.fixed, context.cpu_clock, said)))
+        let FrontPlan { chosen, fixed, .. } = &self.plan;
+        let labels = labels(chosen, *fixed, self.law.particles_in_bends());
+        let exact = Box::new(self.front);
+        Ok(Box::new(GridBasedParticles::new(system, exact, None, *fixed, context.cpu_clock, labels)))
     }
 }

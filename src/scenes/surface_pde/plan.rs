@@ -4,7 +4,8 @@
 use super::points;
 use super::problems::{self, ProblemChoice};
 use super::spec::{
-    EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, SurfaceChoice, SurfacePde,
+    EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, SurfaceChoice,
+    SurfacePde,
 };
 use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
 use crate::geometry::random::CounterRandom;
@@ -404,8 +405,7 @@ impl SurfaceScene {
             Normals::Estimated => {
                 let found = normals::estimate::<D>(&cloud.points, radius);
                 let found = found.map_err(|failed| {
-                    let refused =
-                        Violation::new("/normals", "data", failed.to_string(), "estimated", Value::Null);
+                    let refused = Violation::new("/normals", "data", failed.to_string(), "estimated", Value::Null);
                     vec![refused]
                 })?;
                 cloud.normals = found;

@@ -7,7 +7,7 @@ use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
-use crate::scenes::flow_work::{error_units, stretch};
+use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
@@ -17,6 +17,7 @@ use crate::schemes::advected_level_set::{
     AdvectedLevelSet, AdvectedParts, AdvectedSystem, FieldChoice, RedistanceWhen, Start,
 };
 use crate::schemes::exact_motion::ExactMotion;
+use crate::schemes::front_stretch::front_stretch;
 use crate::simulation::{OutputPlan, Simulation};
 use crate::spec::{Parameter, Violation};
 use crate::time::{FixedStep, PathIntegrator};
@@ -283,7 +284,9 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
-            self.spec.shape.surface::<D>("/shape")
+            self.spec
+                .shape
+                .surface::<D>("/shape")
                 .map_or(0, |surface| band_particles(surface.as_ref(), self.reach(), self.lattice.spacing))
         });
         Estimate {
@@ -324,7 +327,7 @@ impl<const D: usize> Scene for VortexScene<D> {
         let surface = self.spec.shape.surface::<D>("/shape").ok();
         let stretch = match (&surface, &flow) {
             (Some(surface), Some(flow)) if course == Course::EveryStep => {
-                stretch(surface.as_ref(), flow.as_ref(), end_time).mean
+                front_stretch(surface.as_ref(), flow.as_ref(), end_time).mean
             }
             _ => 1.0,
         };
@@ -360,7 +363,7 @@ impl<const D: usize> Scene for VortexScene<D> {
             }
             (Start { positions, level }, None)
         };
-        let system = AdvectedSystem::new(ExactMotion::new(surface, flow), start, parts, context.interrupt);
+        let system = AdvectedSystem::new(ExactMotion::new(surface, flow.into()), start, parts, context.interrupt);
         Ok(Box::new(AdvectedLevelSet::new(system, self.fixed, context.plan, context.cpu_clock, self.chosen.clone())))
     }
 }

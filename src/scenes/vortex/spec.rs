@@ -1,7 +1,8 @@
 //! The parameters of a `vortex` scene.
 
-use crate::scenes::flows::{FlowChoice, IntegratorChoice};
+use crate::geometry::flows::FlowChoice;
 use crate::scenes::gbpm_spec::GbpmSpec;
+use crate::scenes::integrators::IntegratorChoice;
 use crate::scenes::pcp_spec::{Neighborhood, PcpSpec};
 use crate::scenes::shapes::{PlainShape, Shape};
 use crate::spec::{Given, Interval, POSITIVE, Preset, Whole, whole};

@@ -1,65 +1,65 @@
-//! The particles of a front: one foot-point a grid point.
+//! The particles of a front: one foot point for each grid point near it.
 
 use super::grid::{Grid, Node};
 use crate::geometry::Vector;
 use crate::simulation::state::check_length;
 use crate::simulation::{RestoreError, State};
 
-/// One foot-point.
+/// One foot point: the point of the front closest to a grid point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FootPoint<const D: usize> {
-    /// y.
+    /// y, its position.
     pub position: Vector<D>,
-    /// n, outward; of a curve in space its tangent.
+    /// n, the outward unit normal of a surface or the unit tangent of a curve in space.
     pub normal: Vector<D>,
-    /// ∇·n.
+    /// ∇·n, or κ of a curve in space.
     pub curvature: f64,
-    /// Product of the principal curvatures; zero in the plane.
+    /// Product of the principal curvatures; zero of a curve.
     pub gauss_curvature: f64,
-    /// Which of the closed parts of the front at the start it belongs to.
+    /// Index of its closed part of the front at the start.
     pub part: u32,
-    /// How far along that part, from 0 to 1 round it; 0 where nothing asks for it.
+    /// Position along that part, from 0 to 1 around it; 0 where parameters are not used.
     pub parameter: f64,
 }
 
-/// All foot-points, in the order of their grid points; at the start and where moved ones stay others follow.
+/// All foot points in the order of their grid points. Particles of corners, and moved particles that stay, follow.
 #[derive(Debug, Clone, Default)]
 pub struct FootPoints<const D: usize> {
-    /// p.
+    /// Grid points.
     pub nodes: Vec<Node>,
-    /// y.
+    /// Positions.
     pub positions: Vec<Vector<D>>,
-    /// n.
+    /// Unit normals, or tangents of a curve in space.
     pub normals: Vec<Vector<D>>,
-    /// ∇·n.
+    /// ∇·n, or κ of a curve in space.
     pub curvatures: Vec<f64>,
-    /// Product of the principal curvatures.
+    /// Products of the principal curvatures.
     pub gauss_curvatures: Vec<f64>,
-    /// Part of the front at the start.
+    /// Indices of closed parts of the front at the start.
     pub parts: Vec<u32>,
-    /// How far along it.
+    /// Positions along these parts.
     pub parameters: Vec<f64>,
 }
 
 impl<const D: usize> FootPoints<D> {
-    /// How many there are.
+    /// Number of foot points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// The spacing of the finest level that any is of.
+    /// The spacing of the finest level with foot points.
     pub(super) fn finest_spacing(&self, grid: &Grid) -> f64 {
         grid.spacing_at(self.nodes.iter().map(|node| Grid::level(*node)).max().unwrap_or(0))
     }
 
-    /// Whether there is none.
+    /// Whether there are no foot points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// Forgets all.
+    /// Removes all foot points.
     pub fn clear(&mut self) {
         self.nodes.clear();
         self.positions.clear();
@@ -70,7 +70,7 @@ impl<const D: usize> FootPoints<D> {
         self.parameters.clear();
     }
 
-    /// Adds one.
+    /// Adds a foot point of a grid point.
     pub fn push(&mut self, node: Node, foot: &FootPoint<D>) {
         self.nodes.push(node);
         self.positions.push(foot.position);
@@ -81,7 +81,7 @@ impl<const D: usize> FootPoints<D> {
         self.parameters.push(foot.parameter);
     }
 
-    /// One of them.
+    /// Foot point i.
     #[must_use]
     pub fn get(&self, i: usize) -> FootPoint<D> {
         FootPoint {
@@ -94,7 +94,7 @@ impl<const D: usize> FootPoints<D> {
         }
     }
 
-    /// Keeps those with a mark, in their order.
+    /// Keeps the marked foot points in their order.
     pub fn retain(&mut self, keep: &[bool]) {
         fn thin<T>(values: &mut Vec<T>, keep: &[bool]) {
             let mut k = 0;

@@ -4,12 +4,12 @@
 
 use crate::geometry::Vector;
 
-/// A grid point's number: its level, then its coordinates by the spacing of the level, in an order that is that of space.
+/// Number of a grid point: its level, then its coordinates in spacings of the level. Ascending numbers follow space.
 pub type Node = u64;
 
 /// Bits of the level.
 const LEVEL_BITS: u32 = 4;
-/// The levels that a front may ask for: each is twice as long to walk over.
+/// Largest number of levels. Each further level doubles the time to visit a row of cells.
 pub const MOST_LEVELS: u32 = 8;
 
 /// Bits of one coordinate.
@@ -17,12 +17,12 @@ const fn bits<const D: usize>() -> u32 {
     (u64::BITS - LEVEL_BITS) / D as u32
 }
 
-/// What is added to coordinates so that none is negative: half their number.
+/// Offset that makes all coordinates positive: half their number.
 const fn offset<const D: usize>() -> i64 {
     1 << (bits::<D>() - 1)
 }
 
-/// The centre of cell 0 of a level, by the spacing of the level: cells of all levels have common faces.
+/// Center of cell 0 of a level, in spacings of the level: cells of all levels have common faces.
 fn shift(level: u32) -> f64 {
     0.5 * (1.0 - f64::from(1_u32 << level))
 }
@@ -53,21 +53,21 @@ impl Grid {
         (node >> (u64::BITS - LEVEL_BITS)) as u32
     }
 
-    /// The place of a grid point.
+    /// The position of a grid point.
     #[must_use]
     pub fn place<const D: usize>(&self, node: Node) -> Vector<D> {
         let level = Self::level(node);
         self.center(&Self::coordinates(node), level)
     }
 
-    /// The place with such coordinates.
+    /// The position with some coordinates.
     #[must_use]
     pub fn center<const D: usize>(&self, at: &[i64; D], level: u32) -> Vector<D> {
         let (spacing, shift) = (self.spacing_at(level), shift(level));
         Vector::<D>::from_fn(|d, _| (at[d] as f64 + shift) * spacing)
     }
 
-    /// The coordinates of the grid point next to a place, that is of the cell with it; None where the grid ends.
+    /// The coordinates of the grid point nearest to a place, whose cell contains the place; None beyond the end of the grid.
     #[must_use]
     pub fn nearest<const D: usize>(&self, x: &Vector<D>, level: u32) -> Option<[i64; D]> {
         let (spacing, shift) = (self.spacing_at(level), shift(level));
@@ -91,7 +91,7 @@ impl Grid {
             .fold(level, |node, (d, c)| node | ((c + offset::<D>()) as u64) << (bits::<D>() * d as u32))
     }
 
-    /// What the next cell along an axis has more in its number.
+    /// Difference between the numbers of two cells next to each other along an axis.
     pub(super) fn next_along<const D: usize>(axis: usize) -> Node {
         1 << (bits::<D>() * axis as u32)
     }
@@ -103,7 +103,7 @@ impl Grid {
         std::array::from_fn(|d| (node >> (bits::<D>() * d as u32) & mask) as i64 - offset::<D>())
     }
 
-    /// Calls for the coordinates of all cells of a box, both corners included.
+    /// Calls `visit` with the coordinates of all cells of a box, both corners included.
     pub fn for_each_in<const D: usize>(low: &[i64; D], high: &[i64; D], mut visit: impl FnMut(&[i64; D])) {
         let mut at = *low;
         if (0..D).any(|d| low[d] > high[d]) {

@@ -17,16 +17,30 @@ pub(super) const PARAMETER: usize = MOST_ACROSS;
 /// Coordinates along the tangent plane, and what is fitted over it.
 pub(super) type LocalPoint<const M: usize> = ([f64; M], [f64; QUANTITIES]);
 
-/// Newton's steps to a closest point at most.
-const MOST_ITERATIONS: usize = 30;
-/// The longest of them.
-const LONGEST_STEP: f64 = 0.5;
-/// The largest condition of a fit, its columns scaled: points spread evenly have 10 to 100.
-const WORST_CONDITION: f64 = 1e3;
-/// A step that changes nothing.
-const STILL: f64 = 1e-15;
-/// The last step of an answer that counts as found.
-const FOUND: f64 = 1e-9;
+/// Tuning constants of fits and of Newton's iteration to a closest point. Lengths are in spacings.
+struct GraphTuning {
+    /// Largest number of Newton steps.
+    most_iterations: usize,
+    /// Longest Newton step.
+    longest_step: f64,
+    /// Length of a Newton step that changes nothing.
+    still: f64,
+    /// Length of the last Newton step below which the closest point counts as found.
+    found: f64,
+    /// Least pivot of a Hessian that counts as positive definite.
+    least_pivot: f64,
+    /// Largest condition of a fit with scaled columns; evenly spread points have 10 to 100.
+    worst_condition: f64,
+}
+
+const TUNING: GraphTuning = GraphTuning {
+    most_iterations: 30,
+    longest_step: 0.5,
+    still: 1e-15,
+    found: 1e-9,
+    least_pivot: 1e-3,
+    worst_condition: 1e3,
+};
 
 /// Exponents of the terms.
 #[derive(Debug, Clone)]
@@ -40,6 +54,19 @@ pub(super) struct GraphJet<const M: usize> {
     pub value: f64,
     pub first: [f64; M],
     pub second: [[f64; M]; M],
+}
+
+/// What a fit reads.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FitData<'a, const M: usize> {
+    /// Points s_j with the quantities there.
+    pub points: &'a [LocalPoint<M>],
+    /// k of the weights exp(−k |s_j|²).
+    pub weight: f64,
+    /// Slopes asked for at the points, None where the front is too steep; empty where none are asked for.
+    pub slopes: &'a [Option<[f64; M]>],
+    /// λ: slopes count with λ² times the weight of the quantities.
+    pub slope_weight: f64,
 }
 
 /// f with its coefficients.
@@ -64,44 +91,36 @@ impl<const M: usize> Terms<M> {
         LocalGraph { terms: self, coefficients: [0.0; MOST_TERMS] }
     }
 
-    /// The least-squares fit to one quantity at s_j with weights exp(−k |s_j|²), and with λ² times as much weight to its slopes
-    /// there, where there are any (one for each point then, None where the front is too steep); None where the points do not
-    /// determine it.
-    pub fn fit(
-        &self,
-        points: &[LocalPoint<M>],
-        quantity: usize,
-        k: f64,
-        (slopes, lambda): (&[Option<[f64; M]>], f64),
-        room: &mut LeastSquares,
-    ) -> Option<LocalGraph<'_, M>> {
+    /// The least-squares fit to one quantity; None where the points do not determine it.
+    pub fn fit(&self, data: &FitData<'_, M>, quantity: usize, squares: &mut LeastSquares) -> Option<LocalGraph<'_, M>> {
+        let &FitData { points, weight, slopes, slope_weight } = data;
         let n = self.count();
         if points.len() < n {
             return None;
         }
-        room.reset(points.len() + M * slopes.len(), n);
+        squares.reset(points.len() + M * slopes.len(), n);
         let mut row = [0.0; MOST_TERMS];
         for (j, (s, quantities)) in points.iter().enumerate() {
             let square: f64 = s.iter().map(|s| s * s).sum();
-            let root = (-0.5 * k * square).exp();
+            let root = (-0.5 * weight * square).exp();
             let powers = powers(s);
             for (value, index) in row.iter_mut().zip(&self.indices) {
                 *value = root * product(&powers, index);
             }
-            room.set_row(j, &row[..n], root * quantities[quantity]);
+            squares.set_row(j, &row[..n], root * quantities[quantity]);
             let Some(slope) = slopes.get(j) else { continue };
             // A row of zeros asks for nothing.
-            let (root, slope) = slope.map_or((0.0, [0.0; M]), |slope| (lambda * root, slope));
+            let (root, slope) = slope.map_or((0.0, [0.0; M]), |slope| (slope_weight * root, slope));
             for (a, slope) in slope.iter().enumerate() {
                 for (value, index) in row.iter_mut().zip(&self.indices) {
                     let term = lowered(index, a).map(|(factor, lower)| factor * product(&powers, &lower));
                     *value = root * term.unwrap_or(0.0);
                 }
-                room.set_row(points.len() + M * j + a, &row[..n], root * slope);
+                squares.set_row(points.len() + M * j + a, &row[..n], root * slope);
             }
         }
-        let (found, solution) = room.solve();
-        if found.rank < n || found.condition > WORST_CONDITION {
+        let (found, solution) = squares.solve();
+        if found.rank < n || found.condition > TUNING.worst_condition {
             return None;
         }
         let mut coefficients = [0.0; MOST_TERMS];
@@ -164,7 +183,7 @@ pub(super) fn closest<const M: usize, const C: usize>(
     let mut s = start;
     let mut found = jets(&s);
     let mut last = f64::INFINITY;
-    for _ in 0..MOST_ITERATIONS {
+    for _ in 0..TUNING.most_iterations {
         let mut gradient: [f64; M] = std::array::from_fn(|a| s[a] - p[a]);
         let mut hessian = [[[0.0; M]; M]; 2];
         for (bend, hessian) in [1.0, 0.0].into_iter().zip(&mut hessian) {
@@ -185,18 +204,18 @@ pub(super) fn closest<const M: usize, const C: usize>(
         }
         let step = solve_positive(&hessian[0], &gradient).or_else(|| solve_positive(&hessian[1], &gradient))?;
         let length = step.iter().map(|s| s * s).sum::<f64>().sqrt();
-        let scale = if length > LONGEST_STEP { LONGEST_STEP / length } else { 1.0 };
+        let scale = if length > TUNING.longest_step { TUNING.longest_step / length } else { 1.0 };
         for (s, step) in s.iter_mut().zip(step) {
             *s -= scale * step;
         }
         found = jets(&s);
         // At round-off steps stop shrinking.
-        if length <= STILL || (length <= FOUND && length >= 0.5 * last) {
+        if length <= TUNING.still || (length <= TUNING.found && length >= 0.5 * last) {
             return Some((s, found));
         }
         last = length;
     }
-    (last <= FOUND).then_some((s, found))
+    (last <= TUNING.found).then_some((s, found))
 }
 
 /// The exponents of ∂_a of a monomial and its factor; None where the derivative vanishes.
@@ -209,10 +228,10 @@ fn lowered<const M: usize>(index: &[u8; M], a: usize) -> Option<(f64, [u8; M])> 
 
 /// The solution of a symmetric system of one or two equations, if it is clearly positive definite.
 fn solve_positive<const M: usize>(matrix: &[[f64; M]; M], b: &[f64; M]) -> Option<[f64; M]> {
-    const LEAST: f64 = 1e-3;
+    let least = TUNING.least_pivot;
     let mut x = *b;
     let a = matrix[0][0];
-    if a <= LEAST {
+    if a <= least {
         return None;
     }
     if M == 1 {
@@ -220,7 +239,7 @@ fn solve_positive<const M: usize>(matrix: &[[f64; M]; M], b: &[f64; M]) -> Optio
     } else {
         let (c, d) = (matrix[0][1], matrix[1][1]);
         let det = a * d - c * c;
-        if d <= LEAST || det <= LEAST * a {
+        if d <= least || det <= least * a {
             return None;
         }
         x[0] = (d * b[0] - c * b[1]) / det;
@@ -276,8 +295,18 @@ impl<const M: usize> GraphJet<M> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LocalPoint, Terms, closest};
+    use super::{FitData, LocalPoint, Terms, closest};
     use crate::linear_algebra::least_squares::LeastSquares;
+
+    /// A fit of heights alone.
+    fn heights<const M: usize>(points: &[LocalPoint<M>], weight: f64) -> FitData<'_, M> {
+        FitData { points, weight, slopes: &[], slope_weight: 0.0 }
+    }
+
+    /// A fit of heights and slopes.
+    fn with_slopes<'a>(points: &'a [LocalPoint<2>], slopes: &'a [Option<[f64; 2]>]) -> FitData<'a, 2> {
+        FitData { points, weight: 0.7, slopes, slope_weight: 0.1 }
+    }
 
     #[test]
     fn a_polynomial_is_reproduced_with_its_curvatures() {
@@ -289,8 +318,8 @@ mod tests {
             })
             .collect();
         let terms = Terms::<2>::new(2);
-        let mut room = LeastSquares::default();
-        let graph = terms.fit(&points, 0, 0.7, (&[], 0.0), &mut room).unwrap();
+        let mut squares = LeastSquares::default();
+        let graph = terms.fit(&heights(&points, 0.7), 0, &mut squares).unwrap();
         let jet = graph.jet(&[0.2, -0.1]);
         assert!((jet.value - f(0.2, -0.1)).abs() < 1e-13);
         assert!((jet.first[0] - (0.1 + 0.8 * 0.2 - 0.015)).abs() < 1e-13);
@@ -316,14 +345,14 @@ mod tests {
             .map(|(x, y)| (([x, y], [f(x, y), 0.0, 0.0]), Some([0.1 + 0.8 * x + 0.15 * y, -0.2 + 0.15 * x - 0.6 * y])))
             .unzip();
         let terms = Terms::<2>::new(2);
-        let mut room = LeastSquares::default();
-        assert!(terms.fit(&points, 0, 0.7, (&[], 0.0), &mut room).is_none());
+        let mut squares = LeastSquares::default();
+        assert!(terms.fit(&heights(&points, 0.7), 0, &mut squares).is_none());
         // −.3 y² is seen by no height and no slope along y alone.
-        assert!(terms.fit(&points, 0, 0.7, (&slopes, 0.1), &mut room).is_none());
+        assert!(terms.fit(&with_slopes(&points, &slopes), 0, &mut squares).is_none());
         let aside = ([0.4, -0.5], [f(0.4, -0.5), 0.0, 0.0]);
         let points: Vec<_> = points.into_iter().chain([aside]).collect();
         let slopes: Vec<_> = slopes.into_iter().chain([None]).collect();
-        let graph = terms.fit(&points, 0, 0.7, (&slopes, 0.1), &mut room).unwrap();
+        let graph = terms.fit(&with_slopes(&points, &slopes), 0, &mut squares).unwrap();
         assert!((graph.jet(&[0.2, -0.1]).value - f(0.2, -0.1)).abs() < 1e-13);
         assert!((graph.jet(&[0.2, -0.1]).second[1][1] + 0.6).abs() < 1e-12);
     }
@@ -335,8 +364,8 @@ mod tests {
             .map(|x| ([x], [(9.0 - x * x).sqrt() - 3.0, 0.3 * x, 0.0]))
             .collect();
         let terms = Terms::<1>::new(4);
-        let mut room = LeastSquares::default();
-        let graph = terms.fit(&points, 0, 1.0, (&[], 0.0), &mut room).unwrap();
+        let mut squares = LeastSquares::default();
+        let graph = terms.fit(&heights(&points, 1.0), 0, &mut squares).unwrap();
         for (p, height) in [(0.4, 1.0), (-0.6, -1.1), (0.0, 0.3)] {
             let (s, [jet]) = closest(&[graph], &[p], &[height], [0.0]).unwrap();
             assert!((s[0] - p + (jet.value - height) * jet.first[0]).abs() < 1e-13);
@@ -346,12 +375,12 @@ mod tests {
             assert!((jet.curvature() - 1.0 / 3.0).abs() < 1e-2);
         }
         // As a curve in space, on a plane inclined by .3: its closest point to a place is across its tangent.
-        let inclined = terms.fit(&points, 1, 1.0, (&[], 0.0), &mut room).unwrap();
+        let inclined = terms.fit(&heights(&points, 1.0), 1, &mut squares).unwrap();
         let (s, [up, aside]) = closest(&[graph, inclined], &[0.4], &[1.0, -0.5], [0.0]).unwrap();
         assert!((aside.value - 0.3 * s[0]).abs() < 1e-12);
         assert!((s[0] - 0.4 + (up.value - 1.0) * up.first[0] + (aside.value + 0.5) * aside.first[0]).abs() < 1e-12);
-        assert!(terms.fit(&points[..4], 0, 1.0, (&[], 0.0), &mut room).is_none());
+        assert!(terms.fit(&heights(&points[..4], 1.0), 0, &mut squares).is_none());
         let same = [([0.1], [0.0; 3]); 9];
-        assert!(terms.fit(&same, 0, 1.0, (&[], 0.0), &mut room).is_none());
+        assert!(terms.fit(&heights(&same, 1.0), 0, &mut squares).is_none());
     }
 }

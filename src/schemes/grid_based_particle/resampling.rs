@@ -1,220 +1,158 @@
-//! New foot-points for every grid point near the front, after a motion (GBPM 3.3 and 3.4).
+//! New foot points for all grid points near the front, after a motion (GBPM 3.3 and 3.4).
 //!
-//! Particles are found by where they are, not by their old grid points: so a step may be as long as the flow allows, and activation
-//! and deactivation of the tube are one thing.
+//! Particles are found by their positions, not by their old grid points. So a step may be as long as the flow allows, and
+//! activation and deactivation of the tube are one operation.
 
-use super::foot_points::FootPoint;
+use super::config::FrontConfig;
+use super::foot_points::FootPoints;
+use super::gaps::{GapSearch, REACH_ALONG};
 use super::grid::{Grid, Node};
-use super::reconstruction::{Failure, Reconstruction, Room};
-use super::refinement::{Hints, Window};
-use super::system::FrontSystem;
-use crate::geometry::Vector;
-use crate::geometry::frame::tangents;
-use crate::neighbors::NeighborSearch;
-use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread, one_by_one};
-use rayon::prelude::{
-    IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator, ParallelSlice, ParallelSliceMut,
-};
+use super::reconstruction::{Failure, Outcome};
+use super::reconstructor::Reconstructor;
+use super::refinement::{Hints, Refinement, Window};
+use super::removals::Removals;
+use crate::geometry::Domain;
+use crate::neighbors::CellList;
+use crate::parallel::{BLOCK, Interrupted, one_by_one};
+use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator, ParallelSliceMut};
 
-/// Reach along the front within which a particle proposes grid points, in spacings: half the largest gap that a motion may
-/// open before grid points in its middle are missed.
-const ALONG: f64 = 1.4;
-/// How much farther than γ across the front, in spacings: for the bend of the front.
-const MARGIN: f64 = 0.35;
-/// Particles whose proposals are put in order together.
+/// Tuning constants of resampling. Lengths are in spacings.
+struct ResamplingTuning {
+    /// Half width of the window in which a particle proposes grid points across the front, beyond γ: for the bend of the
+    /// front.
+    margin_across: f64,
+    /// Distance of a moved particle from a new foot point of its segment within which it is replaced, on a curve and on a
+    /// surface: half the largest distance between neighbors. With less, particles would stay that nothing misses, and they
+    /// distort reconstructions.
+    replaced: [f64; 2],
+    /// The same at a gap and at the end of a segment, where a particle that is lost is never found again. Of .15 and .02, the
+    /// first left gaps of up to 17 h (docs/results/front-notes.md, The vortex at T = 8).
+    replaced_at_gap: f64,
+}
+
+const TUNING: ResamplingTuning = ResamplingTuning { margin_across: 0.35, replaced: [0.55, 1.0], replaced_at_gap: 0.02 };
+/// Particles whose proposals are sorted together.
 const PROPOSING: usize = 256;
-/// A moved particle with a new foot-point of its segment within so many spacings needs not stay: half the largest distance between
-/// neighbours, on a curve and on a surface. Less would keep particles that nothing misses, which distort reconstructions.
-const COVERED: [f64; 2] = [0.55, 1.0];
-/// The same at the end of a segment, a corner or the tip of a filament, and at a gap: whatever is lost there is never found again.
-const SAME: f64 = 0.02;
 
-/// How many particles were removed, and why; and what was done to keep the front whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Removals {
-    /// Grid points without enough particles of one segment about them.
-    pub starved: u64,
-    /// Grid points whose foot-point would lie beyond all particles, or past a corner.
-    pub extrapolated: u64,
-    /// Grid points where the front turns too sharply for the spacing, or where a fit in a flow misses its particles' directions.
-    pub unresolved: u64,
-    /// Particles that another segment has passed.
-    pub swept: u64,
-    /// Moved particles that stayed, since no reconstruction took their place.
-    pub kept: u64,
-    /// Particles beyond the end of the grid, which counts half a billion cells from the origin in the plane, half a million in space.
-    pub outside: u64,
-}
-
-impl Removals {
-    /// Names and numbers.
-    #[must_use]
-    pub fn entries(&self) -> [(&'static str, u64); 6] {
-        [
-            ("foot_points.starved", self.starved),
-            ("foot_points.extrapolated", self.extrapolated),
-            ("foot_points.unresolved", self.unresolved),
-            ("foot_points.swept", self.swept),
-            ("particles.kept", self.kept),
-            ("particles.outside", self.outside),
-        ]
-    }
-
-    /// From the numbers of [`Self::entries`].
-    #[must_use]
-    pub fn from_numbers(n: [u64; 6]) -> Self {
-        let [starved, extrapolated, unresolved, swept, kept, outside] = n;
-        Self { starved, extrapolated, unresolved, swept, kept, outside }
-    }
-}
-
-/// Grid points that a block of particles has about it.
+/// Grid points that a block of particles proposes.
 #[derive(Debug, Default)]
-pub(super) struct Proposals {
+struct Proposals {
     nodes: Vec<Node>,
     hints: Hints,
+    /// Particles beyond the end of the grid.
     outside: u64,
 }
 
-/// What became of a grid point near the front.
-pub(super) type Outcome<const D: usize> = Result<FootPoint<D>, Failure>;
+/// Storage of resampling, which lasts from step to step.
+pub(super) struct Resampling<const D: usize> {
+    proposals: Vec<Proposals>,
+    /// All proposed grid points, each once and in order, and their foot points.
+    candidates: Vec<Node>,
+    outcomes: Vec<Outcome<D>>,
+    /// Whether each moved particle is next to a gap or at the end of its segment.
+    at_gap: Vec<bool>,
+    /// Whether each moved particle stays.
+    keep: Vec<bool>,
+    /// The new foot points, and the same sorted into cells.
+    fresh: FootPoints<D>,
+    fresh_cells: CellList<D>,
+}
 
-impl<const D: usize, const M: usize> FrontSystem<D, M> {
-    /// 1. The moved particles are sorted into cells, and the grid is refined where they need it. 2. Each proposes the grid points
-    ///    about it. 3. Each of these gets the closest point of its local reconstruction. 4. Those within the tube are the new
-    ///    foot-points. 5. Where every particle is exact by itself, in a flow, one that nothing has replaced stays.
-    pub(super) fn resample(&mut self) -> Result<(), Interrupted> {
-        self.sort_cells();
-        self.refine()?;
-        self.find_gaps()?;
-        self.propose();
-        self.outcomes.clear();
-        self.outcomes.resize(self.candidates.len(), Err(Failure::Starved));
-        let mut outcomes = std::mem::take(&mut self.outcomes);
-        let (grid, interrupt) = (self.parts.grid, &self.parts.interrupt);
-        let place = |_: usize, node: &Node| (grid.place(*node), grid.spacing_of(*node));
-        let filled = fill(&self.reconstruction(), &self.candidates, &mut outcomes, &self.rooms, interrupt, place);
-        self.outcomes = outcomes;
-        filled?;
-        self.renew();
-        if self.parts.law.keeps_particles_exact() {
-            self.keep_unreplaced();
+/// The moved particles, and what resampling reads beside them.
+struct Moved<'a, const D: usize, const M: usize> {
+    feet: &'a FootPoints<D>,
+    config: &'a FrontConfig<D, M>,
+    refinement: &'a Refinement,
+    at_gap: &'a [bool],
+}
+
+impl<const D: usize> Default for Resampling<D> {
+    fn default() -> Self {
+        Self {
+            proposals: Vec::new(),
+            candidates: Vec::new(),
+            outcomes: Vec::new(),
+            at_gap: Vec::new(),
+            keep: Vec::new(),
+            fresh: FootPoints::default(),
+            fresh_cells: CellList::new(Domain::unbounded()),
         }
-        std::mem::swap(&mut self.feet, &mut self.fresh);
+    }
+}
+
+impl<const D: usize> Resampling<D> {
+    /// Replaces the moved particles by the foot points of the grid points near them. The reconstructor has the particles
+    /// sorted, and the grid is refined for them.
+    ///
+    /// 1. Mark the particles at gaps.
+    /// 2. Each particle proposes the grid points about it.
+    /// 3. Each of these gets the closest point of its local reconstruction.
+    /// 4. Those within the tube are the new foot points.
+    /// 5. Where every particle is exact by itself, as in a flow, the particles that nothing has replaced stay.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when the run is asked to stop.
+    pub fn resample<const M: usize>(
+        &mut self,
+        feet: &mut FootPoints<D>,
+        config: &FrontConfig<D, M>,
+        reconstructor: &Reconstructor<D, M>,
+        refinement: &Refinement,
+        removals: &mut Removals,
+    ) -> Result<(), Interrupted> {
+        self.at_gap.clear();
+        self.at_gap.resize(feet.len(), false);
+        let keeps_particles = config.law.keeps_particles_exact();
+        if keeps_particles {
+            // Elsewhere a gap is closed by reconstructions, or another segment has swept it.
+            GapSearch { feet, cells: reconstructor.cells(), config }.mark(&mut self.at_gap)?;
+        }
+        config.interrupt.check()?;
+        let at_gap = std::mem::take(&mut self.at_gap);
+        let moved = Moved { feet, config, refinement, at_gap: &at_gap };
+        removals.outside += self.propose(&moved);
+        let place = |_: usize, node: &Node| (config.grid.place(*node), config.grid.spacing_of(*node));
+        let reconstruction = reconstructor.reconstruction(feet, config);
+        let found = reconstructor.closest_points(&reconstruction, &self.candidates, &mut self.outcomes, place);
+        if found.is_ok() {
+            self.renew(config, removals);
+            if keeps_particles {
+                self.keep_unreplaced(&moved, removals);
+            }
+        }
+        self.at_gap = at_gap;
+        found?;
+        std::mem::swap(feet, &mut self.fresh);
         Ok(())
     }
 
-    /// Splits the cells where the particles need it.
-    pub(super) fn refine(&mut self) -> Result<(), Interrupted> {
-        let Self { refinement, feet, cells, parts, .. } = self;
-        refinement.renew(feet, cells, (&parts.grid, &parts.method), parts.segments, &parts.interrupt)
-    }
-
-    /// The grid points that the particles have about them, each once and in order: of each level those of cells without parts.
-    fn propose(&mut self) {
-        let mut proposals = std::mem::take(&mut self.proposals);
-        proposals.resize_with(self.feet.len().div_ceil(PROPOSING).max(proposals.len()), Proposals::default);
+    /// Collects the grid points that the particles propose, each once and in order. Returns the number of particles beyond the
+    /// end of the grid.
+    fn propose<const M: usize>(&mut self, moved: &Moved<'_, D, M>) -> u64 {
+        let Self { proposals, candidates, .. } = self;
+        let count = moved.feet.len();
+        proposals.resize_with(count.div_ceil(PROPOSING).max(proposals.len()), Proposals::default);
         one_by_one(proposals.par_iter_mut().enumerate()).for_each(|(block, proposals)| {
             proposals.nodes.clear();
             proposals.outside = 0;
-            let end = ((block + 1) * PROPOSING).min(self.feet.len());
-            for i in block * PROPOSING..end {
-                self.propose_about(i, proposals);
+            for i in block * PROPOSING..((block + 1) * PROPOSING).min(count) {
+                moved.propose_about(i, proposals);
             }
             proposals.nodes.sort_unstable();
             proposals.nodes.dedup();
         });
-        self.candidates.clear();
-        for proposals in &proposals {
-            self.candidates.extend_from_slice(&proposals.nodes);
-            self.removals.outside += proposals.outside;
+        candidates.clear();
+        for proposals in &*proposals {
+            candidates.extend_from_slice(&proposals.nodes);
         }
-        self.proposals = proposals;
-        self.candidates.par_sort_unstable();
-        self.candidates.dedup();
+        candidates.par_sort_unstable();
+        candidates.dedup();
+        proposals.iter().map(|proposals| proposals.outside).sum()
     }
 
-    /// Those about one particle.
-    fn propose_about(&self, i: usize, proposals: &mut Proposals) {
-        let Proposals { nodes, hints, outside } = proposals;
-        let grid = self.parts.grid;
-        let width = self.parts.method.tube_radius + MARGIN;
-        let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
-        if grid.nearest(y, self.parts.method.levels() - 1).is_none() {
-            // Where particles are exact by themselves it is looked at again below.
-            *outside += u64::from(!self.parts.law.keeps_particles_exact());
-            return;
-        }
-        let own = grid.spacing_of(self.feet.nodes[i]);
-        let farthest = own * if self.at_gap[i] { self.parts.law.widest_bridge() } else { ALONG };
-        let window = |level: u32| {
-            let spacing = grid.spacing_at(level);
-            let (across, along) = (width * spacing, farthest.max(ALONG * spacing));
-            let reach = across.hypot(along);
-            let corner = |side: f64| grid.nearest(&y.add_scalar(side), level);
-            let (low, high) = (corner(-reach)?, corner(reach)?);
-            Some(Window { low, high, across, along, spacing, first: grid.center(&low, level) - y })
-        };
-        self.refinement.for_each_leaf_in(hints, window, |at, level, window| {
-            let d = window.seen_at(at);
-            // Of the squares along the direction and across it, one is that along the front.
-            let by_direction = d.dot(n).powi(2);
-            let rest = d.norm_squared() - by_direction;
-            let (height, way) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
-            if height <= window.across * window.across && way <= window.along * window.along {
-                nodes.push(Grid::node(at, level));
-            }
-        });
-    }
-
-    /// Which particles are next to a gap or at an end, in a flow.
-    fn find_gaps(&mut self) -> Result<(), Interrupted> {
-        let mut at_gap = std::mem::take(&mut self.at_gap);
-        at_gap.clear();
-        at_gap.resize(self.feet.len(), false);
-        // Only a flow draws particles apart that nothing else replaces.
-        let looked_at = if self.parts.law.keeps_particles_exact() { &mut at_gap[..] } else { &mut [] };
-        let interrupt = &self.parts.interrupt;
-        one_by_one(looked_at.par_chunks_mut(BLOCK).enumerate()).for_each(|(block, at_gap)| {
-            for (k, is_at_gap) in at_gap.iter_mut().enumerate() {
-                if interrupt.is_raised() {
-                    return;
-                }
-                *is_at_gap = self.is_at_gap(block * BLOCK + k);
-            }
-        });
-        self.at_gap = at_gap;
-        self.parts.interrupt.check()
-    }
-
-    /// Whether a particle has nobody of its segment near it in some direction along the front: a motion has drawn its neighbours
-    /// away, or a sharp tip has become round again and lacks particles.
-    pub(super) fn is_at_gap(&self, i: usize) -> bool {
-        let spacing = self.parts.grid.spacing_of(self.feet.nodes[i]);
-        let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
-        let frame = if D - M == 1 { tangents::<D, M>(n) } else { [*n; M] };
-        let mut has_neighbor = [[false; 2]; M];
-        // The coarser side of a border between levels has its neighbours farther away.
-        let coarser = if self.parts.method.levels() > 1 { 2.0 } else { 1.0 };
-        self.cells.for_each_within(y, coarser * ALONG * spacing, |j, d, square| {
-            let reach = ALONG * spacing.max(self.parts.grid.spacing_of(self.feet.nodes[j]));
-            if j != i && square <= reach * reach && self.feet.normals[j].dot(n) > self.parts.method.cosine {
-                for (has, t) in has_neighbor.iter_mut().zip(&frame) {
-                    // Within 60° of the direction, so that in space somebody is on every side.
-                    let ahead = t.dot(d);
-                    if 4.0 * ahead * ahead >= square {
-                        has[usize::from(ahead > 0.0)] = true;
-                    }
-                }
-            }
-        });
-        !has_neighbor.iter().flatten().all(|has| *has)
-    }
-
-    /// New foot-points from the outcomes within the tube.
-    fn renew(&mut self) {
-        let grid = self.parts.grid;
-        let radius = self.parts.method.tube_radius;
+    /// Takes the closest points within the tube as the new foot points, and counts the others by reason.
+    fn renew<const M: usize>(&mut self, config: &FrontConfig<D, M>, removals: &mut Removals) {
+        let (grid, radius) = (&config.grid, config.method.tube_radius);
         self.fresh.clear();
         for (node, outcome) in self.candidates.iter().zip(&self.outcomes) {
             match outcome {
@@ -223,72 +161,85 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
                         self.fresh.push(*node, foot);
                     }
                 }
-                Err(Failure::Starved | Failure::Undetermined) => self.removals.starved += 1,
-                Err(Failure::Extrapolated) => self.removals.extrapolated += 1,
-                Err(Failure::Unresolved) => self.removals.unresolved += 1,
-                Err(Failure::Swept) => self.removals.swept += 1,
+                Err(Failure::Starved | Failure::Undetermined) => removals.starved += 1,
+                Err(Failure::Extrapolated) => removals.extrapolated += 1,
+                Err(Failure::Unresolved) => removals.unresolved += 1,
+                Err(Failure::Swept) => removals.swept += 1,
             }
         }
     }
 
-    /// Moved particles without a new foot-point of their segment close by stay as they are.
-    fn keep_unreplaced(&mut self) {
-        let edge = self.fresh.finest_spacing(&self.parts.grid);
-        self.fresh_cells.rebuild(self.fresh.positions.iter().copied(), edge);
-        let mut keep = std::mem::take(&mut self.keep);
+    /// Adds the moved particles without a new foot point of their segment close to them.
+    fn keep_unreplaced<const M: usize>(&mut self, moved: &Moved<'_, D, M>, removals: &mut Removals) {
+        let Self { fresh, fresh_cells, keep, .. } = self;
+        let (feet, grid) = (moved.feet, &moved.config.grid);
+        fresh_cells.rebuild(fresh.positions.iter().copied(), fresh.finest_spacing(grid));
         keep.clear();
-        keep.resize(self.feet.len(), false);
+        keep.resize(feet.len(), false);
         one_by_one(keep.par_chunks_mut(BLOCK).enumerate()).for_each(|(block, keep)| {
             for (k, keep) in keep.iter_mut().enumerate() {
-                *keep = !self.is_replaced(block * BLOCK + k);
+                *keep = !moved.is_replaced(block * BLOCK + k, fresh, fresh_cells);
             }
         });
-        for i in (0..self.feet.len()).filter(|i| keep[*i]) {
-            let foot = self.feet.get(i);
-            if let Some(node) = self.refinement.leaf_at(&self.parts.grid, &foot.position) {
-                self.fresh.push(node, &foot);
-                self.removals.kept += 1;
+        for i in (0..feet.len()).filter(|i| keep[*i]) {
+            let foot = feet.get(i);
+            if let Some(node) = moved.refinement.leaf_at(grid, &foot.position) {
+                fresh.push(node, &foot);
+                removals.kept += 1;
             } else {
-                self.removals.outside += 1;
+                removals.outside += 1;
             }
         }
-        self.keep = keep;
+    }
+}
+
+impl<const D: usize, const M: usize> Moved<'_, D, M> {
+    /// Adds the grid points that particle i proposes.
+    fn propose_about(&self, i: usize, proposals: &mut Proposals) {
+        let Proposals { nodes, hints, outside } = proposals;
+        let (grid, law) = (self.config.grid, &self.config.law);
+        let width = self.config.method.tube_radius + TUNING.margin_across;
+        let (y, n) = (&self.feet.positions[i], &self.feet.normals[i]);
+        if grid.nearest(y, self.config.method.levels() - 1).is_none() {
+            // Particles that are exact by themselves are counted when they are kept.
+            *outside += u64::from(!law.keeps_particles_exact());
+            return;
+        }
+        let own = grid.spacing_of(self.feet.nodes[i]);
+        let farthest = own * if self.at_gap[i] { law.widest_bridge() } else { REACH_ALONG };
+        let window = |level: u32| {
+            let spacing = grid.spacing_at(level);
+            let (across, along) = (width * spacing, farthest.max(REACH_ALONG * spacing));
+            let reach = across.hypot(along);
+            let corner = |side: f64| grid.nearest(&y.add_scalar(side), level);
+            let (low, high) = (corner(-reach)?, corner(reach)?);
+            Some(Window { low, high, across, along, spacing, first: grid.center(&low, level) - y })
+        };
+        self.refinement.for_each_leaf_in(hints, window, |at, level, window| {
+            let d = window.relative(at);
+            // The direction is the normal of a surface and the tangent of a curve in space.
+            let by_direction = d.dot(n).powi(2);
+            let rest = d.norm_squared() - by_direction;
+            let (across, along) = if D - M == 1 { (by_direction, rest) } else { (rest, by_direction) };
+            if across <= window.across * window.across && along <= window.along * window.along {
+                nodes.push(Grid::node(at, level));
+            }
+        });
     }
 
-    /// Whether a new foot-point of its segment is close to a moved particle.
-    fn is_replaced(&self, i: usize) -> bool {
-        let grid = &self.parts.grid;
+    /// Whether a new foot point of its segment is close to moved particle i.
+    fn is_replaced(&self, i: usize, fresh: &FootPoints<D>, fresh_cells: &CellList<D>) -> bool {
+        let grid = &self.config.grid;
         let (position, normal) = (&self.feet.positions[i], &self.feet.normals[i]);
         let Some(node) = self.refinement.leaf_at(grid, position) else { return false };
         let spacing = grid.spacing_of(node).max(grid.spacing_of(self.feet.nodes[i]));
-        let covered = if self.at_gap[i] { SAME } else { COVERED[M - 1] };
-        let order = self.fresh_cells.permutation();
-        self.fresh_cells.any_within(position, covered * spacing, |place| {
-            self.fresh.normals[order[place]].dot(normal) > self.parts.method.cosine
+        let replaced = if self.at_gap[i] { TUNING.replaced_at_gap } else { TUNING.replaced[M - 1] };
+        let order = fresh_cells.permutation();
+        fresh_cells.any_within(position, replaced * spacing, |place| {
+            fresh.normals[order[place]].dot(normal) > self.config.method.cosine
         })
     }
 }
 
-/// The outcome of a reconstruction at every item's place, where the grid has that spacing.
-pub(super) fn fill<const D: usize, const M: usize, T: Sync>(
-    reconstruction: &Reconstruction<'_, D, M>,
-    items: &[T],
-    outcomes: &mut [Outcome<D>],
-    rooms: &PerThread<Room<D, M>>,
-    interrupt: &Interrupt,
-    place: impl Fn(usize, &T) -> (Vector<D>, f64) + Sync,
-) -> Result<(), Interrupted> {
-    let blocks = items.par_chunks(BLOCK).zip(outcomes.par_chunks_mut(BLOCK)).enumerate();
-    one_by_one(blocks).for_each(|(block, (items, outcomes))| {
-        if interrupt.is_raised() {
-            return;
-        }
-        rooms.with(|room| {
-            for (k, (item, outcome)) in items.iter().zip(outcomes).enumerate() {
-                let (place, spacing) = place(block * BLOCK + k, item);
-                *outcome = reconstruction.closest(&place, spacing, room);
-            }
-        });
-    });
-    interrupt.check()
-}
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,5 @@
-//! How segments of a front are told apart (GBPM 3.3.2): by normals, by the part that particles were of at the start, and by a
-//! parameter along it.
+//! How segments of a front are told apart (GBPM 3.3.2): by normals, by their closed part of the front at the start, and
+//! by a parameter along that part.
 
 use super::foot_points::FootPoints;
 use crate::geometry::{Domain, Surface, Vector};
@@ -8,30 +8,30 @@ use crate::neighbors::{CellList, NeighborSearch};
 /// What particles of one segment have in common beside their normals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segments {
-    /// The part of the front at the start.
+    /// Whether they have the same closed part of the front at the start.
     pub by_part: bool,
-    /// The parameter along it, up to this difference; it goes round a closed part from 0 to 1. None where it is not carried along.
+    /// Largest difference of their parameters along that part, from 0 to 1 around it. None where parameters are not used.
     pub parameter: Option<f64>,
 }
 
 impl Segments {
-    /// Whether two particles may be of one segment, but for their normals.
+    /// Whether two particles may belong to one segment as far as labels tell.
     pub(super) fn match_labels<const D: usize>(&self, feet: &FootPoints<D>, i: usize, j: usize) -> bool {
         let is_same_part = !self.by_part || feet.parts[i] == feet.parts[j];
-        let apart = |most: f64| turned(feet.parameters[i] - feet.parameters[j]).abs() > most;
+        let apart = |most: f64| shorter_difference(feet.parameters[i] - feet.parameters[j]).abs() > most;
         is_same_part && !self.parameter.is_some_and(apart)
     }
 }
 
-/// A difference of parameters by the shorter way round.
-pub(super) fn turned(difference: f64) -> f64 {
+/// A difference of parameters by the shorter way around.
+pub(super) fn shorter_difference(difference: f64) -> f64 {
     difference - difference.round()
 }
 
-/// The outlines of a part, and how far along them places are.
+/// The outlines of a closed part, with the position of each point along them.
 pub(super) struct Course<const D: usize> {
     points: Vec<Vector<D>>,
-    /// Length before each point by the whole.
+    /// Length before each point, relative to the whole length.
     shares: Vec<f64>,
     /// Whether point k and k + 1 are joined.
     joined: Vec<bool>,
@@ -39,8 +39,8 @@ pub(super) struct Course<const D: usize> {
 }
 
 impl<const D: usize> Course<D> {
-    /// Of a surface in the plane, by points about `spacing` apart; None in space.
-    pub fn of(surface: &dyn Surface<D>, spacing: f64) -> Option<Self> {
+    /// The outlines of a surface in the plane, with points about `spacing` apart; None in space.
+    pub fn from_surface(surface: &dyn Surface<D>, spacing: f64) -> Option<Self> {
         let chains = surface.outline(spacing);
         let (mut points, mut shares, mut joined) = (Vec::new(), Vec::new(), Vec::new());
         let mut length = 0.0;
@@ -61,7 +61,7 @@ impl<const D: usize> Course<D> {
         Some(Self { points, shares, joined, cells })
     }
 
-    /// The parameter of the nearest place: along the chord from the nearest point, or to it.
+    /// The parameter of the nearest place on the chords that end at the nearest point.
     pub fn parameter(&self, x: &Vector<D>) -> f64 {
         let Some((nearest, _)) = self.cells.nearest(x, f64::INFINITY) else { return 0.0 };
         let along = |k: usize| {
@@ -77,27 +77,30 @@ impl<const D: usize> Course<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Course, turned};
+    use super::{Course, shorter_difference};
     use crate::geometry::Vector;
     use crate::geometry::surfaces::Ball;
 
     #[test]
     fn a_parameter_is_the_share_of_the_way_round() {
         let ball = Ball { center: Vector::<2>::new(0.2, -0.1), radius: 0.5 };
-        let course = Course::of(&ball, 0.01).unwrap();
+        let course = Course::from_surface(&ball, 0.01).unwrap();
         let at = |angle: f64| course.parameter(&(ball.center + Vector::<2>::new(angle.cos(), angle.sin()) * 0.51));
         let start = at(0.0);
         for k in 1..50 {
             let angle = f64::from(k) * 0.12;
             let share = angle / std::f64::consts::TAU;
-            let way = turned(at(angle) - start);
-            assert!(turned(way - share).abs() < 1e-4 || turned(way + share).abs() < 1e-4, "{angle}: {way}");
+            let way = shorter_difference(at(angle) - start);
+            assert!(
+                shorter_difference(way - share).abs() < 1e-4 || shorter_difference(way + share).abs() < 1e-4,
+                "{angle}: {way}"
+            );
         }
     }
 
     #[test]
     fn differences_go_the_shorter_way() {
-        assert!((turned(0.95 - 0.05) + 0.1).abs() < 1e-15);
-        assert!((turned(0.3) - 0.3).abs() < 1e-15);
+        assert!((shorter_difference(0.95 - 0.05) + 0.1).abs() < 1e-15);
+        assert!((shorter_difference(0.3) - 0.3).abs() < 1e-15);
     }
 }

@@ -1,10 +1,11 @@
 //! A front step by step.
 
-use super::exact::{ExactFrontMotion, FrontErrors};
+use super::config::FrontConfig;
+use super::exact::{FrontErrors, front_errors};
+use super::exact_front::{ExactFrontMotion, Moment};
 use super::foot_points::FootPoints;
 use super::grid::Grid;
-use super::motion::{self, Law};
-use super::resampling::Removals;
+use super::removals::Removals;
 use super::system::FrontSystem;
 use crate::geometry::Vector;
 use crate::geometry::surfaces::Ball;
@@ -17,17 +18,14 @@ use crate::simulation::{
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
 
-/// The measure of a front under mean curvature, by that at the start, beyond which a run has gone astray.
-const MOST_GROWTH: f64 = 2.0;
-
 /// A front as a simulation, M = D − 1.
 pub struct GridBasedParticles<const D: usize, const M: usize> {
     system: FrontSystem<D, M>,
-    exact: ExactFrontMotion<D>,
+    exact: Box<dyn ExactFrontMotion<D>>,
     /// The front at the start, where it is a ball.
     ball: Option<Ball<D>>,
-    /// The measure of the front at the start.
-    start_measure: f64,
+    /// Length or area of the front at the start, up to a constant factor.
+    start_area: f64,
     fixed: FixedStep,
     step: u64,
     max_cfl: f64,
@@ -44,14 +42,14 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
     #[must_use]
     pub fn new(
         system: FrontSystem<D, M>,
-        exact: ExactFrontMotion<D>,
+        exact: Box<dyn ExactFrontMotion<D>>,
         ball: Option<Ball<D>>,
         fixed: FixedStep,
         cpu_clock: CpuClock,
         method: BTreeMap<&'static str, String>,
     ) -> Self {
         Self {
-            start_measure: system.measure(),
+            start_area: system.area_or_length(),
             system,
             exact,
             ball,
@@ -66,20 +64,17 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
         }
     }
 
-    /// At the end, and where a flow turns.
+    /// Whether errors are due after a step: at the end, and where a flow turns.
     fn is_error_due(&self, step: u64) -> bool {
-        let turn = match &self.system.parts.law {
-            Law::Flow(flow) => flow.return_time(),
-            _ => None,
-        };
+        let turn = self.system.config.law.return_time();
         step == self.fixed.steps || turn.is_some_and(|turn| self.fixed.reaches(step, 0.5 * turn))
     }
 
-    /// By its mean curvature a front only shrinks.
+    /// Fails where the front has grown more than its law allows.
     fn check_growth(&self, Clock { step, time }: Clock) -> Result<(), StepError> {
-        let is_by_curvature = matches!(self.system.parts.law, Law::MeanCurvature);
-        let growth = if is_by_curvature { self.system.measure() / self.start_measure } else { 0.0 };
-        if growth <= MOST_GROWTH {
+        let Some(most) = self.system.config.law.most_growth() else { return Ok(()) };
+        let growth = self.system.area_or_length() / self.start_area;
+        if growth <= most {
             return Ok(());
         }
         let reason = format!(
@@ -90,12 +85,12 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
         Err(StepError::Unsolved { reason, step, time })
     }
 
-    /// A closed front has no ends: by its mean curvature even corners become round at once.
+    /// Reports open ends of a front that must stay closed.
     fn look_for_ends(&mut self, time: f64) {
-        if !matches!(self.system.parts.law, Law::MeanCurvature) {
+        if !self.system.config.law.keeps_fronts_closed() {
             return;
         }
-        let ends = self.system.ends();
+        let ends = self.system.open_ends();
         if let Some(first) = ends.first() {
             let place: Vec<String> = self.system.feet.positions[*first].iter().map(|c| format!("{c:.4}")).collect();
             let message = format!(
@@ -109,12 +104,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
     }
 
     fn velocity(&self, i: usize) -> Vector<D> {
-        let feet = &self.system.feet;
-        match &self.system.parts.law {
-            Law::Flow(flow) => flow.velocity(&feet.positions[i], self.clock().time),
-            Law::Normal { speed } => feet.normals[i] * *speed,
-            Law::MeanCurvature => motion::curvature_velocity(feet.curvatures[i], &feet.normals[i]),
-        }
+        self.system.config.law.velocity(&self.system.feet, i, self.clock().time)
     }
 }
 
@@ -143,8 +133,9 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         }
         if self.is_error_due(to.step) {
             let Self { exact, ball, system, phases, .. } = self;
-            let (feet, grid, interrupt) = (&system.feet, &system.parts.grid, &system.parts.interrupt);
-            let found = phases.measure("errors", || exact.errors(ball.as_ref(), feet, grid, to.time, interrupt))?;
+            let FrontConfig { grid, interrupt, .. } = &system.config;
+            let moment = Moment { feet: &system.feet, grid, time: to.time, interrupt };
+            let found = phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
             self.errors.extend(found);
             self.look_for_ends(to.time);
         }
@@ -175,7 +166,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
 
     fn fields(&self) -> Fields {
         let feet = &self.system.feet;
-        let grid = self.system.parts.grid;
+        let grid = self.system.config.grid;
         let mut fields = Fields::at(&feet.positions);
         // Of a wave front the direction of travel.
         let is_curve_in_space = D - M == 2;
@@ -191,7 +182,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         fields.vector("velocity", (0..feet.len()).map(|i| self.velocity(i)));
         fields.vector("grid_point", feet.nodes.iter().map(|node| grid.place::<D>(*node)));
         fields.scalar("level", feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
-        if self.system.parts.segments.parameter.is_some() {
+        if self.system.config.segments.parameter.is_some() {
             fields.scalar("parameter", feet.parameters.clone());
         }
         fields.scalar("segment", feet.parts.iter().map(|part| f64::from(*part)).collect());
@@ -275,3 +266,6 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         std::mem::take(&mut self.findings)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,5 @@
-//! Wave fronts of geometrical optics as curves in (x, y, θ) (GBPM 4.6): where the front crosses itself in the plane, the
-//! directions of its parts tell them apart.
+//! Wave fronts of geometrical optics as curves in (x, y, θ) (GBPM 4.6). Where a front crosses itself in the plane, the
+//! directions tell its branches apart.
 
 use super::foot_points::{FootPoint, FootPoints};
 use super::grid::{Grid, Node};
@@ -8,35 +8,48 @@ use crate::geometry::Vector;
 
 /// The wave front that starts on an ellipse, along its inner normals, with a constant speed.
 ///
-/// Place of parameter φ at time t: (a cos φ + c t cos θ, b sin φ + c t sin θ, θ), θ = π + arg(b cos φ + i a sin φ) without jumps. One
-/// turn is a curve from θ = π to 3 π; its ends are one place of the plane.
+/// Position of parameter φ at time t: (a cos φ + c t cos θ, b sin φ + c t sin θ, θ) with θ = π + arg(b cos φ + i a sin φ) without
+/// jumps. One turn is a curve from θ = π to 3 π; its ends are at one position of the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EllipticalWavefront {
-    /// Centre in the plane.
+    /// Center in the plane.
     pub center: [f64; 2],
-    /// a and b.
+    /// a and b, the semi-axes of the ellipse.
     pub semi_axes: [f64; 2],
-    /// c.
+    /// c, the speed of the rays.
     pub speed: f64,
 }
 
-/// Points of a curve per spacing from which closest points are searched.
-const STARTS_PER_SPACING: f64 = 4.0;
-/// Newton's steps to a closest point, and when they have settled.
-const MOST_ITERATIONS: usize = 50;
-const STILL: f64 = 1e-15;
+/// Tuning constants of the search for closest points of the curve at the start.
+struct WavefrontTuning {
+    /// Points of the curve per spacing from which Newton's iteration starts.
+    starts_per_spacing: f64,
+    /// Half the edge of the box of grid points about such a point, in radii of the tube.
+    box_radius: f64,
+    /// Largest number of Newton steps.
+    most_iterations: usize,
+    /// Relative length of a Newton step that changes nothing.
+    still: f64,
+    /// Least second derivative of half the squared distance, relative to that on the curve; below it the step is that on the
+    /// curve.
+    least_bend: f64,
+}
+
+const TUNING: WavefrontTuning =
+    WavefrontTuning { starts_per_spacing: 4.0, box_radius: 1.5, most_iterations: 50, still: 1e-15, least_bend: 1e-3 };
+/// One turn of φ and of θ.
 const TURN: f64 = std::f64::consts::TAU;
 
 impl EllipticalWavefront {
-    /// The direction at φ.
+    /// θ of a parameter φ.
     fn direction(&self, phi: f64) -> f64 {
         let [a, b] = self.semi_axes;
-        // The angle runs ahead of φ or behind it by less than a right angle.
+        // θ − π differs from φ by less than a right angle.
         let lead = ((a - b) * phi.sin() * phi.cos()).atan2(b * phi.cos().powi(2) + a * phi.sin().powi(2));
         std::f64::consts::PI + phi + lead
     }
 
-    /// The parameter of a direction.
+    /// φ of a direction θ.
     fn parameter(&self, theta: f64) -> f64 {
         let [a, b] = self.semi_axes;
         let psi = theta - std::f64::consts::PI;
@@ -44,7 +57,7 @@ impl EllipticalWavefront {
         psi + lag
     }
 
-    /// The place of φ at a time.
+    /// The position of parameter φ at a time.
     #[must_use]
     pub fn place(&self, phi: f64, time: f64) -> Vector<3> {
         let ([a, b], theta, way) = (self.semi_axes, self.direction(phi), self.speed * time);
@@ -55,7 +68,7 @@ impl EllipticalWavefront {
         )
     }
 
-    /// First and second derivatives by φ at the start.
+    /// First and second derivatives of the position by φ at time 0.
     fn derivatives(&self, phi: f64) -> [Vector<3>; 2] {
         let [a, b] = self.semi_axes;
         let (sin, cos) = phi.sin_cos();
@@ -64,7 +77,7 @@ impl EllipticalWavefront {
         [Vector::<3>::new(-a * sin, b * cos, a * b / square), Vector::<3>::new(-a * cos, -b * sin, bend)]
     }
 
-    /// The distance of a place from the exact place with the same direction.
+    /// The distance of a place from the exact position with the same direction.
     pub(super) fn distance(&self, x: &Vector<3>, time: f64) -> f64 {
         (x - self.place(self.parameter(x[2]), time)).norm()
     }
@@ -95,14 +108,17 @@ impl EllipticalWavefront {
         (center - reach, center + reach)
     }
 
-    /// The foot-points of all grid points within the tube, and the two ends of the curve.
+    /// The foot points of all grid points within the tube, and the two ends of the curve.
     #[must_use]
     pub fn foot_points(&self, grid: &Grid, method: &FrontMethod) -> FootPoints<3> {
         let radius = method.tube_radius * grid.spacing;
         let mut near: Vec<(Node, f64)> = Vec::new();
-        for x in self.points(grid.spacing / STARTS_PER_SPACING, 0.0) {
+        for x in self.points(grid.spacing / TUNING.starts_per_spacing, 0.0) {
             let corner = |side: f64| grid.nearest(&x.add_scalar(side), 0);
-            let (Some(low), Some(high)) = (corner(-1.5 * radius), corner(1.5 * radius)) else { continue };
+            let (Some(low), Some(high)) = (corner(-TUNING.box_radius * radius), corner(TUNING.box_radius * radius))
+            else {
+                continue;
+            };
             Grid::for_each_in(&low, &high, |at| {
                 let p = grid.center(at, 0);
                 if let Some(phi) = self.closest(&p, self.parameter(x[2]))
@@ -136,17 +152,17 @@ impl EllipticalWavefront {
         feet
     }
 
-    /// The parameter of the closest point at the start, within the one turn.
+    /// The parameter of the closest point at time 0; None outside the one turn.
     fn closest(&self, p: &Vector<3>, start: f64) -> Option<f64> {
         let mut phi = start;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..TUNING.most_iterations {
             let rest = self.place(phi, 0.0) - p;
             let [first, second] = self.derivatives(phi);
             let slope = first.norm_squared();
             let bend = slope + rest.dot(&second);
-            let step = rest.dot(&first) / if bend > 1e-3 * slope { bend } else { slope };
+            let step = rest.dot(&first) / if bend > TUNING.least_bend * slope { bend } else { slope };
             phi -= step;
-            if step.abs() <= STILL * (1.0 + phi.abs()) {
+            if step.abs() <= TUNING.still * (1.0 + phi.abs()) {
                 break;
             }
         }

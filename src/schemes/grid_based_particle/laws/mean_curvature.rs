@@ -1,0 +1,138 @@
+//! Motion by mean curvature.
+
+use super::{FrontAtStart, FrontLaw, MotionStep, MovingFront, StepPlan};
+use crate::geometry::Vector;
+use crate::parallel::Interrupted;
+use crate::schemes::grid_based_particle::curvature_stability::{StabilityPlan, longest_step};
+use crate::schemes::grid_based_particle::exact_front::{ExactFrontMotion, ShrinkingBall, UnknownMotion};
+use crate::schemes::grid_based_particle::foot_points::FootPoints;
+use crate::time::PathIntegrator;
+
+/// Velocity −κ n, κ = ∇·n.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeanCurvature;
+
+/// Default of dt/h², where it is stable.
+const DEFAULT_STEP: f64 = 0.5;
+/// Length or area relative to the start above which a run counts as unstable: the exact front only shrinks.
+const MOST_GROWTH: f64 = 2.0;
+/// Particles of the quadratics in sharp bends, in the plane and in space.
+const PARTICLES_IN_BENDS: [usize; 2] = [6, 16];
+/// Largest radius of the search for particles in space, in spacings. A surface that moves by its curvature has no gaps, and
+/// the remains of one that has collapsed must not be joined to other sheets.
+const FARTHEST_SEARCH_IN_SPACE: f64 = 4.0;
+
+/// Stages of the classical Runge–Kutta scheme: offset of the stage from the start and its weight, both in steps.
+const FOUR_STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
+/// The same of the TVD scheme of order 2.
+const TWO_STAGES: [(f64, f64); 2] = [(0.0, 0.5), (1.0, 0.5)];
+
+/// −κ n.
+fn velocity<const D: usize>(feet: &FootPoints<D>, i: usize) -> Vector<D> {
+    feet.normals[i] * -feet.curvatures[i]
+}
+
+impl<const D: usize, const M: usize> FrontLaw<D, M> for MeanCurvature {
+    fn name(&self) -> &'static str {
+        "mean_curvature"
+    }
+
+    fn velocity(&self, feet: &FootPoints<D>, i: usize, _time: f64) -> Vector<D> {
+        velocity(feet, i)
+    }
+
+    /// Runge–Kutta stages of dy/dt = −κ n, each with curvatures and normals of reconstructions through the particles of the
+    /// stage.
+    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, Interrupted> {
+        let stages: &[(f64, f64)] = match step.integrator {
+            PathIntegrator::TvdRk2 => &TWO_STAGES,
+            PathIntegrator::Rk4 | PathIntegrator::Dopri5 { .. } => &FOUR_STAGES,
+        };
+        let MovingFront { feet, stages: storage, renew_geometry } = front;
+        let n = feet.len();
+        let (starts, slopes) = (&mut storage.starts, &mut storage.slopes);
+        starts.clear();
+        starts.extend_from_slice(&feet.positions);
+        slopes.clear();
+        slopes.resize(n, Vector::<D>::zeros());
+        for (k, (offset, weight)) in stages.iter().enumerate() {
+            if k > 0 {
+                for i in 0..n {
+                    feet.positions[i] = starts[i] + velocity(feet, i) * (offset * step.step);
+                }
+                renew_geometry(feet)?;
+            }
+            for (i, slope) in slopes.iter_mut().enumerate() {
+                *slope += velocity(feet, i) * *weight;
+            }
+        }
+        let mut longest = 0.0_f64;
+        for i in 0..n {
+            feet.positions[i] = starts[i] + slopes[i] * step.step;
+            longest = longest.max(slopes[i].norm());
+        }
+        Ok(longest * step.step / step.spacing)
+    }
+
+    fn normal_displacement(&self, curvature: f64, step: f64) -> f64 {
+        -curvature * step
+    }
+
+    fn facing(&self, curvature: f64) -> f64 {
+        -curvature.signum()
+    }
+
+    fn farthest_search(&self) -> f64 {
+        if D == 3 { FARTHEST_SEARCH_IN_SPACE } else { 6.0 }
+    }
+
+    /// Bends flatten by themselves, the sharper the sooner; a wide polynomial would flatten them too slowly.
+    fn particles_in_bends(&self) -> Option<usize> {
+        Some(PARTICLES_IN_BENDS[D - 2])
+    }
+
+    fn opens_corners(&self, _signed_distance: f64) -> bool {
+        true
+    }
+
+    fn rounds_corners_at_once(&self) -> bool {
+        true
+    }
+
+    fn most_growth(&self) -> Option<f64> {
+        Some(MOST_GROWTH)
+    }
+
+    fn keeps_fronts_closed(&self) -> bool {
+        true
+    }
+
+    /// The speed depends on the curvature and has no bound.
+    fn top_speed(&self, _extent: Option<&(Vector<D>, Vector<D>)>) -> f64 {
+        f64::INFINITY
+    }
+
+    fn default_cfl(&self) -> Option<f64> {
+        None
+    }
+
+    fn default_time_step(&self, plan: &StepPlan<D>) -> f64 {
+        DEFAULT_STEP.min(longest_step(&plan.stability)) * plan.finest * plan.finest
+    }
+
+    fn longest_step(&self, stability: &StabilityPlan) -> Option<f64> {
+        Some(longest_step(stability))
+    }
+
+    /// Each stage of a step needs reconstructions through all particles, so they take the same steps.
+    fn takes_error_control(&self) -> bool {
+        false
+    }
+
+    fn exact_motion(&self, start: FrontAtStart<D>) -> Box<dyn ExactFrontMotion<D>> {
+        match start.ball {
+            Some(start) => Box::new(ShrinkingBall { start }),
+            None => Box::new(UnknownMotion),
+        }
+    }
+}
