@@ -9,7 +9,6 @@ mod support;
 mod surfaces;
 
 use meniscus::parallel::Interrupt;
-use meniscus::scene::schema::{Default, Kind, Parameter};
 use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, OutputPlan, State};
@@ -253,32 +252,31 @@ fn an_interrupt_drops_the_step() {
     assert_eq!(simulation.step().unwrap_err(), meniscus::simulation::StepError::Interrupted);
 }
 
-/// Every default that a scene declares is accepted by its own declaration, at every depth.
+/// Every default that a scene declares lies in its own range, at every depth.
 #[test]
 fn declared_defaults_are_valid() {
-    fn walk(parameters: &'static [Parameter], place: &str) {
-        for parameter in parameters {
-            let place = format!("{place}/{}", parameter.name);
-            if let Default::Json(text) | Default::JsonOrNull(text) = parameter.default {
-                let value: Value = serde_json::from_str(text).unwrap_or_else(|e| panic!("{place}: {e}"));
-                let mut violations = Vec::new();
-                let given = serde_json::Map::from_iter([(parameter.name.to_owned(), value)]);
-                meniscus::scene::check(std::slice::from_ref(parameter), &given, "", &mut violations);
-                assert!(violations.is_empty(), "{place}: {violations:?}");
-            }
-            if let Kind::Group(parameters) = parameter.kind {
-                walk(parameters, &place);
-            }
-            if let Kind::Choice(variants) | Kind::Choices { variants, .. } = parameter.kind {
-                for variant in variants() {
-                    walk(variant.parameters, &format!("{place}/{}", variant.name));
-                }
-            }
+    fn walk(schema: &Value, place: &str) {
+        if let Some(default) = schema.get("default").and_then(Value::as_f64) {
+            // An optional number has its range among the alternatives.
+            let ranges = schema["anyOf"].as_array().map_or_else(|| vec![schema], |options| options.iter().collect());
+            let is_within = |range: &&Value| {
+                let bound = |name: &str| range.get(name).and_then(Value::as_f64);
+                bound("minimum").is_none_or(|least| default >= least)
+                    && bound("maximum").is_none_or(|most| default <= most)
+                    && bound("exclusiveMinimum").is_none_or(|least| default > least)
+                    && bound("exclusiveMaximum").is_none_or(|most| default < most)
+            };
+            assert!(ranges.iter().all(is_within), "{place}: {default} in {schema}");
+        }
+        match schema {
+            Value::Object(map) => map.iter().for_each(|(name, value)| walk(value, &format!("{place}/{name}"))),
+            Value::Array(list) => list.iter().enumerate().for_each(|(k, value)| walk(value, &format!("{place}/{k}"))),
+            _ => {}
         }
     }
     for kind in SCENES {
-        walk(kind.parameters, kind.kind);
-        for preset in kind.presets {
+        walk(&kind.json_schema(), kind.kind);
+        for preset in kind.preset_names() {
             scene(&json!({"kind": kind.kind, "preset": preset, "spacing": 0.1}));
         }
     }
@@ -392,7 +390,7 @@ fn nonsense_is_refused_at_its_place() {
         (json!({"kind": "surface_pde", "solver": {"type": "bicgstab", "tolerance": 1e-9}}), "/solver"),
         (json!({"kind": "surface_pde", "problem": "diffusion", "solver": "sparse_lu"}), "/solver"),
     ] {
-        let found = meniscus::scene::understand(&body, SCENES).err().unwrap();
+        let found = meniscus::scene::parse(&body, SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == place), "{body}: {found:?}");
     }
     let bare = scene(&json!({"kind": "redistance", "preset": "paper", "method": "pcp"})).resolved();

@@ -7,7 +7,8 @@ mod support;
 
 use meniscus::geometry::{Vector, fibonacci};
 use meniscus::parallel::Interrupt;
-use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds, Violation};
+use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds};
+use meniscus::spec::Violation;
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, FieldValues, OutputPlan, Simulation, State};
 use serde_json::{Value, json};
@@ -271,7 +272,7 @@ fn what_points_cannot_do_is_refused_at_its_place() {
         (json!({"surface": {"type": "points", "upload": "a", "file": "b"}}), "/surface"),
         (json!({"surface": "sphere", "normals": "given"}), "/normals"),
     ] {
-        let found = meniscus::scene::understand(&body(&more), SCENES).err().unwrap();
+        let found = meniscus::scene::parse(&body(&more), SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == place), "{more}: {found:?}");
     }
     let sizes = CloudSizes::from([("/surface", 123_456)]);

@@ -17,7 +17,7 @@ use crate::rate_limit::Budget;
 use axum::Json;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use meniscus::scene::Violation;
+use meniscus::spec::Violation;
 use meniscus_jobs::service::store::{ChangeError, StoreError};
 use meniscus_jobs::system::process;
 use serde::Serialize;
@@ -125,7 +125,7 @@ impl ApiError {
     /// One wrong value that is neither missing nor misspelled.
     #[must_use]
     pub fn invalid(pointer: &str, code: &'static str, detail: &str, got: &Value, allowed: Value) -> Self {
-        Self::Invalid(vec![Violation::new(pointer, code, detail, got, allowed).into()])
+        Self::Invalid(vec![Violation::new(pointer, code, detail, got.clone(), allowed).into()])
     }
 
     fn problem_type(&self) -> &'static ProblemType {

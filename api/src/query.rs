@@ -14,7 +14,7 @@ mod values;
 use crate::error::{ApiError, ProblemItem};
 use axum::extract::{FromRequestParts, Query as RawQuery};
 use axum::http::request::Parts;
-use meniscus::scene::check::closest;
+use meniscus::spec::suggest;
 use serde::de::{DeserializeOwned, Expected, Unexpected};
 use serde_json::{Value, json};
 use std::fmt::{self, Display};
@@ -154,12 +154,12 @@ impl serde::de::Error for Refusal {
     }
 
     fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
-        let did_you_mean = closest(variant, expected);
+        let did_you_mean = suggest(variant, expected);
         Self { did_you_mean, ..Self::new("unknown", "the value is not one of the allowed ones", json!(expected)) }
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        let did_you_mean = closest(field, expected);
+        let did_you_mean = suggest(field, expected);
         Self { did_you_mean, ..Self::new("unknown", "there is no such parameter", json!(expected)) }
     }
 

@@ -1,7 +1,7 @@
 //! What the tests of the engine share: a scene from JSON, run to its end in a pool of its own.
 
 use meniscus::parallel::Interrupt;
-use meniscus::scene::{BuildContext, Clouds, Scene, understand};
+use meniscus::scene::{BuildContext, Clouds, Scene, parse};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, OutputPlan, Report, Simulation};
 use serde_json::Value;
@@ -9,7 +9,7 @@ use serde_json::Value;
 pub const PLAN: OutputPlan = OutputPlan { every_time: None, series_every_steps: 10 };
 
 pub fn scene(value: &Value) -> Box<dyn Scene> {
-    understand(value, SCENES).unwrap_or_else(|violations| panic!("{violations:#?}"))
+    parse(value, SCENES).unwrap_or_else(|violations| panic!("{violations:#?}"))
 }
 
 pub fn build(value: &Value, plan: OutputPlan) -> Box<dyn Simulation> {

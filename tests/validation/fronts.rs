@@ -3,7 +3,7 @@
 
 use crate::ring::extinction_of_ring;
 use crate::support::{build, error, run};
-use meniscus::scene::understand;
+use meniscus::scene::parse;
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{FieldValues, OutputPlan, Simulation, StepError};
 use serde_json::{Value, json};
@@ -190,7 +190,7 @@ fn set_ups_beyond_measure_are_refused() {
 }
 
 fn refusals(body: &Value) -> Vec<String> {
-    let violations = understand(&front(body), SCENES).err().unwrap_or_default();
+    let violations = parse(&front(body), SCENES).err().unwrap_or_default();
     violations.into_iter().map(|violation| violation.pointer).collect()
 }
 
@@ -387,7 +387,7 @@ fn normals_take_part_in_flows() {
     };
     let (with, without) = (off(json!({})), off(json!({"normal_weight": 0})));
     assert!(with < 0.5 * without, "{with:e} {without:e}");
-    let refused = understand(
+    let refused = parse(
         &front(&json!({"law": "mean_curvature", "normal_weight": 0.1, "degree": 4, "neighbors": 3})),
         SCENES,
     );

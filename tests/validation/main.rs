@@ -106,7 +106,7 @@ fn a_thin_band_has_the_particles_that_fits_need() {
 #[test]
 fn what_does_not_go_together_is_refused() {
     let refused = |body: Value, pointer: &str| {
-        let found = meniscus::scene::understand(&body, meniscus::scenes::SCENES).err().unwrap();
+        let found = meniscus::scene::parse(&body, meniscus::scenes::SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == pointer), "{body}: {found:?}");
     };
     let material = json!({"type": "pcp", "neighborhood": "material"});

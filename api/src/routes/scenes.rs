@@ -4,16 +4,16 @@ use crate::error::{ApiError, Problem};
 use crate::path::Path;
 use crate::views::{SceneKindList, SceneKindView};
 use axum::Json;
-use meniscus::scene::{SceneKind, json_schema};
+use meniscus::scene::SceneKind;
 use meniscus::scenes::{SCENES, find};
 
 fn view(kind: &SceneKind) -> SceneKindView {
     SceneKindView {
         kind: kind.kind,
         title: kind.title,
-        schema: json_schema::of_kind(kind),
-        presets: kind.presets.to_vec(),
-        restart_safe: json_schema::restart_safe(kind),
+        schema: kind.json_schema(),
+        presets: kind.preset_names(),
+        restart_safe: kind.restart_safe(),
         // The example is part of the program; a test runs it.
         example: serde_json::from_str(kind.example).unwrap_or_default(),
     }

@@ -59,19 +59,19 @@ pub async fn submit(
         }
         let sources = StoreSources::new(store);
         let (allowance, slots) = (here.config.allowance(), here.config.slots);
-        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?);
+        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::of);
         sources.check()?;
         let study = study?;
         if query.dry_run {
-            let view = DryRunView { points: study.points, estimate: study.new.estimate };
+            let view = DryRunView { points: study.points, estimate: study.estimate };
             return Ok(Json(view).into_response());
         }
-        check_capacity(&here, store, study.new.jobs.len() as u64, study.total.disk_bytes)?;
+        check_capacity(&here, store, study.jobs.len() as u64, study.total.disk_bytes)?;
         let answer = |row: &StudyRow| {
             let location = format!("/v1/studies/{}", row.id);
             stored_response(StatusCode::CREATED, Some(location), &StudyView::from(row.clone()))
         };
-        creation.respond(store.make_study(study.new, creation.keyed.as_ref(), answer)?)
+        creation.respond(store.make_study(study.into(), creation.keyed.as_ref(), answer)?)
     };
     let response = state.with_store(work).await?;
     state.supervisor.wake();

@@ -118,7 +118,7 @@ impl From<JobBody> for EstimateView {
         let estimate = body.forecast.estimate;
         let time = body.forecast.time.as_ref();
         Self {
-            resolved: body.resolved,
+            resolved: body.resolved.to_json(),
             particles: estimate.particles,
             time_step: estimate.time_step,
             steps: estimate.steps,

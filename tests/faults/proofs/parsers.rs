@@ -3,7 +3,7 @@
 
 use meniscus::geometry::random::CounterRandom;
 use meniscus::scene::CloudSizes;
-use meniscus::scene::understand;
+use meniscus::scene::parse;
 use meniscus::scenes::SCENES;
 use meniscus::simulation::OutputPlan;
 use meniscus_jobs::formats::mesh;
@@ -114,7 +114,7 @@ fn words() -> Vec<String> {
     }
     let mut words = vec!["kind".to_owned(), "preset".to_owned(), "scene".to_owned()];
     for kind in SCENES {
-        collect(&meniscus::scene::json_schema::of_kind(kind), &mut words);
+        collect(&kind.json_schema(), &mut words);
     }
     words.sort();
     words.dedup();
@@ -126,7 +126,7 @@ fn seeds() -> Vec<Value> {
     for kind in SCENES {
         let scenes: Vec<Value> = serde_json::from_str(kind.calibration).unwrap();
         seeds.extend(scenes.into_iter().map(|scene| json!({"scene": scene})));
-        let bare = understand(&json!({"kind": kind.kind}), SCENES).ok().unwrap().resolved();
+        let bare = parse(&json!({"kind": kind.kind}), SCENES).ok().unwrap().resolved();
         seeds.push(
             json!({"scene": bare, "limits": {"threads": 1}, "output": {"every_time": 0.1}, "checkpoint": {"keep": 3}}),
         );
@@ -157,7 +157,7 @@ pub fn scenes(count: u64, seed: u64) -> String {
             Err(found) => assert!(!found.is_empty(), "refused without a word: {spec}"),
             Ok(body) => {
                 accepted += 1;
-                let again = understand(&body.resolved["scene"], SCENES)
+                let again = parse(&body.resolved.scene, SCENES)
                     .unwrap_or_else(|found| panic!("what is resolved is refused: {spec}: {found:?}"));
                 assert_eq!(again.resolved(), body.resolved["scene"], "{spec}");
                 let plan = OutputPlan { every_time: None, series_every_steps: 10 };

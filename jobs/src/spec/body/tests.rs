@@ -1,4 +1,5 @@
-use super::{Allowance, NoSources, Origin, RestartSource, Sources, Wishes, parse};
+use super::{Allowance, NoSources, Origin, RestartSource, Sources, parse};
+use crate::spec::run_options::RunOptions;
 use crate::spec::uploads::Purpose;
 use serde_json::{Value, json};
 
@@ -11,7 +12,7 @@ impl Sources for OneCheckpoint {
     fn checkpoint(&self, _: &str) -> Option<RestartSource> {
         let first = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok()?;
         let origin = Origin::Checkpoint("ckpt_1".into());
-        Some(RestartSource { origin, resolved: first.resolved, isa: crate::system::build::isa(), step: 240 })
+        Some(RestartSource { origin, scene: first.resolved.scene, isa: crate::system::build::isa(), step: 240 })
     }
 
     fn uploaded_checkpoint(&self, _: &str) -> Option<RestartSource> {
@@ -72,17 +73,18 @@ fn files_of_this_machine_are_for_the_foreground_alone() {
 #[test]
 fn every_default_stands_in_the_resolved_body() {
     let body = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok().unwrap();
-    let scene = &body.resolved["scene"];
+    let resolved = body.resolved.to_json();
+    let scene = &resolved["scene"];
     assert_eq!(scene["field"], "dual");
     assert_eq!(scene["redistance"]["type"], "for_output");
     assert_eq!(scene["method"]["neighborhood"]["type"], "material");
-    assert_eq!(body.resolved["limits"]["threads"], 2);
-    assert_eq!(body.resolved["output"]["series_every_steps"], 10);
-    assert_eq!(body.resolved["checkpoint"]["every_wall_s"], 60.0);
-    assert!(Wishes::of(&body.resolved).is_ok());
+    assert_eq!(resolved["limits"]["threads"], 2);
+    assert_eq!(resolved["output"]["series_every_steps"], 10);
+    assert_eq!(resolved["checkpoint"]["every_wall_s"], 60.0);
+    assert!(RunOptions::from_resolved(&resolved).is_ok());
     // What is resolved is a body of its own with the same meaning.
     let again = parse(&json!({"scene": scene}), ALLOWANCE, &NoSources).ok().unwrap();
-    assert_eq!(&again.resolved["scene"], scene);
+    assert_eq!(&again.resolved.scene, scene);
 }
 
 #[test]
