@@ -87,7 +87,7 @@ pub fn check_capacity(state: &AppState, store: &Store, jobs: u64, disk_bytes: u6
         return Err(ApiError::NoSpace { needed: disk_bytes, free });
     }
     if let Some(most) = state.config.most_unfinished {
-        let unfinished = store.census()?.unfinished();
+        let unfinished = store.statistics()?.unfinished();
         if unfinished + jobs > most {
             return Err(ApiError::QuotaReached { unfinished, most });
         }

@@ -170,7 +170,8 @@ impl GbpmSpec {
         let is_by_curvature = motion == Motion::Curvature;
         let mut errors = Vec::new();
         if let Some(given) = self.normal_weight.filter(|given| *given > 0.0 && motion != Motion::Flow) {
-            let detail = "normals of a surface take part in reconstructions in a flow, which carries them along exactly";
+            let detail =
+                "normals of a surface take part in reconstructions in a flow, which carries them along exactly";
             errors.push(Violation::new(format!("{pointer}/normal_weight"), "conflict", detail, given, 0));
         }
         let (fewest, detail) = if is_by_curvature {
@@ -236,10 +237,10 @@ impl GbpmSpec {
             tube_radius: self.tube_radius_h,
             min_separation: self.min_separation_h,
             cosine: *cosine.get_or_insert(default_cosine),
-            adaptivity: self.adaptivity.as_ref().map(|given| gbpm::Adaptivity {
-                levels: given.levels,
-                curvature_constant: given.curvature_constant,
-            }),
+            adaptivity: self
+                .adaptivity
+                .as_ref()
+                .map(|given| gbpm::Adaptivity { levels: given.levels, curvature_constant: given.curvature_constant }),
         };
         self.degree = Some(degree);
         self.neighbors = Some(neighbors);

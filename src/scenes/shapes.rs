@@ -246,7 +246,11 @@ impl PlainShape {
                 Some(Box::new(Cuboid { center: check.center(center), size: check.vector("size", size) }))
             }
             Self::RoundedBox { center, size, corner_radius } => {
-                check.is_below("corner_radius", *corner_radius, 0.5 * size.iter().copied().fold(f64::INFINITY, f64::min));
+                check.is_below(
+                    "corner_radius",
+                    *corner_radius,
+                    0.5 * size.iter().copied().fold(f64::INFINITY, f64::min),
+                );
                 let (center, size) = (check.center(center), check.vector("size", size));
                 Some(Box::new(RoundedCuboid { center, size, corner_radius: *corner_radius }))
             }
@@ -265,7 +269,12 @@ impl PlainShape {
             Self::Dumbbell { center, separation, radius, neck_radius } => {
                 check.is_below("neck_radius", *neck_radius, *radius);
                 let joint = 2.0 * (radius * radius - neck_radius * neck_radius).max(0.0).sqrt();
-                check.is_above("separation", *separation, joint, "the balls would touch and leave no neck between them");
+                check.is_above(
+                    "separation",
+                    *separation,
+                    joint,
+                    "the balls would touch and leave no neck between them",
+                );
                 Some(Box::new(Dumbbell::new(check.center(center), *separation, *radius, *neck_radius)))
             }
         };

@@ -163,8 +163,11 @@ impl Parameter for u64 {
         if let Some(number) = found.filter(|number| (domain.least..=domain.most).contains(number)) {
             return Some(number);
         }
-        let (code, detail) =
-            if found.is_some() { ("range", "the number is out of range") } else { ("type", "a whole number is needed") };
+        let (code, detail) = if found.is_some() {
+            ("range", "the number is out of range")
+        } else {
+            ("type", "a whole number is needed")
+        };
         errors.push(Violation::new(place, code, detail, given.clone(), Self::allowed(domain)));
         None
     }

@@ -279,7 +279,7 @@ fn new_jobs(state: &AppState, store: &Store, study: &StudyRow) -> Result<Vec<New
         }
         let Some(old) = store.job(&point.job)? else { continue };
         let body = sources.understand(&old.spec, state.config.allowance(), &calibration)?;
-        let mut job = NewJob::of(&body);
+        let mut job = NewJob::from_body(&body);
         job.study = Some((study.id.clone(), point.index));
         job.retry_of = Some(point.job);
         new.push(job);

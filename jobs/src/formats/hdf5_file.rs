@@ -1,5 +1,6 @@
 //! Small conveniences over libhdf5: checksummed data sets of plain numbers, without times.
 
+use crate::spec::forecast::CHUNK_ROWS;
 use hdf5::{Dataset, Group, H5Type};
 
 /// Writes numbers as a data set with a Fletcher-32 checksum per chunk; `components` > 1 makes it two-dimensional.
@@ -23,9 +24,6 @@ pub fn write<T: H5Type>(group: &Group, name: &str, components: usize, values: &[
     }
     Ok(dataset)
 }
-
-/// Rows of a chunk at most.
-pub const CHUNK_ROWS: usize = 1 << 16;
 
 /// The bytes of numbers as they stand in the file, for digests (this program runs on little-endian machines only).
 #[must_use]

@@ -3,7 +3,7 @@
 
 use crate::service::store::uploads::{CLOUD, CONTENT};
 use crate::service::store::{self, JobFilter, JobRow, START_CHECKPOINT, Store, StoreError};
-use crate::spec::attempt_spec::attempt_directory;
+use crate::spec::attempt_files::attempt_directory;
 use crate::spec::states::State;
 use crate::system::digest;
 use crate::system::lock::{DirectoryLock, LockError};
@@ -140,7 +140,7 @@ fn of_uploads(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
             let directory = store.upload_directory(&upload.id);
             let mut wrong: Vec<String> =
                 of_file(&directory.join(CONTENT), CONTENT, upload.size_bytes, &upload.sha256).into_iter().collect();
-            let has_points = upload.found["points"].as_u64().is_some();
+            let has_points = upload.found.as_ref().is_some_and(|found| found.points().is_some());
             if has_points && !directory.join(CLOUD).is_file() {
                 wrong.push("its points are missing".to_owned());
             }

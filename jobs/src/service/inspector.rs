@@ -3,9 +3,8 @@
 use crate::formats::cloud_file;
 use crate::service::store::uploads::{CLOUD, CONTENT};
 use crate::service::store::{Store, UploadRow};
-use crate::spec::uploads::Findings;
+use crate::spec::uploads::{Contents, Inspection};
 use crate::system::artifacts;
-use serde_json::Value;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -29,7 +28,7 @@ pub struct InspectorHandle {
 impl InspectorHandle {
     /// There is something to look into.
     pub fn wake(&self) {
-        // After the end there is nobody to wake.
+        // After the end there is no receiver.
         let _ = self.sender.send(());
     }
 }
@@ -40,11 +39,11 @@ impl InspectorHandle {
 /// When the thread cannot be started.
 pub fn start(store: Arc<Store>, program: PathBuf) -> io::Result<InspectorHandle> {
     let (sender, receiver) = channel();
-    std::thread::Builder::new().name("inspector".to_owned()).spawn(move || attend(&store, &program, &receiver))?;
+    std::thread::Builder::new().name("inspector".to_owned()).spawn(move || inspect_all(&store, &program, &receiver))?;
     Ok(InspectorHandle { sender })
 }
 
-fn attend(store: &Store, program: &Path, receiver: &Receiver<()>) {
+fn inspect_all(store: &Store, program: &Path, receiver: &Receiver<()>) {
     loop {
         match store.quarantined_uploads() {
             Ok(waiting) => {
@@ -63,19 +62,19 @@ fn attend(store: &Store, program: &Path, receiver: &Receiver<()>) {
 
 fn look_into(store: &Store, program: &Path, upload: &UploadRow) {
     let directory = store.upload_directory(&upload.id);
-    let settled = check(program, upload, &directory).map_err(|error| error.to_string()).and_then(|verdict| {
-        let said = verdict.as_ref().map_or_else(String::as_str, |_| "ready");
-        tracing::info!(upload = upload.id, purpose = upload.purpose.word(), said, "upload checked");
-        store.settle_upload(&upload.id, &verdict).map_err(|error| error.to_string())
+    let finished = check(program, upload, &directory).map_err(|error| error.to_string()).and_then(|verdict| {
+        let outcome = verdict.as_ref().map_or_else(String::as_str, |_| "ready");
+        tracing::info!(upload = upload.id, purpose = upload.purpose.word(), outcome, "upload checked");
+        store.finish_upload(&upload.id, &verdict).map_err(|error| error.to_string())
     });
-    if let Err(error) = settled {
+    if let Err(error) = finished {
         // It stays in quarantine and is looked into again.
         tracing::error!(upload = upload.id, error, "an upload could not be checked");
     }
 }
 
 /// What a process of its own finds in an upload.
-fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Result<Findings, String>> {
+fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Result<Contents, String>> {
     let mut child = Command::new(program)
         .arg0("meniscus")
         .args(["inspect", "--as", upload.purpose.word()])
@@ -116,16 +115,15 @@ fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Res
 }
 
 /// Takes the line and puts the points behind it, if there are any, into a file.
-fn take(output: impl Read, target: &Path) -> io::Result<Result<Findings, String>> {
+fn take(output: impl Read, target: &Path) -> io::Result<Result<Contents, String>> {
     let mut output = BufReader::new(output);
     let mut line = Vec::new();
     (&mut output).take(LONGEST_LINE).read_until(b'\n', &mut line)?;
-    let Ok(mut said) = serde_json::from_slice::<Value>(&line) else {
-        return Ok(Err("looking into it failed".to_owned()));
+    let contents = match serde_json::from_slice(&line) {
+        Ok(Inspection::Ready(contents)) => contents,
+        Ok(Inspection::Rejected(reason)) => return Ok(Err(reason)),
+        Err(_) => return Ok(Err("looking into it failed".to_owned())),
     };
-    if let Some(reason) = said["rejected"].as_str() {
-        return Ok(Err(reason.to_owned()));
-    }
     if !output.fill_buf()?.is_empty() {
         let mut file = File::create(artifacts::unfinished(target))?;
         let written = io::copy(&mut output.take(cloud_file::MOST_BYTES), &mut file)
@@ -140,5 +138,5 @@ fn take(output: impl Read, target: &Path) -> io::Result<Result<Findings, String>
             return Err(error);
         }
     }
-    Ok(Ok(said["ready"].take()))
+    Ok(Ok(contents))
 }

@@ -3,9 +3,9 @@
 //! One connection writes, under a lock; a few others read. Every change of a job is a compare-and-set on its `rev`
 //! inside a transaction that also writes the event, so what a client saw and what the file says never differ.
 
-pub mod answers;
+pub mod idempotency;
 pub mod calibration;
-pub mod census;
+pub mod statistics;
 pub mod events;
 pub mod ids;
 pub mod import;
@@ -14,15 +14,16 @@ pub mod listing;
 pub mod migrations;
 pub mod retention;
 pub mod rows;
-pub mod settle;
+pub mod finish_attempt;
 pub mod studies;
+mod study_limits;
 pub mod submission;
-mod together;
+mod group_commit;
 pub mod transitions;
 pub mod uploads;
 
-pub use answers::{KeptAnswer, Made, Once};
 pub use events::Event;
+pub use idempotency::{IdempotencyKey, Made, Receipt};
 pub use listing::JobFilter;
 pub use rows::{CheckpointRow, FileRow, JobRow};
 pub use studies::{NewStudy, PointRow, StudyRow};
@@ -30,7 +31,7 @@ pub use submission::{NewJob, START_CHECKPOINT};
 pub use transitions::{Change, ChangeError};
 pub use uploads::{NewUpload, UploadRow};
 
-use crate::spec::body::{Origin, RestartSource};
+use crate::spec::body::{Origin, RestartSource, resolved_scene};
 use crate::spec::states::State;
 use ids::RisingIds;
 use rusqlite::config::DbConfig;
@@ -59,7 +60,7 @@ pub struct Store {
     directory: PathBuf,
     writer: Arc<Mutex<Connection>>,
     /// Small transactions that wait for the writer.
-    waiting: Mutex<Sender<together::Waiting>>,
+    waiting: Mutex<Sender<group_commit::Waiting>>,
     readers: Vec<Mutex<Connection>>,
     next_reader: std::sync::atomic::AtomicUsize,
     /// Trims the log.
@@ -86,7 +87,7 @@ pub enum StoreError {
     UploadGone,
     /// A transaction that was shared with others failed.
     #[error("the store failed: {0}")]
-    Together(String),
+    GroupCommit(String),
     /// A row does not say what it should.
     #[error("a stored value is unreadable: {0}")]
     Json(#[from] serde_json::Error),
@@ -116,7 +117,7 @@ impl Store {
         let readers = (0..READERS).map(|_| connect(&path).map(Mutex::new)).collect::<Result<_, _>>()?;
         Ok(Self {
             directory: directory.to_owned(),
-            waiting: together::start(Arc::clone(&writer), changes.clone())?,
+            waiting: group_commit::start(Arc::clone(&writer), changes.clone())?,
             writer,
             readers,
             next_reader: std::sync::atomic::AtomicUsize::new(0),
@@ -248,13 +249,9 @@ impl Store {
         let Some(row) = rows::checkpoint(&connection, checkpoint)? else {
             return Ok(None);
         };
-        let job = rows::job(&connection, &row.job)?;
-        Ok(job.map(|job| RestartSource {
-            origin: Origin::Checkpoint(row.id),
-            scene: job.resolved["scene"].clone(),
-            isa: row.isa,
-            step: row.step,
-        }))
+        let Some(job) = rows::job(&connection, &row.job)? else { return Ok(None) };
+        let (origin, scene) = (Origin::Checkpoint(row.id), resolved_scene(&job.resolved)?);
+        Ok(Some(RestartSource { origin, scene, isa: row.isa, step: row.step }))
     }
 
     /// Deletes a job in a terminal state and its files; false where it is in another state.

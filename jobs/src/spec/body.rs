@@ -9,9 +9,7 @@ pub use restart::{Origin, RestartSource, RestartSpec};
 pub use sources::{NoSources, Sources};
 
 use crate::spec::forecast::{self, Forecast, WORKER_BASE_BYTES};
-use crate::spec::run_options::{
-    CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions,
-};
+use crate::spec::run_options::{CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions};
 use meniscus::scene::{self, CloudSizes, CloudSource, Estimate, Scene};
 use meniscus::scenes::SCENES;
 use meniscus::spec::{Given, Group, Json, Parameter, Raw, Violation, group};
@@ -78,6 +76,18 @@ impl ResolvedBody {
         // Texts, numbers and JSON always have a JSON form.
         serde_json::to_value(self).unwrap_or_default()
     }
+}
+
+/// The scene of a resolved body as it stands in a row or in a checkpoint, of earlier builds too.
+///
+/// # Errors
+/// When it has none.
+pub fn resolved_scene(body: &Value) -> Result<Value, serde_json::Error> {
+    #[derive(Deserialize)]
+    struct SceneAlone {
+        scene: Value,
+    }
+    SceneAlone::deserialize(body).map(|body| body.scene)
 }
 
 /// A valid job body with every default, and its scene.
@@ -252,8 +262,7 @@ fn check_memory(prefix: &str, scene: &dyn Scene, estimate: &Estimate, limit: u64
         estimate.particles
     );
     let at = format!("{prefix}/spacing");
-    (needed > limit)
-        .then(|| Violation::new(at, "memory", detail, json!(scene.spacing()), format!("≤ {limit} bytes")))
+    (needed > limit).then(|| Violation::new(at, "memory", detail, json!(scene.spacing()), format!("≤ {limit} bytes")))
 }
 
 /// An error where the checkpoint lies behind the end of the scene.

@@ -67,10 +67,7 @@ impl Parameter for FieldNames {
     }
 
     fn schema((): ()) -> Object {
-        Object::from_iter([
-            ("type".to_owned(), json!("array")),
-            ("items".to_owned(), json!({"type": "string"})),
-        ])
+        Object::from_iter([("type".to_owned(), json!("array")), ("items".to_owned(), json!({"type": "string"}))])
     }
 
     fn to_json(&self) -> Json {
@@ -134,6 +131,12 @@ impl RunOptions {
     /// When the body is not resolved.
     pub fn from_resolved(body: &Json) -> Result<Self, serde_json::Error> {
         Self::deserialize(body)
+    }
+
+    /// Threads of the worker.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.limits.threads.max(1) as usize
     }
 
     /// The plan that the engine sees.

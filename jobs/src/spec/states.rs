@@ -183,8 +183,8 @@ impl Reason {
     pub fn hint(self) -> &'static str {
         match self {
             Self::UserCancel => "canceled on request; submit the body again to run it anew",
-            Self::UserPause => "paused on request; POST …/resume goes on from the last checkpoint",
-            Self::LimitWalltime => "limits.wall_s is used up; POST …/resume grants it once more",
+            Self::UserPause => "paused on request; resume the job to go on from its last checkpoint",
+            Self::LimitWalltime => "limits.wall_s is used up; resume the job to grant it once more",
             Self::LimitMemory => {
                 "the worker outgrew limits.memory_bytes; raise it, or use a larger spacing or a narrower band"
             }

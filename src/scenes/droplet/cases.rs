@@ -41,9 +41,7 @@ impl Case {
         match name {
             CaseName::Oscillating => Self::oscillating(dimension),
             CaseName::Dividing => Self::dividing(dimension, spacing),
-            CaseName::Static => {
-                Self { shape: Some(Shape::ball(dimension, 0.5)), ..Self::oscillating(dimension) }
-            }
+            CaseName::Static => Self { shape: Some(Shape::ball(dimension, 0.5)), ..Self::oscillating(dimension) },
             CaseName::Custom => Self { shape: None, ..Self::oscillating(dimension) },
         }
     }

@@ -90,7 +90,8 @@ fn check_fits(spec: &Droplet, order: u64, errors: &mut Vec<Violation>) {
     }
     let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
     if inside.viscosity != outside.viscosity || inside.density != outside.density {
-        let detail = "the fits of dcpse reach across the interface: both fluids must have one density and one viscosity";
+        let detail =
+            "the fits of dcpse reach across the interface: both fluids must have one density and one viscosity";
         let got = json!([inside.density, outside.density, inside.viscosity, outside.viscosity]);
         refuse("/fluids", detail, got, Value::Null);
     }

@@ -13,7 +13,7 @@ use crate::parallel::Interrupt;
 use crate::polynomials::multi_index::term_count;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
@@ -91,12 +91,7 @@ fn body_force<const D: usize>(force: &ForceChoice, errors: &mut Vec<Violation>) 
 }
 
 /// Where normals and curvatures come from; the spec gets what was left open.
-fn geometry(
-    spec: &mut Droplet,
-    case: &Case,
-    dimension: usize,
-    smoothing_h: f64,
-) -> Result<Geometry, Violation> {
+fn geometry(spec: &mut Droplet, case: &Case, dimension: usize, smoothing_h: f64) -> Result<Geometry, Violation> {
     let GeometryChoice::Pcp { band_h, method } = &mut spec.geometry else { return Ok(Geometry::ColorField) };
     if method.neighborhood.is_none() && method.cutoff_h.is_none() {
         method.neighborhood = Some(Neighborhood::Radius { cutoff_h: case.fits.1 });
@@ -381,6 +376,11 @@ impl<const D: usize> Scene for DropletScene<D> {
 
     fn resolved(&self) -> Value {
         scene::resolved(super::KIND.kind, &self.spec)
+    }
+
+    fn view(&self) -> View {
+        let has_distance = self.parts.has_tension() && matches!(self.parts.geometry, Geometry::Pcp { .. });
+        if has_distance { View::DISTANCE } else { View::Nothing }
     }
 
     fn field_names(&self) -> Vec<&'static str> {

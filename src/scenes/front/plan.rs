@@ -7,7 +7,7 @@ use crate::geometry::flows::Stretch;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::curvature_stability::longest_step;
 use crate::scenes::flow_work::{error_units, path_units, stretch};
 use crate::scenes::gbpm_spec::{GbpmContext, GbpmPlan, GbpmSpec, Motion, TopologyWord};
@@ -360,9 +360,7 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
                 speed: *speed,
                 topology: self.chosen.topology,
             },
-            Law::MeanCurvature => {
-                shape.as_ball::<D>().map_or(ExactFrontMotion::Unknown, ExactFrontMotion::Shrinking)
-            }
+            Law::MeanCurvature => shape.as_ball::<D>().map_or(ExactFrontMotion::Unknown, ExactFrontMotion::Shrinking),
             Law::GeometricalOptics { .. } => ExactFrontMotion::Unknown,
         })
     }
@@ -385,6 +383,10 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         self.resolved.1.clone()
     }
 
+    fn view(&self) -> View {
+        View::Front { normal: "normal", is_plane: D == 2 }
+    }
+
     fn field_names(&self) -> Vec<&'static str> {
         let mut names = vec!["normal", "curvature", "velocity", "grid_point", "level", "segment", "particle_id"];
         if D == 3 {
@@ -399,7 +401,10 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
         // On the coarsest level; where there are not many, as it is refined.
         let reach = self.chosen.method.tube_radius * self.choice.spacing;
-        let about = self.choice.shape.surface::<D>("/shape")
+        let about = self
+            .choice
+            .shape
+            .surface::<D>("/shape")
             .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.choice.spacing));
         // Corners without foot-points matter where there are few.
         let counted = if about < COUNTED { self.system(Interrupt::default()).ok() } else { None };

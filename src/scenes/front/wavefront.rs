@@ -5,7 +5,7 @@ use crate::geometry::flows::Rays;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
-use crate::scene::{BuildContext, Estimate, Scene};
+use crate::scene::{BuildContext, Estimate, Scene, View};
 use crate::scenes::gbpm_spec::GbpmPlan;
 use crate::scenes::shapes::{PlainShape, Shape};
 use crate::scenes::work_estimate;
@@ -73,6 +73,11 @@ impl Scene for WavefrontScene {
 
     fn resolved(&self) -> Value {
         self.resolved.1.clone()
+    }
+
+    /// A curve in (x, y, θ) is drawn in the plane: rays keep their direction.
+    fn view(&self) -> View {
+        View::Front { normal: "normal", is_plane: true }
     }
 
     fn field_names(&self) -> Vec<&'static str> {

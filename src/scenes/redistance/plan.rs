@@ -6,7 +6,7 @@ use crate::geometry::Surface;
 use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::pcp_spec::PcpContext;
 use crate::scenes::shapes::Shape;
@@ -59,7 +59,8 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     check_sources(&spec, points.is_some(), asked.is_some(), &mut errors);
     let method = method(&mut spec, D).map_err(|error| errors.push(error)).ok();
     if let Method::Pcp { method } = &spec.method {
-        errors.extend(method.refuse_material("/method", "particles at rest have no initial positions beside their own"));
+        errors
+            .extend(method.refuse_material("/method", "particles at rest have no initial positions beside their own"));
     }
     let initial = initial::<D>(&mut spec, &shape, points.is_some(), &mut errors);
     let band = band(&mut spec, &mut errors);
@@ -77,7 +78,16 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     spec.dimension = Some(D);
     let lattice = Lattice { spacing: spec.spacing, offset: 0.0, jitter: spec.jitter, seed: spec.seed };
     let clouds = points.into_iter().chain(asked).collect();
-    Ok(Box::new(RedistanceScene::<D> { spec, shape, lattice, method, remeshing, initial, half_band: 0.5 * band, clouds }))
+    Ok(Box::new(RedistanceScene::<D> {
+        spec,
+        shape,
+        lattice,
+        method,
+        remeshing,
+        initial,
+        half_band: 0.5 * band,
+        clouds,
+    }))
 }
 
 /// What does not go together with points from outside.
@@ -130,7 +140,13 @@ fn initial<const D: usize>(
     errors: &mut Vec<Violation>,
 ) -> InitialLevel<D> {
     if let (true, Some(given)) = (has_points, &spec.initial) {
-        errors.push(Violation::new("/initial", "conflict", "points come with their level", given.to_json(), Value::Null));
+        errors.push(Violation::new(
+            "/initial",
+            "conflict",
+            "points come with their level",
+            given.to_json(),
+            Value::Null,
+        ));
     }
     let quadric = shape.quadric::<D>();
     let default = if quadric.is_some() { Initial::Quadric } else { Initial::Distance };
@@ -185,6 +201,10 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         scene::resolved(super::KIND.kind, &self.spec)
     }
 
+    fn view(&self) -> View {
+        View::DISTANCE
+    }
+
     fn field_names(&self) -> Vec<&'static str> {
         vec!["phi", "closest_point", "normal", "curvature", "particle_id"]
     }
@@ -197,7 +217,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
         let reach = self.half_band.max(self.method.fit_band_h::<D>() * self.lattice.spacing) + beyond;
         let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
-            self.shape.surface::<D>("/shape")
+            self.shape
+                .surface::<D>("/shape")
                 .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing))
         });
         Estimate {

@@ -4,7 +4,8 @@
 use super::points;
 use super::problems::{self, ProblemChoice};
 use super::spec::{
-    EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, SurfaceChoice, SurfacePde,
+    EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, SurfaceChoice,
+    SurfacePde,
 };
 use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
 use crate::geometry::random::CounterRandom;
@@ -15,7 +16,7 @@ use crate::operators::charts::tangent::Metric;
 use crate::point_clouds::{Bump, normals};
 use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::PhaseWork;
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::work_estimate;
 use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
 use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method, SurfaceCloud, SurfaceEquation};
@@ -404,8 +405,7 @@ impl SurfaceScene {
             Normals::Estimated => {
                 let found = normals::estimate::<D>(&cloud.points, radius);
                 let found = found.map_err(|failed| {
-                    let refused =
-                        Violation::new("/normals", "data", failed.to_string(), "estimated", Value::Null);
+                    let refused = Violation::new("/normals", "data", failed.to_string(), "estimated", Value::Null);
                     vec![refused]
                 })?;
                 cloud.normals = found;
@@ -430,6 +430,12 @@ impl Scene for SurfaceScene {
 
     fn resolved(&self) -> Value {
         scene::resolved(super::KIND.kind, &self.spec)
+    }
+
+    fn view(&self) -> View {
+        let has_values = self.problem.field_names(&self.shape).contains(&"value");
+        let field = View::SurfaceField { field: "value", normal: "normal", is_plane: self.shape.is_curve() };
+        if has_values { field } else { View::Nothing }
     }
 
     fn field_names(&self) -> Vec<&'static str> {

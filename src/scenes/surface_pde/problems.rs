@@ -171,9 +171,7 @@ pub(super) fn plan(
         }
         ProblemSpec::Diffusion { initial, end_time, time_step, integrator, .. } => {
             let initial = initial.get_or_insert_with(|| match shape {
-                Shape::Bump(_) => {
-                    InitialChoice::TruncatedGaussian { center: [0.0, 0.0, 0.0].into(), sigma: 0.2 }
-                }
+                Shape::Bump(_) => InitialChoice::TruncatedGaussian { center: [0.0, 0.0, 0.0].into(), sigma: 0.2 },
                 shape => InitialChoice::Field(default_field(shape)),
             });
             let start = Start::Field(site("/problem/initial").initial(initial, errors));
@@ -186,7 +184,14 @@ pub(super) fn plan(
         }
         ProblemSpec::Curvature => Some(ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights }),
         ProblemSpec::ReactionDiffusion {
-            model, diffusivity, second_diffusivity, noise, manufactured, end_time, time_step, tolerance
+            model,
+            diffusivity,
+            second_diffusivity,
+            noise,
+            manufactured,
+            end_time,
+            time_step,
+            tolerance,
         } => {
             let exact = manufactured.as_mut().map(|field| site("/problem/manufactured").field(field, errors));
             if let (Shape::Points(_), Some(_)) = (shape, exact) {
@@ -362,9 +367,7 @@ impl ProblemChoice {
     pub fn fill(&self, entries: f64, points: f64) -> f64 {
         match self.solver() {
             Some(Solver::SparseLu) => 70.0 * entries * points.ln(),
-            Some(Solver::Gmres { restart, stopping }) => {
-                8.0 * (stopping.max_iterations.min(restart as u64) + 1) as f64
-            }
+            Some(Solver::Gmres { restart, stopping }) => 8.0 * (stopping.max_iterations.min(restart as u64) + 1) as f64,
             _ => 0.0,
         }
     }

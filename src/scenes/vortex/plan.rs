@@ -6,7 +6,7 @@ use crate::geometry::Flow;
 use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::flow_work::{error_units, stretch};
 use crate::scenes::front::{FrontChoice, Law, plan_front};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
@@ -269,6 +269,10 @@ impl<const D: usize> Scene for VortexScene<D> {
         scene::resolved(super::KIND.kind, &self.spec)
     }
 
+    fn view(&self) -> View {
+        View::DISTANCE
+    }
+
     fn field_names(&self) -> Vec<&'static str> {
         let mut names = vec!["phi", "closest_point", "normal", "curvature", "velocity", "particle_id"];
         if self.field == FieldChoice::Dual {
@@ -283,7 +287,9 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
-            self.spec.shape.surface::<D>("/shape")
+            self.spec
+                .shape
+                .surface::<D>("/shape")
                 .map_or(0, |surface| band_particles(surface.as_ref(), self.reach(), self.lattice.spacing))
         });
         Estimate {

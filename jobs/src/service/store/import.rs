@@ -2,14 +2,13 @@
 //! job is at the record's attempt.
 
 use super::{Store, StoreError, calibration, events, rows};
-use crate::spec::calibration::measured;
+use crate::spec::attempt_files::{self, attempt_directory};
+use crate::spec::forecast::measured;
 use crate::spec::records::{self, CheckpointRecord, Line, Progress, Record, Usage, Verdict};
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-/// The file of a finished run's errors and cost.
-pub const REPORT: &str = "report.json";
 /// Least time between two progress events of a job.
 const PROGRESS_EVENT_INTERVAL: Duration = Duration::from_secs(1);
 
@@ -47,7 +46,7 @@ impl Store {
         let Some(row) = self.job(job)?.filter(|row| row.attempt == epoch) else {
             return Ok(Imported::default());
         };
-        let directory = crate::spec::attempt_spec::attempt_directory(&self.job_directory(job), epoch);
+        let directory = attempt_directory(&self.job_directory(job), epoch);
         let lines = records::read_from(&directory, row.records_offset)?;
         let Some((_, end)) = lines.last() else {
             return Ok(Imported::default());
@@ -138,7 +137,7 @@ impl Store {
         if !deleted {
             return Ok(false);
         }
-        let directory = crate::spec::attempt_spec::attempt_directory(&self.job_directory(&row.job), row.attempt);
+        let directory = attempt_directory(&self.job_directory(&row.job), row.attempt);
         match std::fs::remove_file(directory.join(&row.path)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
             _ => Ok(true),
@@ -180,15 +179,15 @@ impl Attempt<'_> {
 impl Store {
     /// Keeps the errors and the cost of a finished run in its row, so that tables of thousands open no file.
     fn keep_results(&self, transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
-        let directory = crate::spec::attempt_spec::attempt_directory(&self.job_directory(of.job), of.epoch);
-        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(directory.join(REPORT))?)?;
+        let directory = attempt_directory(&self.job_directory(of.job), of.epoch);
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(directory.join(attempt_files::REPORT))?)?;
         let results = json!({"errors": report["errors"], "cost": report["cost"]});
         // Runs that began in the middle or were cut off tell nothing about whole ones.
         if let Some(row) =
             rows::job(transaction, of.job)?.filter(|row| row.attempt == 1 && row.restarted_from.is_none())
         {
             let threads = row.resolved["limits"]["threads"].as_u64().unwrap_or(1);
-            calibration::add(transaction, &measured(&row.estimate, &report["cost"], threads))?;
+            calibration::add(transaction, &measured(&row.forecast, &report["cost"], threads))?;
         }
         transaction.execute("UPDATE jobs SET results = ?2 WHERE id = ?1", params![of.job, results.to_string()])?;
         Ok(())
@@ -197,7 +196,7 @@ impl Store {
     fn take(&self, transaction: &Transaction, of: &Attempt, record: &Record) -> Result<(), StoreError> {
         let Attempt { job, epoch, .. } = *of;
         match record {
-            Record::Started { frames, pid, step, .. } => {
+            Record::Started { frames, step, .. } => {
                 // Frames after the checkpoint are written again; until then they are not part of the job.
                 let paths: Vec<String> = {
                     let mut statement = transaction.prepare_cached(
@@ -209,7 +208,6 @@ impl Store {
                 for path in paths.iter().skip(*frames as usize) {
                     transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
                 }
-                transaction.execute("UPDATE jobs SET worker_pid = ?2 WHERE id = ?1", params![job, pid])?;
                 // Checkpoints of steps that are to come again were refused by the worker.
                 transaction
                     .execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, *step as i64])?;
@@ -230,7 +228,7 @@ impl Store {
                         file.time,
                         file.step.map(|step| step as i64),
                     ])?;
-                if file.path == REPORT {
+                if file.path == attempt_files::REPORT {
                     self.keep_results(transaction, of)?;
                 }
                 if file.step.is_some() {

@@ -152,6 +152,26 @@ const MIGRATIONS: &[&str] = &[
         PRIMARY KEY (build, machine, kind, phase)
     ) STRICT, WITHOUT ROWID;
 ",
+    // What clients were told is opaque to the store; a worker is known by the handle that its executor gave.
+    "
+    CREATE TABLE receipts (
+        owner TEXT NOT NULL,
+        key TEXT NOT NULL,
+        fingerprint TEXT NOT NULL,
+        receipt BLOB NOT NULL,
+        created_at TEXT NOT NULL,
+        PRIMARY KEY (owner, key)
+    ) STRICT, WITHOUT ROWID;
+    INSERT INTO receipts (owner, key, fingerprint, receipt, created_at)
+        SELECT owner, key, request_sha256,
+            CAST(json_object('status', status, 'location', location, 'body', body) AS BLOB), created_at
+        FROM answers;
+    DROP TABLE answers;
+    ALTER TABLE jobs ADD COLUMN worker_handle TEXT;
+    UPDATE jobs SET worker_handle = CAST(worker_pid AS TEXT) WHERE worker_pid IS NOT NULL;
+    ALTER TABLE jobs DROP COLUMN worker_pid;
+    ALTER TABLE jobs RENAME COLUMN condemned TO kill_reason;
+",
 ];
 
 /// Makes the changes that are missing, each in a transaction of its own.

@@ -2,6 +2,7 @@
 
 use super::StoreError;
 use crate::formats::frame_index;
+use crate::spec::forecast::ForecastRecord;
 use crate::spec::records::{Progress, Usage, Verdict};
 use crate::spec::states::{Reason, State};
 use crate::system::digest;
@@ -34,8 +35,8 @@ pub struct JobRow {
     pub spec: Value,
     /// Body with every default.
     pub resolved: Value,
-    /// Size of the run as estimated.
-    pub estimate: Value,
+    /// What the run was forecast to take.
+    pub forecast: ForecastRecord,
     /// Priority.
     pub priority: i64,
     /// Made.
@@ -52,12 +53,12 @@ pub struct JobRow {
     pub records_offset: u64,
     /// Whether this attempt has made a checkpoint.
     pub has_new_checkpoint: bool,
-    /// Process of the latest attempt.
-    pub worker_pid: Option<u32>,
-    /// The worker's last word in this attempt, once it has come.
+    /// Handle of the latest attempt's worker, as its executor gave it.
+    pub worker_handle: Option<String>,
+    /// The verdict of this attempt's worker, once it has come.
     pub verdict: Option<Verdict>,
-    /// Why the service ended the worker, written before it did.
-    pub condemned: Option<Reason>,
+    /// Why the service killed the worker, written before it did.
+    pub kill_reason: Option<Reason>,
     /// Progress.
     pub progress: Progress,
     /// Counts changes of progress.
@@ -86,7 +87,7 @@ impl JobRow {
     /// Bytes that its files will still need, beside what is there.
     #[must_use]
     pub fn disk_bytes_to_come(&self) -> u64 {
-        self.estimate["disk_bytes"].as_u64().unwrap_or(0).saturating_sub(self.usage.disk_bytes)
+        self.forecast.disk_bytes.saturating_sub(self.usage.disk_bytes)
     }
 }
 
@@ -165,7 +166,7 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         kind: row.get("kind")?,
         spec: json(row, "spec")?,
         resolved: json(row, "resolved")?,
-        estimate: json(row, "estimate")?,
+        forecast: json(row, "estimate")?,
         priority: row.get("priority")?,
         created_at: row.get("created_at")?,
         started_at: row.get("started_at")?,
@@ -174,9 +175,9 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         deaths: row.get("deaths")?,
         records_offset: row.get::<_, i64>("records_offset")? as u64,
         has_new_checkpoint: row.get::<_, i64>("checkpoint_since")? != 0,
-        worker_pid: row.get("worker_pid")?,
+        worker_handle: row.get("worker_handle")?,
         verdict: json(row, "verdict")?,
-        condemned: row.get::<_, Option<String>>("condemned")?.as_deref().and_then(Reason::from_word),
+        kill_reason: row.get::<_, Option<String>>("kill_reason")?.as_deref().and_then(Reason::from_word),
         progress: json(row, "progress")?,
         progress_count: row.get("progress_count")?,
         warnings: json(row, "warnings")?,

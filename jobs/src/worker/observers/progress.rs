@@ -1,6 +1,6 @@
 //! How far a run is, how fast it goes, what it costs.
 
-use crate::spec::forecast::TimeForecast;
+use crate::spec::calibration::TimeForecast;
 use crate::spec::records::{HealthRecord, Progress, Usage};
 use crate::system::process;
 use meniscus::scenes::work_estimate::REST;

@@ -9,7 +9,7 @@ use rusqlite::Transaction;
 
 /// How a worker that left no verdict was lost.
 #[derive(Debug, Clone, Copy)]
-pub struct Loss {
+pub struct LossCause {
     /// Why, unless it was condemned before.
     pub reason: Reason,
     /// Whether it counts towards the three deaths that fail a job.
@@ -25,7 +25,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn settle(&self, job: &str, epoch: u64, lost: Loss) -> Result<(), StoreError> {
+    pub fn finish_attempt(&self, job: &str, epoch: u64, lost: LossCause) -> Result<(), StoreError> {
         let settled = self.write(|transaction| {
             let row = rows::job(transaction, job)?.filter(|row| row.attempt == epoch);
             row.map_or(Ok(()), |row| decide(transaction, &row, lost))
@@ -42,7 +42,7 @@ impl Store {
     }
 }
 
-fn decide(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), ChangeError> {
+fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
     let step = |trigger: Trigger, reason: Option<Reason>, message: Option<String>| {
         apply(transaction, &row.id, trigger, &Change { reason, message, epoch: Some(row.attempt) })
     };
@@ -72,8 +72,8 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), Cha
     }
 }
 
-fn lose(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), ChangeError> {
-    let reason = row.condemned.unwrap_or(lost.reason);
+fn lose(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
+    let reason = row.kill_reason.unwrap_or(lost.reason);
     let step = |trigger: Trigger, reason: Reason, message: Option<String>| {
         apply(transaction, &row.id, trigger, &Change { reason: Some(reason), message, epoch: Some(row.attempt) })
     };

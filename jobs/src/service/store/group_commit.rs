@@ -44,7 +44,7 @@ fn commit_all(writer: &Mutex<Connection>, changes: &watch::Sender<u64>, receiver
                 // A full disk can roll everything back in the middle: then nothing more must be begun, or it would be
                 // committed by itself.
                 if transaction.is_autocommit() {
-                    return Err(StoreError::Together("rolled back: database or disk is full".to_owned()));
+                    return Err(StoreError::GroupCommit("rolled back: database or disk is full".to_owned()));
                 }
             }
             Ok(transaction.commit()?)
@@ -61,7 +61,7 @@ fn commit_all(writer: &Mutex<Connection>, changes: &watch::Sender<u64>, receiver
             Err(error) => {
                 let all = done.into_iter().map(|(_, reply)| reply).chain(waiting.map(|one| one.reply));
                 for reply in all {
-                    let _ = reply.send(Err(StoreError::Together(error.to_string())));
+                    let _ = reply.send(Err(StoreError::GroupCommit(error.to_string())));
                 }
             }
         }
@@ -72,7 +72,7 @@ fn in_savepoint(transaction: &Transaction, work: SharedWork) -> Result<Made, Sto
     transaction.execute_batch("SAVEPOINT one")?;
     // A defect in one must not take the others, or this thread, along.
     let result = catch_unwind(AssertUnwindSafe(|| work(transaction)))
-        .unwrap_or_else(|_| Err(StoreError::Together("a transaction panicked".to_owned())));
+        .unwrap_or_else(|_| Err(StoreError::GroupCommit("a transaction panicked".to_owned())));
     let end = if result.is_ok() { "RELEASE one" } else { "ROLLBACK TO one; RELEASE one" };
     match transaction.execute_batch(end) {
         Err(error) if result.is_ok() => Err(error.into()),
@@ -82,9 +82,9 @@ fn in_savepoint(transaction: &Transaction, work: SharedWork) -> Result<Made, Sto
 
 impl Store {
     /// Runs work together with that of others; it is durable when this returns.
-    pub(super) fn write_together(&self, work: SharedWork) -> Result<Made, StoreError> {
+    pub(super) fn write_in_group(&self, work: SharedWork) -> Result<Made, StoreError> {
         let (reply, answer) = sync_channel(1);
-        let gone = || StoreError::Together("nobody commits any more".to_owned());
+        let gone = || StoreError::GroupCommit("nobody commits any more".to_owned());
         let sender = self.waiting.lock().unwrap_or_else(PoisonError::into_inner).clone();
         sender.send(Waiting { work, reply }).map_err(|_| gone())?;
         answer.recv().map_err(|_| gone())?
