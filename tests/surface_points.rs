@@ -8,9 +8,9 @@ mod support;
 use meniscus::geometry::{Vector, fibonacci};
 use meniscus::parallel::Interrupt;
 use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds};
-use meniscus::spec::Violation;
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, FieldValues, OutputPlan, Simulation, State};
+use meniscus::spec::Violation;
 use serde_json::{Value, json};
 use support::{pool, scene};
 

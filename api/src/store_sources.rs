@@ -5,7 +5,6 @@ use meniscus_jobs::service::store::{Store, StoreError};
 use meniscus_jobs::spec::body::{self, Allowance, JobBody, RestartSource, Sources};
 use meniscus_jobs::spec::calibration::Calibration;
 use meniscus_jobs::spec::uploads::Purpose;
-use serde::Deserialize;
 use serde_json::Value;
 use std::cell::RefCell;
 
@@ -55,12 +54,6 @@ impl<'a> StoreSources<'a> {
     }
 }
 
-/// What an examination found in a file with points.
-#[derive(Deserialize)]
-struct FoundPoints {
-    points: u64,
-}
-
 impl Sources for StoreSources<'_> {
     fn checkpoint(&self, id: &str) -> Option<RestartSource> {
         self.found(self.store.restart_source(id))
@@ -72,7 +65,7 @@ impl Sources for StoreSources<'_> {
 
     fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
         let row = self.found(self.store.upload(id)).filter(|row| row.state == "ready")?;
-        let found = FoundPoints::deserialize(&row.found).ok()?;
-        Some((row.purpose, found.points))
+        let points = row.found?.points()?;
+        Some((row.purpose, points))
     }
 }

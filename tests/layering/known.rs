@@ -9,18 +9,6 @@ pub const CIRCLES: &[&[&str]] = &[
     ],
     &["src/schemes/grid_based_particle/method.rs", "src/schemes/grid_based_particle/refinement.rs"],
     &["src/schemes/weakly_compressible_sph/stepping.rs", "src/schemes/weakly_compressible_sph/system.rs"],
-    &["jobs/src/service/store/studies.rs", "jobs/src/service/store/transitions.rs"],
-    &[
-        "jobs/src/spec/attempt_spec.rs",
-        "jobs/src/spec/body.rs",
-        "jobs/src/spec/calibration.rs",
-        "jobs/src/spec/forecast.rs",
-        "jobs/src/worker/attempt.rs",
-        "jobs/src/worker/inputs.rs",
-        "jobs/src/worker/local_run.rs",
-        "jobs/src/worker/observers.rs",
-        "jobs/src/worker/observers/progress.rs",
-    ],
     &["jobs/src/spec/body/restart.rs", "jobs/src/spec/body/sources.rs"],
 ];
 

@@ -387,10 +387,8 @@ fn normals_take_part_in_flows() {
     };
     let (with, without) = (off(json!({})), off(json!({"normal_weight": 0})));
     assert!(with < 0.5 * without, "{with:e} {without:e}");
-    let refused = parse(
-        &front(&json!({"law": "mean_curvature", "normal_weight": 0.1, "degree": 4, "neighbors": 3})),
-        SCENES,
-    );
+    let refused =
+        parse(&front(&json!({"law": "mean_curvature", "normal_weight": 0.1, "degree": 4, "neighbors": 3})), SCENES);
     let places: Vec<String> = refused.err().unwrap().into_iter().map(|violation| violation.pointer).collect();
     assert_eq!(places, ["/normal_weight", "/neighbors"]);
 }

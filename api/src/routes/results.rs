@@ -14,9 +14,7 @@ use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Response};
 use meniscus_jobs::formats::csv;
 use meniscus_jobs::service::store::{JobRow, Store};
-use meniscus_jobs::spec::attempt_files::attempt_directory;
-use meniscus_jobs::worker::attempt;
-use meniscus_jobs::worker::observers::series;
+use meniscus_jobs::spec::attempt_files::{self, attempt_directory};
 use serde::Deserialize;
 
 /// Which part of a log.

@@ -59,7 +59,7 @@ pub async fn submit(
         }
         let sources = StoreSources::new(store);
         let (allowance, slots) = (here.config.allowance(), here.config.slots);
-        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::of);
+        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::from_body);
         sources.check()?;
         let study = study?;
         if query.dry_run {
