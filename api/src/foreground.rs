@@ -89,7 +89,8 @@ fn resolve(spec: &Value, threads: Option<usize>) -> Result<ResolvedBody, RunErro
         memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4,
         local_files: true,
     };
-    let body = body::parse(spec, allowance, &NoSources).map_err(|violations| {
+    let body = body::parse(spec, allowance, &NoSources).map_err(|error| {
+        let violations = error.violations();
         let lines: Vec<String> = violations
             .iter()
             .map(|v| {

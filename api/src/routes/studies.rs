@@ -59,9 +59,7 @@ pub async fn submit(
         }
         let sources = StoreSources::new(store);
         let (allowance, slots) = (here.config.allowance(), here.config.slots);
-        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::from_body);
-        sources.check()?;
-        let study = study?;
+        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::from_body)?;
         if query.dry_run {
             let view = DryRunView { points: study.points, estimate: study.estimate };
             return Ok(Json(view).into_response());

@@ -34,7 +34,8 @@ pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<J
     fs::create_dir_all(directory).map_err(system)?;
     let memory_bytes = process::total_memory().unwrap_or(4 << 30) / 5 * 4;
     let allowance = Allowance { threads, memory_bytes, local_files: false };
-    let body = body::parse(body, allowance, &NoSources).map_err(|violations| {
+    let body = body::parse(body, allowance, &NoSources).map_err(|error| {
+        let violations = error.violations();
         violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
     })?;
     let spec = AttemptSpec {
