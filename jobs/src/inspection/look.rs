@@ -19,11 +19,11 @@ use std::path::Path;
 /// Bytes of a mesh file at most.
 const LARGEST_MESH: u64 = 1 << 30;
 
-/// Looks into a file and says on `out` what was found: a line of JSON, [`Inspection`], and
-/// behind it, of points, the points.
+/// Looks into a file and writes to `out` what was found: an
+/// [`Inspection`] as a line of JSON and, of points, the points behind it.
 ///
 /// # Errors
-/// When nothing can be said.
+/// When it cannot be written.
 pub fn run(purpose: Purpose, path: &Path, out: &mut dyn Write) -> io::Result<()> {
     let mut out = BufWriter::new(out);
     match inspect(purpose, path) {

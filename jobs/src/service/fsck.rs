@@ -97,9 +97,9 @@ fn of_job(store: &Store, job: &JobRow, findings: &mut Findings) -> Result<(), Fs
     if !store.events_are_whole(&job.id)? {
         wrong.push("its events are not numbered from 1 without gaps".to_owned());
     }
-    let told = store.last_told_state(&job.id)?;
-    if told != Some(job.state) {
-        wrong.push(format!("its last event says {:?}, its row {:?}", told.map(State::word), job.state.word()));
+    let last = store.state_of_last_event(&job.id)?;
+    if last != Some(job.state) {
+        wrong.push(format!("its last event says {:?}, its row {:?}", last.map(State::word), job.state.word()));
     }
     let directory = store.job_directory(&job.id);
     let listed = store.files(&job.id)?.into_iter().filter(|file| file.content.is_none());

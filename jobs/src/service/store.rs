@@ -46,13 +46,13 @@ use ulid::Ulid;
 
 /// Name of the file in the data directory.
 pub const FILE_NAME: &str = "meniscus.sqlite";
-/// Size of the log from which on it is trimmed.
+/// Size from which on the log is trimmed while there are no writers.
 const LONG_LOG_BYTES: u64 = 2 << 20;
-/// Size from which on it is trimmed though somebody writes.
+/// Size from which on the log is trimmed even while there are writers.
 const LONGEST_LOG_BYTES: u64 = 128 << 20;
-/// Pages of the log at which a commit trims it after all.
+/// Pages of the log at which a commit itself trims it.
 const LONGEST_LOG_PAGES: i64 = 65_536;
-/// Connections for reading.
+/// Number of connections for reading.
 const READERS: usize = 4;
 
 /// The store of a data directory.
@@ -63,7 +63,7 @@ pub struct Store {
     waiting: Mutex<Sender<group_commit::Waiting>>,
     readers: Vec<Mutex<Connection>>,
     next_reader: std::sync::atomic::AtomicUsize,
-    /// Trims the log.
+    /// Connection that trims the log.
     trimmer: Mutex<Connection>,
     ids: RisingIds,
     /// Counts changes; waiting clients watch it.
@@ -139,7 +139,7 @@ impl Store {
         &self.directory
     }
 
-    /// Tells of every committed change.
+    /// A counter that rises with every committed change.
     #[must_use]
     pub fn watch(&self) -> watch::Receiver<u64> {
         self.changes.subscribe()
@@ -173,7 +173,7 @@ impl Store {
         self.ids.next()
     }
 
-    /// What tells two versions of a job apart: its revision and the count of its progress.
+    /// Revision of a job and count of its progress: they differ between any two versions of it.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -185,8 +185,8 @@ impl Store {
             .optional()?)
     }
 
-    /// Brings what the log has into the store's file while nobody writes: commits beside it would be late. Only a very long
-    /// log is trimmed in any case.
+    /// Moves the log into the store's file while there are no writers, whose commits would wait. Only a very long log is
+    /// trimmed in any case.
     ///
     /// # Errors
     /// [`StoreError`].

@@ -1,5 +1,5 @@
-//! Points that a scene takes from files, as its worker reads them: uploads in the plain format that their check left
-//! behind, local files (of `meniscus run`, named by whoever runs it) as they are.
+//! Points that a scene takes from files, as its worker reads them: uploads in the plain format that their inspection
+//! wrote, local files of `meniscus run` as they are.
 
 use crate::formats::mesh;
 use crate::formats::{cloud_file, structure, vtkhdf};
@@ -8,7 +8,7 @@ use meniscus::scene::{Cloud, CloudReference, CloudSource, Clouds, Scene};
 use std::fs::File;
 use std::path::Path;
 
-/// All that a scene names.
+/// Reads all points that a scene names.
 ///
 /// # Errors
 /// A sentence with the pointer, the name and the cause.

@@ -18,16 +18,16 @@ pub struct ProgressPace {
     last: Option<Instant>,
 }
 
-/// What an import brought.
+/// Outcome of an import.
 #[derive(Debug)]
 pub struct Imported {
     /// Whether every whole record that the worker has written is taken.
     pub is_whole: bool,
-    /// The worker's last word.
+    /// The worker's verdict, if it came.
     pub verdict: Option<Verdict>,
-    /// Whether a checkpoint came.
+    /// Whether a checkpoint was among them.
     pub has_checkpoint: bool,
-    /// Whether anything came.
+    /// Whether there were new records.
     pub any: bool,
 }
 
@@ -163,7 +163,7 @@ impl Store {
     }
 }
 
-/// Whose records are taken.
+/// The attempt whose records are taken.
 struct Attempt<'a> {
     job: &'a str,
     study: Option<&'a str>,
@@ -171,7 +171,7 @@ struct Attempt<'a> {
 }
 
 impl Attempt<'_> {
-    fn tell(&self, transaction: &Transaction, kind: &str, data: &serde_json::Value) -> Result<(), StoreError> {
+    fn append_event(&self, transaction: &Transaction, kind: &str, data: &serde_json::Value) -> Result<(), StoreError> {
         Ok(events::append(transaction, self.job, self.study, self.epoch, kind, data)?)
     }
 }
@@ -234,7 +234,7 @@ impl Store {
                 if file.step.is_some() {
                     let data =
                         json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
-                    of.tell(transaction, "frame", &data)?;
+                    of.append_event(transaction, "frame", &data)?;
                 }
             }
             Record::Warning { code, message } => {
@@ -246,11 +246,11 @@ impl Store {
                     "UPDATE jobs SET warnings = ?2, progress_count = progress_count + 1 WHERE id = ?1",
                     params![job, serde_json::to_string(&warnings)?],
                 )?;
-                of.tell(transaction, "warning", &json!({"code": code, "message": message}))?;
+                of.append_event(transaction, "warning", &json!({"code": code, "message": message}))?;
             }
             Record::Finding { name, message, time } => {
                 let data = json!({"name": name, "message": message, "time": time});
-                of.tell(transaction, "finding", &data)?;
+                of.append_event(transaction, "finding", &data)?;
             }
             Record::Progress(_) | Record::Checkpoint(_) | Record::Verdict(_) => {}
         }
@@ -280,7 +280,7 @@ fn take_checkpoint(transaction: &Transaction, of: &Attempt, checkpoint: &Checkpo
         ])?;
     transaction.execute("UPDATE jobs SET checkpoint_since = 1 WHERE id = ?1", [job])?;
     let data = json!({"id": checkpoint.id, "step": checkpoint.step, "time": checkpoint.time, "size_bytes": checkpoint.size_bytes});
-    of.tell(transaction, "checkpoint", &data)
+    of.append_event(transaction, "checkpoint", &data)
 }
 
 /// The last progress as an event, if the coalescing held it back: the end of a run is never missing.
@@ -307,7 +307,7 @@ fn append_progress(transaction: &Transaction, of: &Attempt, progress: &Progress)
         "fraction": progress.fraction, "time": progress.time, "step": progress.step,
         "steps_per_s": progress.steps_per_s, "eta_s": progress.eta_s,
     });
-    of.tell(transaction, "progress", &data)
+    of.append_event(transaction, "progress", &data)
 }
 
 fn take_progress(

@@ -1,4 +1,4 @@
-//! Rows as values.
+//! Rows of the store as values.
 
 use super::StoreError;
 use crate::formats::frame_index;
@@ -13,21 +13,21 @@ use std::collections::BTreeMap;
 /// A job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobRow {
-    /// Id.
+    /// Id of the job.
     pub id: String,
     /// Counts changes of state.
     pub rev: i64,
-    /// State.
+    /// State of the job.
     pub state: State,
-    /// Why, if the state is not plain.
+    /// Reason of the state, if it has one.
     pub reason: Option<Reason>,
-    /// What to do about it.
+    /// What a user can do about it.
     pub hint: Option<String>,
-    /// Numbers and places of a failure.
+    /// Numbers and places of a failure, in a sentence.
     pub message: Option<String>,
-    /// Name.
+    /// Name, for people.
     pub name: Option<String>,
-    /// Labels.
+    /// Labels, for filters.
     pub labels: BTreeMap<String, String>,
     /// Kind of the scene.
     pub kind: String,
@@ -37,13 +37,13 @@ pub struct JobRow {
     pub resolved: Value,
     /// What the run was forecast to take.
     pub forecast: ForecastRecord,
-    /// Priority.
+    /// Priority: higher goes first.
     pub priority: i64,
-    /// Made.
+    /// Time at which it was made.
     pub created_at: String,
-    /// First started.
+    /// Time at which it first started.
     pub started_at: Option<String>,
-    /// Came to a terminal state.
+    /// Time at which it came to a terminal state.
     pub finished_at: Option<String>,
     /// Number of the latest attempt: the epoch.
     pub attempt: u64,
@@ -59,13 +59,13 @@ pub struct JobRow {
     pub verdict: Option<Verdict>,
     /// Why the service killed the worker, written before it did.
     pub kill_reason: Option<Reason>,
-    /// Progress.
+    /// Progress as last reported.
     pub progress: Progress,
     /// Counts changes of progress.
     pub progress_count: i64,
     /// Warnings.
     pub warnings: Vec<String>,
-    /// Cost of attempts that ended.
+    /// Cost so far, over all attempts.
     pub usage: Usage,
     /// Running time at the last resume.
     pub leg_wall_s: f64,
@@ -98,15 +98,15 @@ pub struct FileRow {
     pub path: String,
     /// Attempt that wrote it.
     pub attempt: u64,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
     /// Media type.
     pub media_type: String,
     /// Scene time.
     pub time: Option<f64>,
-    /// Step.
+    /// Step of the simulation.
     pub step: Option<u64>,
     /// The whole content, where no attempt has written it.
     pub content: Option<String>,
@@ -115,7 +115,7 @@ pub struct FileRow {
 /// A verified checkpoint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckpointRow {
-    /// Id.
+    /// Id of the checkpoint.
     pub id: String,
     /// Job that wrote it.
     pub job: String,
@@ -123,19 +123,19 @@ pub struct CheckpointRow {
     pub attempt: u64,
     /// Path below the attempt's directory.
     pub path: String,
-    /// Step.
+    /// Step of the simulation.
     pub step: u64,
     /// Scene time.
     pub time: f64,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
-    /// When.
+    /// Time at which it was imported.
     pub created_at: String,
-    /// Instruction set.
+    /// Instruction set that it was written on.
     pub isa: String,
-    /// Program.
+    /// Program that wrote it.
     pub build: String,
 }
 

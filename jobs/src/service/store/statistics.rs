@@ -1,4 +1,4 @@
-//! How many of what there are.
+//! Counts of jobs and uploads by state, and the size of the store.
 
 use super::{FILE_NAME, Store, StoreError};
 use crate::spec::states::State;
@@ -11,7 +11,7 @@ pub struct Statistics {
     pub by_state: BTreeMap<State, u64>,
     /// Seconds that the oldest job of the queue has waited.
     pub oldest_queued_s: f64,
-    /// Uploads that nobody has looked into yet.
+    /// Uploads that were not inspected yet.
     pub quarantined: u64,
     /// Size of the SQLite file and its log.
     pub store_bytes: u64,
@@ -26,7 +26,7 @@ impl Statistics {
 }
 
 impl Store {
-    /// Counts.
+    /// Counts jobs and uploads.
     ///
     /// # Errors
     /// [`StoreError`].

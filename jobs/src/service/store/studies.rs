@@ -1,4 +1,4 @@
-//! Studies: sweeps of jobs as one object. A study has no state of its own but what its jobs are in.
+//! Studies: sweeps of jobs as one object. Its state is that of its jobs.
 
 use super::idempotency::{IdempotencyKey, Made, Receipt};
 use super::submission::{NewJob, insert};
@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, HashSet};
 /// A study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyRow {
-    /// Id.
+    /// Id of the study.
     pub id: String,
     /// Name.
     pub name: Option<String>,
@@ -27,9 +27,9 @@ pub struct StudyRow {
     pub sweep: Value,
     /// Pointers that vary.
     pub axes: Vec<String>,
-    /// Points.
+    /// Number of points.
     pub points: u64,
-    /// Jobs at once.
+    /// Most jobs that run at once.
     pub max_parallel: Option<u64>,
     /// `continue` or `stop`.
     pub on_failure: String,
@@ -37,7 +37,7 @@ pub struct StudyRow {
     pub is_stopping: bool,
     /// Estimated total.
     pub estimate: Value,
-    /// Made.
+    /// Time at which it was made.
     pub created_at: String,
     /// Points by the state of their latest job.
     pub counts: BTreeMap<State, u64>,
@@ -56,13 +56,13 @@ pub struct NewStudy {
     pub sweep: Value,
     /// Pointers that vary.
     pub axes: Vec<String>,
-    /// Jobs at once.
+    /// Most jobs that run at once.
     pub max_parallel: Option<u64>,
     /// `continue` or `stop`.
     pub on_failure: &'static str,
     /// Estimated total.
     pub estimate: Value,
-    /// One a point.
+    /// Jobs, one for each point.
     pub jobs: Vec<NewJob>,
 }
 
@@ -80,13 +80,13 @@ pub struct PointRow {
     pub index: u64,
     /// Latest job.
     pub job: String,
-    /// Its state.
+    /// State of that job.
     pub state: State,
-    /// Why, if not plain.
+    /// Reason of that state, if it has one.
     pub reason: Option<String>,
     /// Its value at every axis: as it was sent, else the default that it got.
     pub values: Vec<Value>,
-    /// Its spacing.
+    /// Spacing of its scene.
     pub spacing: Option<f64>,
     /// CPU seconds and seconds by the clock.
     pub spent: [f64; 2],
@@ -172,7 +172,7 @@ impl Store {
         let made = self.make_once(key, |transaction| {
             transaction.execute("UPDATE studies SET stopping = 0 WHERE id = ?1", [study])?;
             for (id, job, start) in &prepared {
-                // Somebody else may have repeated it in the meantime.
+                // Another request may have repeated it in the meantime.
                 let is_latest: bool = transaction
                     .prepare_cached("SELECT EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND superseded = 0)")?
                     .query_row([&job.retry_of], |row| row.get(0))?;
@@ -259,7 +259,7 @@ impl Store {
             all.into_iter().filter(|(_, state)| from.contains(state.as_str())).map(|(id, _)| id).collect()
         };
         if trigger == Trigger::Pause {
-            // Those that rest for want of space must not go on by themselves any more.
+            // Jobs that were paused for lack of space must not resume by themselves any more.
             self.keep_paused_where("study", study)?;
         }
         for chunk in ids.chunks(CHUNK) {
@@ -277,7 +277,7 @@ impl Store {
         Ok(())
     }
 
-    /// Cancels what is left of studies that stop at their first failure.
+    /// Cancels the remaining jobs of studies that stop at their first failure.
     ///
     /// # Errors
     /// [`StoreError`].

@@ -83,7 +83,7 @@ fn records_are_taken_once_and_never_from_another_attempt() {
     store.change(&job.id, Trigger::Lose, &Change::default()).unwrap();
     store.change(&job.id, Trigger::Requeue, &Change::default()).unwrap();
     store.claim(|_, _| true).unwrap();
-    // The orphan of attempt 1 goes on writing; nobody believes it.
+    // The orphan of attempt 1 goes on writing; its records do not count.
     first.put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
     assert!(store.import(&job.id, 1, &mut pace).unwrap().verdict.is_none());
     // Attempt 2 goes on after one frame: the second is void until it is written again.
@@ -188,7 +188,7 @@ fn entries_that_the_database_does_not_list_are_named() {
 }
 
 #[test]
-fn a_verdict_survives_the_crash_between_import_and_settlement() {
+fn a_verdict_survives_the_crash_between_import_and_end_of_attempt() {
     let (directory, store) = store();
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
@@ -204,7 +204,7 @@ fn a_verdict_survives_the_crash_between_import_and_settlement() {
 fn requests_that_come_while_a_worker_ends_are_kept() {
     let (_directory, store) = store();
     let loss = LossCause { reason: Reason::WorkerCrash, is_death: true };
-    // A cancel before the settlement of a success.
+    // A cancellation before the end of a successful attempt.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     records(&store, &job, 1).put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
@@ -212,7 +212,7 @@ fn requests_that_come_while_a_worker_ends_are_kept() {
     store.change(&job.id, Trigger::Cancel, &Change::because(Reason::UserCancel)).unwrap();
     store.finish_attempt(&job.id, 1, loss).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Canceled);
-    // A pause whose worker had to be ended: it rests, and nobody died.
+    // A pause whose worker had to be killed: the job is paused, and no death counts.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     store.change(&job.id, Trigger::Pause, &Change::because(Reason::UserPause)).unwrap();

@@ -8,7 +8,7 @@ use serde_json::json;
 /// Why a change was not made.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
-    /// No such job.
+    /// There is no such job.
     #[error("there is no such job")]
     NotFound,
     /// The table has no such row.
@@ -31,11 +31,11 @@ impl From<rusqlite::Error> for ChangeError {
 /// A change to make.
 #[derive(Debug, Clone, Default)]
 pub struct Change {
-    /// Why.
+    /// Reason of the new state.
     pub reason: Option<Reason>,
-    /// Numbers and places of a failure.
+    /// Numbers and places of a failure, in a sentence.
     pub message: Option<String>,
-    /// Only if the job is at this attempt.
+    /// If given, the change is made only while the job is at this attempt.
     pub epoch: Option<u64>,
 }
 
@@ -144,7 +144,7 @@ impl Store {
         })
     }
 
-    /// A pause asked for by a person of a job that rests for another reason: it must not go on by itself.
+    /// Marks a paused job as paused on request: it must not resume by itself.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -152,7 +152,7 @@ impl Store {
         self.keep_paused_where("id", id)
     }
 
-    /// The same for every job with a value in a column.
+    /// Does so for every job with a value in a column.
     pub(super) fn keep_paused_where(&self, column: &str, value: &str) -> Result<(), StoreError> {
         self.write(|transaction| {
             let reason = Reason::UserPause;
@@ -182,7 +182,7 @@ impl Store {
 }
 
 pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, change: &Change) -> Result<(), ChangeError> {
-    let job = standing(transaction, id)?.ok_or(ChangeError::NotFound)?;
+    let job = current(transaction, id)?.ok_or(ChangeError::NotFound)?;
     if change.epoch.is_some_and(|epoch| epoch != job.attempt) {
         return Err(ChangeError::Stale);
     }
@@ -237,8 +237,8 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     Ok(())
 }
 
-/// What a transition needs to know of a job: a study changes ten thousand at once.
-struct Standing {
+/// The columns of a job that a transition reads: a study changes ten thousand jobs at once.
+struct Current {
     rev: i64,
     state: State,
     reason: Option<Reason>,
@@ -250,7 +250,7 @@ struct Standing {
     study: Option<String>,
 }
 
-fn standing(transaction: &Transaction, id: &str) -> Result<Option<Standing>, ChangeError> {
+fn current(transaction: &Transaction, id: &str) -> Result<Option<Current>, ChangeError> {
     let found = transaction
         .prepare_cached(
             "SELECT rev, state, reason, message, attempt, deaths, leg_wall_s, study,
@@ -258,7 +258,7 @@ fn standing(transaction: &Transaction, id: &str) -> Result<Option<Standing>, Cha
         )?
         .query_row([id], |row| {
             let (state, reason): (String, Option<String>) = (row.get("state")?, row.get("reason")?);
-            Ok(Standing {
+            Ok(Current {
                 rev: row.get("rev")?,
                 state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
                 reason: reason.as_deref().and_then(Reason::from_word),

@@ -1,4 +1,4 @@
-//! Uploads: files from outside, quarantined until a process of its own has looked into them.
+//! Uploads: files from outside, quarantined until a process of its own has inspected them.
 
 use super::idempotency::{IdempotencyKey, Made, Receipt};
 use super::{Store, StoreError, remove_directory, rows};
@@ -16,7 +16,7 @@ pub const CLOUD: &str = "cloud.bin";
 /// An upload.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UploadRow {
-    /// Id.
+    /// Id of the upload.
     pub id: String,
     /// What it is to be used as.
     pub purpose: Purpose,
@@ -28,13 +28,13 @@ pub struct UploadRow {
     pub found: Option<Contents>,
     /// Name that the client gave.
     pub name: Option<String>,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
-    /// Made.
+    /// Time at which it came in.
     pub created_at: String,
-    /// When the check ended.
+    /// Time at which the inspection ended.
     pub checked_at: Option<String>,
 }
 
@@ -47,9 +47,9 @@ pub struct NewUpload {
     pub purpose: Purpose,
     /// Name that the client gave.
     pub name: Option<String>,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
 }
 
@@ -71,7 +71,7 @@ impl Store {
         Ok((id, directory))
     }
 
-    /// Removes the directory of an upload that did not come to its end.
+    /// Removes the directory of an upload that was cut short.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -110,7 +110,7 @@ impl Store {
         made
     }
 
-    /// Enters what the check of an upload came to.
+    /// Enters the outcome of an inspection.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -198,7 +198,7 @@ impl Store {
     }
 
     /// What a restart from an uploaded checkpoint needs to know; None where it is not there, is no checkpoint, or has not
-    /// passed its check.
+    /// passed its inspection.
     ///
     /// # Errors
     /// [`StoreError`].
