@@ -22,7 +22,7 @@ pub struct FrameView {
 /// Reads what a picture shows of a frame; None where there is no picture, or the frame lacks a field that it needs.
 ///
 /// # Errors
-/// Whatever libhdf5 reports.
+/// Errors of libhdf5.
 pub fn read(path: &Path, view: View) -> hdf5::Result<Option<FrameView>> {
     let frame = Frame::open(path)?;
     match view {

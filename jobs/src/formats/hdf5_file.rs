@@ -6,7 +6,7 @@ use hdf5::{Dataset, Group, H5Type};
 /// Writes numbers as a data set with a Fletcher-32 checksum per chunk; `components` > 1 makes it two-dimensional.
 ///
 /// # Errors
-/// Whatever libhdf5 reports.
+/// Errors of libhdf5.
 pub fn write<T: H5Type>(group: &Group, name: &str, components: usize, values: &[T]) -> hdf5::Result<Dataset> {
     let rows = values.len() / components.max(1);
     let builder = group.new_dataset::<T>();

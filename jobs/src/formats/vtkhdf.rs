@@ -12,7 +12,7 @@ use std::path::Path;
 /// Writes the chosen fields of one moment; the file is closed when this returns.
 ///
 /// # Errors
-/// Whatever libhdf5 reports.
+/// Errors of libhdf5.
 pub fn write_frame(path: &Path, fields: &Fields, chosen: &[String], time: f64, step: u64) -> hdf5::Result<()> {
     let file = File::create(path)?;
     let root = file.create_group("VTKHDF")?;
@@ -59,7 +59,7 @@ impl Frame {
     /// Opens a frame.
     ///
     /// # Errors
-    /// Whatever libhdf5 reports.
+    /// Errors of libhdf5.
     pub fn open(path: &Path) -> hdf5::Result<Self> {
         Ok(Self { root: File::open(path)?.group("VTKHDF")? })
     }
@@ -67,7 +67,7 @@ impl Frame {
     /// Scene time.
     ///
     /// # Errors
-    /// Whatever libhdf5 reports.
+    /// Errors of libhdf5.
     pub fn time(&self) -> hdf5::Result<f64> {
         Ok(self.root.dataset("FieldData/Time")?.read_raw::<f64>()?.first().copied().unwrap_or(0.0))
     }
@@ -75,7 +75,7 @@ impl Frame {
     /// Positions.
     ///
     /// # Errors
-    /// Whatever libhdf5 reports.
+    /// Errors of libhdf5.
     pub fn points(&self) -> hdf5::Result<Vec<[f64; 3]>> {
         Ok(triples(&self.root.dataset("Points")?.read_raw()?))
     }
@@ -83,7 +83,7 @@ impl Frame {
     /// The numbers of a field; None where the frame does not have it.
     ///
     /// # Errors
-    /// Whatever libhdf5 reports.
+    /// Errors of libhdf5.
     pub fn scalars(&self, field: &str) -> hdf5::Result<Option<Vec<f64>>> {
         self.root.dataset(&format!("PointData/{field}")).ok().map(|data| data.read_raw()).transpose()
     }
@@ -91,7 +91,7 @@ impl Frame {
     /// The vectors of a field; None where the frame does not have it.
     ///
     /// # Errors
-    /// Whatever libhdf5 reports.
+    /// Errors of libhdf5.
     pub fn vectors(&self, field: &str) -> hdf5::Result<Option<Vec<[f64; 3]>>> {
         Ok(self.scalars(field)?.map(|numbers| triples(&numbers)))
     }
@@ -104,7 +104,7 @@ fn triples(numbers: &[f64]) -> Vec<[f64; 3]> {
 /// φ and a scalar field of a frame, where it has both.
 ///
 /// # Errors
-/// Whatever libhdf5 reports.
+/// Errors of libhdf5.
 pub fn read_profile(path: &Path, field: &str) -> hdf5::Result<Option<Vec<(f64, f64)>>> {
     let frame = Frame::open(path)?;
     let pair = frame.scalars("phi")?.zip(frame.scalars(field)?);
@@ -114,7 +114,7 @@ pub fn read_profile(path: &Path, field: &str) -> hdf5::Result<Option<Vec<(f64, f
 /// Reads points, and `phi` where there is one, from a frame or any file that is laid out like one.
 ///
 /// # Errors
-/// Whatever libhdf5 reports, and points that are no triples.
+/// Errors of libhdf5, and points that are no triples.
 pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
     let root = File::open(path)?.group("VTKHDF")?;
     let numbers: Vec<f64> = root.dataset("Points")?.read_raw()?;
@@ -132,7 +132,7 @@ pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
 /// Reads `normal` of the points, if they have it, from a frame or any file that is laid out like one.
 ///
 /// # Errors
-/// Whatever libhdf5 reports, and normals that are no triples.
+/// Errors of libhdf5, and normals that are no triples.
 pub fn read_normals(path: &Path) -> Result<Option<Vec<[f64; 3]>>, CloudError> {
     let Ok(normal) = File::open(path)?.dataset("VTKHDF/PointData/normal") else { return Ok(None) };
     let numbers: Vec<f64> = normal.read_raw()?;

@@ -1,4 +1,4 @@
-//! The service's side of a check: starts the process that looks, holds it to its time, takes what it says.
+//! The service's side of an inspection: starts the process, limits its time, and takes its result.
 
 use crate::formats::cloud_file;
 use crate::service::store::uploads::{CLOUD, CONTENT};
@@ -14,12 +14,12 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// Time that a check may take.
-const PATIENCE: Duration = Duration::from_secs(90);
-/// Bytes of the line that says what was found, at most.
+/// Time that an inspection may take.
+const TIME_LIMIT: Duration = Duration::from_secs(90);
+/// Longest line with the result, in bytes.
 const LONGEST_LINE: u64 = 4 << 20;
 
-/// Wakes the inspector; dropping all of them ends it.
+/// Wakes the inspector. It ends when all handles are dropped.
 #[derive(Debug, Clone)]
 pub struct InspectorHandle {
     sender: Sender<()>,
@@ -33,7 +33,7 @@ impl InspectorHandle {
     }
 }
 
-/// Looks into one upload after another, on a thread of its own.
+/// Inspects one upload after another, on a thread of its own.
 ///
 /// # Errors
 /// When the thread cannot be started.
@@ -48,7 +48,7 @@ fn inspect_all(store: &Store, program: &Path, receiver: &Receiver<()>) {
         match store.quarantined_uploads() {
             Ok(waiting) => {
                 for upload in waiting {
-                    look_into(store, program, &upload);
+                    inspect(store, program, &upload);
                 }
             }
             Err(error) => tracing::error!(%error, "uploads could not be listed"),
@@ -60,7 +60,7 @@ fn inspect_all(store: &Store, program: &Path, receiver: &Receiver<()>) {
     }
 }
 
-fn look_into(store: &Store, program: &Path, upload: &UploadRow) {
+fn inspect(store: &Store, program: &Path, upload: &UploadRow) {
     let directory = store.upload_directory(&upload.id);
     let finished = check(program, upload, &directory).map_err(|error| error.to_string()).and_then(|verdict| {
         let outcome = verdict.as_ref().map_or_else(String::as_str, |_| "ready");
@@ -68,18 +68,18 @@ fn look_into(store: &Store, program: &Path, upload: &UploadRow) {
         store.finish_upload(&upload.id, &verdict).map_err(|error| error.to_string())
     });
     if let Err(error) = finished {
-        // It stays in quarantine and is looked into again.
+        // It stays in quarantine and is inspected again.
         tracing::error!(upload = upload.id, error, "an upload could not be checked");
     }
 }
 
-/// What a process of its own finds in an upload.
+/// Inspects an upload in a process of its own.
 fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Result<Contents, String>> {
     let mut child = Command::new(program)
         .arg0("meniscus")
         .args(["inspect", "--as", upload.purpose.word()])
         .arg(directory.join(CONTENT))
-        // Nothing of our surroundings reaches libhdf5: no plug-in path, no driver of another name.
+        // No variable of this process reaches libhdf5: no plug-in path, no driver of another name.
         .env_clear()
         .env("HDF5_PLUGIN_PRELOAD", "::")
         .stdin(Stdio::null())
@@ -93,7 +93,7 @@ fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Res
         // The other side may have given up waiting.
         let _ = sender.send(take(output, &target));
     })?;
-    let taken = receiver.recv_timeout(PATIENCE);
+    let taken = receiver.recv_timeout(TIME_LIMIT);
     let is_late = taken.is_err();
     if is_late {
         child.kill()?;
@@ -103,7 +103,7 @@ fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Res
         let _ = reading.join();
     }
     if is_late {
-        return Ok(Err(format!("looking into it took longer than {} s", PATIENCE.as_secs())));
+        return Ok(Err(format!("looking into it took longer than {} s", TIME_LIMIT.as_secs())));
     }
     if let Some(signal) = status.signal() {
         return Ok(Err(format!("looking into it took more memory or time than is granted (signal {signal})")));
@@ -131,7 +131,7 @@ fn take(output: impl Read, target: &Path) -> io::Result<Result<Contents, String>
             .and_then(|()| artifacts::finish(target));
         if let Err(error) = written {
             let _ = std::fs::remove_file(artifacts::unfinished(target));
-            // Waiting for room would keep the upload itself from being deleted.
+            // An upload that waits for space could not be deleted.
             if crate::system::process::is_out_of_space(&error) {
                 return Ok(Err("there was no room on the disk for its points; delete it and send it again".to_owned()));
             }

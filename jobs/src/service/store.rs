@@ -88,7 +88,7 @@ pub enum StoreError {
     /// A transaction that was shared with others failed.
     #[error("the store failed: {0}")]
     GroupCommit(String),
-    /// A row does not say what it should.
+    /// A stored value cannot be read.
     #[error("a stored value is unreadable: {0}")]
     Json(#[from] serde_json::Error),
     /// The file was written by a later version of the program.

@@ -44,7 +44,7 @@ pub struct TimeForecast {
     pub wall_s: f64,
     /// CPU seconds of phases that come at some moments, not with every step.
     pub moments: BTreeMap<String, f64>,
-    /// What it rests on.
+    /// Measurements on which it rests.
     pub basis: String,
 }
 

@@ -85,7 +85,7 @@ pub struct ForecastRecord {
     pub cpu_s: Option<f64>,
     /// Running time in seconds.
     pub wall_s: Option<f64>,
-    /// What it rests on.
+    /// Measurements on which it rests.
     pub basis: String,
     /// Time, as a worker needs it.
     pub time: Option<TimeForecast>,

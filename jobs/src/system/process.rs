@@ -1,4 +1,4 @@
-//! What the system says of processes: CPU time, memory, free space.
+//! Facts of the operating system: CPU time, memory, free space.
 
 use rustix::process::{getpriority_process, setpriority_process};
 use rustix::time::{ClockId, clock_gettime};

@@ -287,7 +287,7 @@ fn take_checkpoint(transaction: &Transaction, of: &Attempt, checkpoint: &Checkpo
 fn flush_progress(transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
     let job = of.job;
     let Some(row) = rows::job(transaction, job)? else { return Ok(()) };
-    let told: Option<u64> = transaction
+    let last_step: Option<u64> = transaction
         .query_row(
             "SELECT json_extract(data, '$.step') FROM events WHERE job = ?1 AND type = 'progress' ORDER BY id DESC LIMIT 1",
             [job],
@@ -296,7 +296,7 @@ fn flush_progress(transaction: &Transaction, of: &Attempt) -> Result<(), StoreEr
         .optional()?
         .flatten()
         .map(|step| step as u64);
-    if row.progress_count > 0 && told != Some(row.progress.step) {
+    if row.progress_count > 0 && last_step != Some(row.progress.step) {
         append_progress(transaction, of, &row.progress)?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Numbered changes of the schema; `user_version` says how many have been made.
+//! Numbered changes of the schema; `user_version` counts those that have been made.
 
 use super::StoreError;
 use rusqlite::Connection;

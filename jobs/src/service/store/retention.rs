@@ -1,11 +1,11 @@
-//! What is kept for how long.
+//! How long jobs, studies and receipts are kept.
 
 use super::{Store, StoreError, idempotency};
 use rusqlite::params;
 
 impl Store {
     /// Deletes jobs that came to their end more than so many days ago, with their files, and studies of which nothing is
-    /// left, twenty at a time. Receipts for repeated requests go after a week. Says how many jobs went.
+    /// left, twenty at a time. Receipts for repeated requests go after a week. Returns how many jobs were deleted.
     ///
     /// # Errors
     /// [`StoreError`].

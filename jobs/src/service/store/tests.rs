@@ -219,7 +219,7 @@ fn requests_that_come_while_a_worker_ends_are_kept() {
     store.finish_attempt(&job.id, 1, loss).unwrap();
     let row = store.job(&job.id).unwrap().unwrap();
     assert_eq!((row.state, row.reason, row.deaths), (State::Paused, Some(Reason::UserPause), 0));
-    // A drain whose service was killed before it heard the verdict.
+    // A drain whose service was killed before it imported the verdict.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     store.change(&job.id, Trigger::Pause, &Change::because(Reason::ServerRestart)).unwrap();

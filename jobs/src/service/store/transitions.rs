@@ -224,8 +224,8 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     if changed != 1 {
         return Err(ChangeError::Stale);
     }
-    let told = reason.map_or("", Reason::word);
-    metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => told).increment(1);
+    let reason_word = reason.map_or("", Reason::word);
+    metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => reason_word).increment(1);
     let attempt = job.attempt + u64::from(is_claim);
     let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
     events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
