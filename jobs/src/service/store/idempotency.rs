@@ -98,3 +98,40 @@ impl Store {
         recall(&self.read(), key)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{IdempotencyKey, Made, Receipt};
+    use crate::service::store::{Store, StoreError};
+    use std::cell::Cell;
+
+    fn key(fingerprint: &str) -> IdempotencyKey {
+        IdempotencyKey { owner: "owner".to_owned(), key: "key".to_owned(), fingerprint: fingerprint.to_owned() }
+    }
+
+    #[test]
+    fn work_is_done_once_under_a_key_and_its_receipt_comes_back_byte_by_byte() {
+        let directory = tempfile::tempdir().unwrap();
+        let store = Store::open(directory.path()).unwrap();
+        let (count, receipt) = (Cell::new(0), Receipt(vec![0, 255, b'{']));
+        let work = || {
+            count.set(count.get() + 1);
+            Ok::<_, StoreError>(receipt.clone())
+        };
+        let first = store.make_once(Some(&key("a")), |_| work()).unwrap();
+        assert!(matches!(first, Made::New(found) if found == receipt));
+        let second = store.make_once(Some(&key("a")), |_| work()).unwrap();
+        assert!(matches!(second, Made::Replayed(found) if found == receipt));
+        assert!(matches!(store.make_once(Some(&key("b")), |_| work()).unwrap(), Made::KeyOfAnother));
+        assert!(matches!(store.make_once(None, |_| work()).unwrap(), Made::New(_)));
+        assert_eq!(count.get(), 2);
+    }
+
+    #[test]
+    fn failed_work_leaves_no_receipt() {
+        let directory = tempfile::tempdir().unwrap();
+        let store = Store::open(directory.path()).unwrap();
+        assert!(store.make_once(Some(&key("a")), |_| Err(StoreError::UploadGone)).is_err());
+        assert!(store.recall(&key("a")).unwrap().is_none());
+    }
+}

@@ -192,3 +192,35 @@ pub fn apply(connection: &mut Connection) -> Result<(), StoreError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{MIGRATIONS, apply};
+    use rusqlite::Connection;
+
+    #[test]
+    fn a_store_of_the_build_before_keeps_its_answers_and_its_workers() {
+        let mut connection = Connection::open_in_memory().unwrap();
+        for change in &MIGRATIONS[..2] {
+            connection.execute_batch(change).unwrap();
+        }
+        connection
+            .execute_batch(
+                "PRAGMA user_version = 2;
+                 INSERT INTO answers VALUES ('owner', 'key', 'digest', 201, '/v1/jobs/job_1', '{\"id\":\"job_1\"}', 'now');
+                 INSERT INTO jobs (id, rev, state, labels, kind, spec, resolved, estimate, priority, created_at, worker_pid,
+                     condemned)
+                 VALUES ('job_1', 1, 'running', '{}', 'vortex', '{}', '{}', '{}', 0, 'now', 4711, 'limit.memory');",
+            )
+            .unwrap();
+        apply(&mut connection).unwrap();
+        let receipt: Vec<u8> =
+            connection.query_row("SELECT receipt FROM receipts WHERE key = 'key'", [], |row| row.get(0)).unwrap();
+        let expected = r#"{"status":201,"location":"/v1/jobs/job_1","body":"{\"id\":\"job_1\"}"}"#;
+        assert_eq!(String::from_utf8(receipt).unwrap(), expected);
+        let worker: (String, String) = connection
+            .query_row("SELECT worker_handle, kill_reason FROM jobs", [], |row| Ok((row.get(0)?, row.get(1)?)))
+            .unwrap();
+        assert_eq!(worker, ("4711".to_owned(), "limit.memory".to_owned()));
+    }
+}
