@@ -42,8 +42,9 @@ pub struct TimeForecast {
     pub cpu_s: f64,
     /// Seconds by the clock.
     pub wall_s: f64,
-    /// CPU seconds of phases that come at some moments, not with every step.
-    pub moments: BTreeMap<String, f64>,
+    /// CPU seconds of phases that come at milestones, not with every step.
+    #[serde(alias = "moments")]
+    pub milestones: BTreeMap<String, f64>,
     /// Measurements on which it rests.
     pub basis: String,
 }
@@ -97,7 +98,7 @@ impl Calibration {
             let seconds = phase.units * self.seconds_per_unit(family, phase.phase)?;
             forecast.cpu_s += seconds;
             if phase.course == Course::Moments {
-                *forecast.moments.entry(phase.phase.to_owned()).or_insert(0.0) += seconds;
+                *forecast.milestones.entry(phase.phase.to_owned()).or_insert(0.0) += seconds;
             }
         }
         let clock = self.seconds_per_unit(family, &wall_phase(threads)).unwrap_or(1.0 / threads as f64);
