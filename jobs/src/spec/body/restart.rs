@@ -9,7 +9,7 @@ meniscus::group! {
     pub struct RestartSpec {
         /// id of a checkpoint
         checkpoint: Option<String>;
-        /// id of an upload made with ?as=checkpoint that is ready
+        /// id of an upload that was made as a checkpoint and is ready
         upload: Option<String>;
         /// new values of fields that a restart may change, by JSON pointers into the scene
         overrides: Option<Overrides>;
@@ -97,7 +97,7 @@ fn source<S: Sources>(spec: &RestartSpec, sources: &S) -> Result<Result<RestartS
         }),
         (None, Some(id)) => sources.uploaded_checkpoint(id)?.ok_or_else(|| {
             let detail = "there is no such upload, or it is no checkpoint that passed its check";
-            let allowed = "the id of an upload made with ?as=checkpoint that is ready, upl_…";
+            let allowed = "the id of an upload that was made as a checkpoint and is ready, upl_…";
             Violation::new("/restart/upload", "not_found", detail, id.as_str(), allowed)
         }),
         (None, None) => {

@@ -120,7 +120,7 @@ pub(super) fn size_of<S: Sources>(
     Ok(match &cloud.source {
         CloudSource::File(_) if local_files => Ok(None),
         CloudSource::File(file) => {
-            let detail = "a local file is valid for `meniscus run` alone; POST /v1/uploads takes files";
+            let detail = "a local file is valid for `meniscus run` alone; upload it and name the upload";
             Err(Violation::new(cloud.pointer, "not_here", detail, file.as_str(), json!({"upload": "upl_…"})))
         }
         CloudSource::Upload(upload) => {
@@ -131,9 +131,8 @@ pub(super) fn size_of<S: Sources>(
                 _ => &[Purpose::Points],
             };
             let found = sources.uploaded_points(upload)?.filter(|(purpose, _)| wanted.contains(purpose));
-            let names: Vec<String> = wanted.iter().map(|purpose| format!("?as={}", purpose.word())).collect();
-            let detail =
-                format!("there is no upload of this id that is ready and was made with {}", names.join(" or "));
+            let names: Vec<&str> = wanted.iter().map(|purpose| purpose.word()).collect();
+            let detail = format!("there is no upload of this id that is ready and was made as {}", names.join(" or "));
             let missing = || Violation::new(cloud.pointer, "not_found", detail, upload.as_str(), Value::Null);
             found.map(|(_, points)| Some(points)).ok_or_else(missing)
         }
