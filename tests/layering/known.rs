@@ -55,11 +55,6 @@ pub const LONG_FUNCTIONS: &[(&str, &str, usize, &str)] = &[
         89,
         "named sections replace it (issue 18, item 5)",
     ),
-    ("jobs/src/service/store/import.rs", "take", 64, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/spec/body/restart.rs", "parse", 83, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/spec/body.rs", "parse", 134, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/spec/study.rs", "parse", 86, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/worker/attempt.rs", "attempt", 61, "not cut yet (issue 18)"),
 ];
 
 /// Files over 500 lines, each with the reason why it is one concept.

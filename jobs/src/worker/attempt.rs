@@ -123,22 +123,7 @@ fn attempt(
     // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
     let mut progress = ProgressMeter::new(spec.usage, spec.time.clone());
     pool.install(|| {
-        let clouds = inputs::read(scene.as_ref(), spec).map_err(|cause| Failure::Known(Reason::InputDamaged, cause))?;
-        let context = BuildContext {
-            clouds,
-            plan: options.plan(),
-            interrupt: control.interrupt().clone(),
-            cpu_clock: CpuClock(process::cpu_seconds),
-        };
-        let built = scene.build(context);
-        // What was dropped on the way says nothing of the input.
-        if control.interrupt().is_raised() {
-            return Err(Failure::Canceled);
-        }
-        let mut simulation = built.map_err(|found| {
-            let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
-            Failure::Known(Reason::InputDamaged, cause)
-        })?;
+        let mut simulation = build(spec, scene.as_ref(), &options, control)?;
         let start = restore(spec, simulation.as_mut(), sink, log)?;
         progress.continue_phases(start.counters.phases.clone());
         let mut observers = prepare(spec, directory, &options, control, sink, &start, progress)?;
@@ -164,6 +149,31 @@ fn attempt(
                 Ok(Verdict::Succeeded)
             }
         }
+    })
+}
+
+/// The simulation at the start of its scene, with the points that it takes from files.
+fn build(
+    spec: &AttemptSpec,
+    scene: &dyn Scene,
+    options: &RunOptions,
+    control: &Control,
+) -> Result<Box<dyn Simulation>, Failure> {
+    let clouds = inputs::read(scene, spec).map_err(|cause| Failure::Known(Reason::InputDamaged, cause))?;
+    let context = BuildContext {
+        clouds,
+        plan: options.plan(),
+        interrupt: control.interrupt().clone(),
+        cpu_clock: CpuClock(process::cpu_seconds),
+    };
+    let built = scene.build(context);
+    // A build that was dropped on request says nothing about the input.
+    if control.interrupt().is_raised() {
+        return Err(Failure::Canceled);
+    }
+    built.map_err(|found| {
+        let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
+        Failure::Known(Reason::InputDamaged, cause)
     })
 }
 

@@ -4,7 +4,8 @@
 use super::{Store, StoreError, calibration, events, rows};
 use crate::spec::attempt_files::{self, attempt_directory};
 use crate::spec::forecast::measured;
-use crate::spec::records::{self, CheckpointRecord, Line, Progress, Record, Usage, Verdict};
+use crate::spec::records::{self, CheckpointRecord, FileRecord, Line, Progress, Record, Usage, Verdict};
+use crate::spec::run_options::RunOptions;
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 use std::time::{Duration, Instant};
@@ -186,7 +187,7 @@ impl Store {
         if let Some(row) =
             rows::job(transaction, of.job)?.filter(|row| row.attempt == 1 && row.restarted_from.is_none())
         {
-            let threads = row.resolved["limits"]["threads"].as_u64().unwrap_or(1);
+            let threads = RunOptions::from_resolved(&row.resolved)?.limits.threads;
             calibration::add(transaction, &measured(&row.forecast, &report["cost"], threads))?;
         }
         transaction.execute("UPDATE jobs SET results = ?2 WHERE id = ?1", params![of.job, results.to_string()])?;
@@ -194,47 +195,13 @@ impl Store {
     }
 
     fn take(&self, transaction: &Transaction, of: &Attempt, record: &Record) -> Result<(), StoreError> {
-        let Attempt { job, epoch, .. } = *of;
+        let job = of.job;
         match record {
-            Record::Started { frames, step, .. } => {
-                // Frames after the checkpoint are written again; until then they are not part of the job.
-                let paths: Vec<String> = {
-                    let mut statement = transaction.prepare_cached(
-                        "SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path",
-                    )?;
-                    let rows = statement.query_map([job], |row| row.get(0))?;
-                    rows.collect::<Result<_, _>>()?
-                };
-                for path in paths.iter().skip(*frames as usize) {
-                    transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
-                }
-                // Checkpoints of steps that are to come again were refused by the worker.
-                transaction
-                    .execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, *step as i64])?;
-            }
+            Record::Started { frames, step, .. } => take_start(transaction, job, *frames, *step)?,
             Record::File(file) => {
-                transaction
-                    .prepare_cached(
-                        "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
-                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-                    )?
-                    .execute(params![
-                        job,
-                        file.path,
-                        epoch as i64,
-                        file.size_bytes as i64,
-                        file.sha256,
-                        file.media_type,
-                        file.time,
-                        file.step.map(|step| step as i64),
-                    ])?;
+                take_file(transaction, of, file)?;
                 if file.path == attempt_files::REPORT {
                     self.keep_results(transaction, of)?;
-                }
-                if file.step.is_some() {
-                    let data =
-                        json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
-                    of.append_event(transaction, "frame", &data)?;
                 }
             }
             Record::Warning { code, message } => {
@@ -256,6 +223,45 @@ impl Store {
         }
         Ok(())
     }
+}
+
+/// Takes the start of an attempt from a checkpoint: what was published after the checkpoint is void until it comes again.
+fn take_start(transaction: &Transaction, job: &str, frames: u64, step: u64) -> Result<(), StoreError> {
+    let paths: Vec<String> = {
+        let mut statement = transaction
+            .prepare_cached("SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path")?;
+        let rows = statement.query_map([job], |row| row.get(0))?;
+        rows.collect::<Result<_, _>>()?
+    };
+    for path in paths.iter().skip(frames as usize) {
+        transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
+    }
+    // The worker refused the checkpoints of steps that are to come again.
+    transaction.execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, step as i64])?;
+    Ok(())
+}
+
+fn take_file(transaction: &Transaction, of: &Attempt, file: &FileRecord) -> Result<(), StoreError> {
+    transaction
+        .prepare_cached(
+            "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        )?
+        .execute(params![
+            of.job,
+            file.path,
+            of.epoch as i64,
+            file.size_bytes as i64,
+            file.sha256,
+            file.media_type,
+            file.time,
+            file.step.map(|step| step as i64),
+        ])?;
+    if file.step.is_some() {
+        let data = json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
+        of.append_event(transaction, "frame", &data)?;
+    }
+    Ok(())
 }
 
 fn take_checkpoint(transaction: &Transaction, of: &Attempt, checkpoint: &CheckpointRecord) -> Result<(), StoreError> {
