@@ -46,7 +46,7 @@ pub struct Allowance {
     pub threads: u64,
     /// Memory a job may ask for, in bytes; also the default.
     pub memory_bytes: u64,
-    /// Whether scenes may name files of this machine: a person who runs them in the foreground may read those anyway.
+    /// Whether scenes may name files of this machine, as in the foreground, where the user may read those anyway.
     pub local_files: bool,
 }
 
