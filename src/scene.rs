@@ -4,9 +4,11 @@
 //! spec to a [`Scene`], which returns everything that is wrong.
 
 pub mod cloud;
+pub mod view;
 pub mod work;
 
 pub use cloud::{Cloud, CloudReference, CloudSizes, CloudSource, Clouds};
+pub use view::View;
 pub use work::PhaseWork;
 
 use crate::parallel::Interrupt;
@@ -121,6 +123,9 @@ pub trait Scene: Send + Sync {
 
     /// Fields that frames can show.
     fn field_names(&self) -> Vec<&'static str>;
+
+    /// What pictures of its frames show.
+    fn view(&self) -> View;
 
     /// Points from outside that the scene needs to be built.
     fn clouds(&self) -> Vec<CloudReference> {

@@ -10,7 +10,6 @@ use clap::{Parser, Subcommand};
 use meniscus_jobs::inspection::{look, sandbox};
 use meniscus_jobs::service::backup;
 use meniscus_jobs::service::fsck;
-use meniscus_jobs::spec::calibration;
 use meniscus_jobs::spec::uploads::Purpose;
 use meniscus_jobs::system::digest;
 use meniscus_jobs::system::process;
@@ -224,7 +223,7 @@ fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
     if let Err(error) = worker::process::end_with_input() {
         return fail(&error);
     }
-    let found = match calibration::measure_here(scratch, threads) {
+    let found = match worker::calibration::measure_here(scratch, threads) {
         Ok(found) => found,
         Err(error) => return fail(&error),
     };

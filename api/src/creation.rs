@@ -7,7 +7,7 @@ use crate::state::AppState;
 use crate::{idempotency, request_body};
 use axum::extract::Request;
 use axum::response::Response;
-use meniscus_jobs::service::store::{Made, Once, Store};
+use meniscus_jobs::service::store::{IdempotencyKey, Made, Store};
 use meniscus_jobs::system::process;
 use serde_json::Value;
 
@@ -16,7 +16,7 @@ use serde_json::Value;
 pub struct Creation {
     body: Vec<u8>,
     /// The request under the client's key, if it gave one.
-    pub keyed: Option<Once>,
+    pub keyed: Option<IdempotencyKey>,
     /// What was created under the key before.
     pub known: Option<Made>,
     budget: Option<Budget>,
@@ -87,7 +87,7 @@ pub fn check_capacity(state: &AppState, store: &Store, jobs: u64, disk_bytes: u6
         return Err(ApiError::NoSpace { needed: disk_bytes, free });
     }
     if let Some(most) = state.config.most_unfinished {
-        let unfinished = store.census()?.unfinished();
+        let unfinished = store.statistics()?.unfinished();
         if unfinished + jobs > most {
             return Err(ApiError::QuotaReached { unfinished, most });
         }

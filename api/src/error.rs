@@ -19,6 +19,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use meniscus::spec::Violation;
 use meniscus_jobs::service::store::{ChangeError, StoreError};
+use meniscus_jobs::spec::body::BodyError;
 use meniscus_jobs::system::process;
 use serde::Serialize;
 use serde_json::Value;
@@ -232,6 +233,15 @@ impl IntoResponse for ApiError {
         (status, headers, Json(body)).into_response()
     }
 }
+impl From<BodyError<StoreError>> for ApiError {
+    fn from(error: BodyError<StoreError>) -> Self {
+        match error {
+            BodyError::Invalid(violations) => violations.into(),
+            BodyError::Lookup(error) => error.into(),
+        }
+    }
+}
+
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         match error {

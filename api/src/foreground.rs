@@ -5,7 +5,7 @@ mod case;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus_jobs::formats::checkpoint;
-use meniscus_jobs::spec::attempt_spec::{Order, StartCheckpoint};
+use meniscus_jobs::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
 use meniscus_jobs::spec::body::{self, Allowance, NoSources, ResolvedBody};
 use meniscus_jobs::spec::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
 use meniscus_jobs::spec::strict_json;
@@ -89,7 +89,8 @@ fn resolve(spec: &Value, threads: Option<usize>) -> Result<ResolvedBody, RunErro
         memory_bytes: process::total_memory().unwrap_or(4 << 30) / 5 * 4,
         local_files: true,
     };
-    let body = body::parse(spec, allowance, &NoSources).map_err(|violations| {
+    let body = body::parse(spec, allowance, &NoSources).map_err(|error| {
+        let violations = error.violations();
         let lines: Vec<String> = violations
             .iter()
             .map(|v| {
@@ -110,7 +111,7 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
         return Err(RunError::NotEmpty(out.display().to_string()));
     }
     let out = std::fs::canonicalize(out)?;
-    let order = Order {
+    let order = AttemptSpec {
         job: "foreground".to_owned(),
         epoch: 1,
         body: resolved.to_json(),

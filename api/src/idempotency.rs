@@ -7,9 +7,9 @@ use crate::error::ApiError;
 use crate::rate_limit::Budget;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use meniscus_jobs::service::store::{KeptAnswer, Made, Once};
+use meniscus_jobs::service::store::{IdempotencyKey, Made, Receipt};
 use meniscus_jobs::system::digest;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 /// Name of the header.
@@ -32,31 +32,42 @@ pub fn key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
 
 /// The request under a key: the same one has the same method, target and body.
 #[must_use]
-pub fn keyed_request(client: Client, key: String, request: &[&[u8]]) -> Once {
-    Once { owner: client.0, key, request_sha256: digest::of_bytes(&request.join(&b'\n')) }
+pub fn keyed_request(client: Client, key: String, request: &[&[u8]]) -> IdempotencyKey {
+    IdempotencyKey { owner: client.0, key, fingerprint: digest::of_bytes(&request.join(&b'\n')) }
 }
 
-/// An answer for the store to keep.
+/// An answer as its receipt has it. Receipts are kept for days: the names stay what they are.
+#[derive(Serialize, Deserialize)]
+struct StoredResponse {
+    status: u16,
+    location: Option<String>,
+    body: String,
+}
+
+/// An answer for the store to keep, in a form that only [`response`] reads.
 #[must_use]
-pub fn stored_response(status: StatusCode, location: Option<String>, body: &impl Serialize) -> KeptAnswer {
+pub fn stored_response(status: StatusCode, location: Option<String>, body: &impl Serialize) -> Receipt {
     // Views are plain data; they always become JSON.
     let body = serde_json::to_string(body).unwrap_or_default();
-    KeptAnswer { status: status.as_u16(), location, body }
+    let stored = StoredResponse { status: status.as_u16(), location, body };
+    Receipt(serde_json::to_vec(&stored).unwrap_or_default())
 }
 
 /// The answer to a request that was carried out, now or before.
 ///
 /// # Errors
-/// [`ApiError::Invalid`] if the key belongs to another request.
+/// [`ApiError::Invalid`] if the key belongs to another request; [`ApiError::Internal`] if the receipt cannot be read.
 pub fn response(made: Made, budget: Option<Budget>) -> Result<Response, ApiError> {
-    let (stored, is_replay) = match made {
-        Made::New(stored) => (stored, false),
-        Made::Replayed(stored) => (stored, true),
+    let (receipt, is_replay) = match made {
+        Made::New(receipt) => (receipt, false),
+        Made::Replayed(receipt) => (receipt, true),
         Made::KeyOfAnother => {
             let detail = "the Idempotency-Key was already used for another request; use a new key";
             return Err(ApiError::invalid(HEADER, "conflict", detail, &Value::Null, Value::Null));
         }
     };
+    let stored: StoredResponse =
+        serde_json::from_slice(&receipt.0).map_err(|error| ApiError::Internal(format!("a kept answer: {error}")))?;
     let status = StatusCode::from_u16(stored.status).unwrap_or(StatusCode::OK);
     let mut response = (status, [(header::CONTENT_TYPE, "application/json")], stored.body).into_response();
     let headers = response.headers_mut();

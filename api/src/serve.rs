@@ -96,7 +96,7 @@ fn build(config: Config, stopping: watch::Receiver<bool>) -> Result<(AppState, S
 }
 
 /// Recovers the jobs and runs the supervisor, on a thread of its own. The service is ready after the recovery.
-fn start_supervision(supervisor: Supervisor, phase: ServicePhase) -> io::Result<JoinHandle<()>> {
+fn start_supervision(mut supervisor: Supervisor, phase: ServicePhase) -> io::Result<JoinHandle<()>> {
     std::thread::Builder::new().name("supervisor".to_owned()).spawn(move || {
         if let Err(error) = supervisor.recover() {
             tracing::error!(%error, "recovery failed; the service stays unready");

@@ -27,7 +27,7 @@ pub use collections::{DryRunView, EstimateView, StudyList, StudyView, UploadList
 use meniscus_jobs::service::store::{CheckpointRow, Event, FileRow, JobRow};
 use meniscus_jobs::spec::records::{HealthRecord, Progress, Usage};
 use meniscus_jobs::system::build;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
@@ -301,15 +301,6 @@ fn links(base: String, parts: &[&'static str]) -> BTreeMap<&'static str, String>
     links
 }
 
-/// What a stored estimate says of a run that has not reported progress yet.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct StoredEstimate {
-    particles: u64,
-    steps: u64,
-    time_step: f64,
-}
-
 impl From<JobRow> for JobView {
     fn from(job: JobRow) -> Self {
         let parts = ["cancel", "pause", "resume", "events", "log", "series", "report", "files", "checkpoints"];
@@ -331,8 +322,7 @@ impl From<JobRow> for JobView {
         let is_running = job.state.has_worker();
         let HealthRecord { finite, max_cfl, volume_drift, rescued_fits } = health;
         let Usage { wall_s, cpu_s, peak_memory_bytes, disk_bytes } = job.usage;
-        let estimate = StoredEstimate::deserialize(&job.estimate).unwrap_or_default();
-        let end_time = if end_time > 0.0 { end_time } else { estimate.steps as f64 * estimate.time_step };
+        let end_time = if end_time > 0.0 { end_time } else { job.forecast.steps as f64 * job.forecast.time_step };
         Self {
             rev: job.rev,
             state: job.state.word().to_owned(),
@@ -349,7 +339,7 @@ impl From<JobRow> for JobView {
                 end_time,
                 step,
                 steps_per_s: steps_per_s.filter(|_| is_running),
-                particles: if particles > 0 { particles } else { estimate.particles },
+                particles: if particles > 0 { particles } else { job.forecast.particles },
                 phase: if is_running { phase } else { job.state.word().to_owned() },
                 eta_s: eta_s.filter(|_| is_running),
                 eta_basis: eta_basis.filter(|_| is_running),

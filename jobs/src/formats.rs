@@ -5,6 +5,7 @@ pub mod checkpoint;
 pub mod cloud_file;
 pub mod csv;
 pub mod frame_index;
+pub mod frame_view;
 pub mod hdf5_file;
 pub mod mesh;
 pub mod picture;

@@ -1,10 +1,12 @@
 //! Plain data that the service and its workers exchange. Nothing here opens the store or steps a simulation.
 
+pub mod attempt_files;
 pub mod attempt_spec;
 pub mod body;
 pub mod calibration;
 pub mod forecast;
 pub mod records;
+pub mod requests;
 pub mod run_options;
 pub mod states;
 pub mod strict_json;

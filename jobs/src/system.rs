@@ -1,4 +1,4 @@
-//! Ground that all processes share: files, digests, the clock, what the operating system says.
+//! What all processes share: files, digests, the clock, facts of the operating system.
 
 pub mod artifacts;
 pub mod breakpoints;

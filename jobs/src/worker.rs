@@ -1,6 +1,7 @@
 //! The process of one attempt: restores, runs under observers, writes checkpoints and output, reports.
 
 pub mod attempt;
+pub mod calibration;
 pub mod inputs;
 pub mod local_run;
 pub mod observers;

@@ -3,19 +3,6 @@
 /// Circles of files.
 pub const CIRCLES: &[&[&str]] = &[
     &["src/schemes/weakly_compressible_sph/stepping.rs", "src/schemes/weakly_compressible_sph/system.rs"],
-    &["jobs/src/service/store/studies.rs", "jobs/src/service/store/transitions.rs"],
-    &[
-        "jobs/src/spec/attempt_spec.rs",
-        "jobs/src/spec/body.rs",
-        "jobs/src/spec/calibration.rs",
-        "jobs/src/spec/forecast.rs",
-        "jobs/src/worker/attempt.rs",
-        "jobs/src/worker/inputs.rs",
-        "jobs/src/worker/local_run.rs",
-        "jobs/src/worker/observers.rs",
-        "jobs/src/worker/observers/progress.rs",
-    ],
-    &["jobs/src/spec/body/restart.rs", "jobs/src/spec/body/sources.rs"],
 ];
 
 /// Words for people that still stand for things, by file: at most so many.
@@ -37,21 +24,6 @@ pub const WORDS: &[(&str, usize)] = &[
     ("src/schemes/weakly_compressible_sph/system.rs", 3),
     ("src/simulation/report.rs", 1),
     ("src/simulation.rs", 1),
-    ("jobs/src/service/inspector.rs", 1),
-    ("jobs/src/service/store/census.rs", 1),
-    ("jobs/src/service/store/settle.rs", 2),
-    ("jobs/src/service/store/studies.rs", 1),
-    ("jobs/src/service/store/tests.rs", 2),
-    ("jobs/src/service/store/together.rs", 4),
-    ("jobs/src/service/store/uploads.rs", 2),
-    ("jobs/src/service/store.rs", 2),
-    ("jobs/src/service/supervisor/limits.rs", 1),
-    ("jobs/src/service/supervisor.rs", 1),
-    ("jobs/src/spec/body.rs", 1),
-    ("jobs/src/spec/states.rs", 3),
-    ("jobs/src/worker/inputs.rs", 1),
-    ("jobs/src/worker/observers/control.rs", 1),
-    ("jobs/src/worker/process.rs", 1),
 ];
 
 /// Functions over 60 lines: file, name, lines, and why it is not cut.
@@ -71,12 +43,6 @@ pub const LONG_FUNCTIONS: &[(&str, &str, usize, &str)] = &[
         89,
         "named sections replace it (issue 18, item 5)",
     ),
-    ("jobs/src/formats/mesh.rs", "ply", 82, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/service/store/import.rs", "take", 64, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/spec/body/restart.rs", "parse", 83, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/spec/body.rs", "parse", 134, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/spec/study.rs", "parse", 86, "it is cut with the rooms of jobs (issue 18, item 3)"),
-    ("jobs/src/worker/attempt.rs", "attempt", 61, "not cut yet (issue 18)"),
 ];
 
 /// Files over 500 lines, each with the reason why it is one concept.

@@ -10,14 +10,15 @@ mod known;
 use code::{CRATES, all_sources, is_test_file, root, sources};
 use imports::Crate;
 use std::fs;
+use std::path::Path;
 
-#[test]
-fn modules_use_only_modules_above_them() {
-    let root = root().join("src");
+/// Asserts that every file below a crate's folder mentions only modules that its `lib.rs` lists before its own.
+fn assert_order(folder: &str) {
+    let root = root().join(folder);
     let library = fs::read_to_string(root.join("lib.rs")).unwrap();
     let order: Vec<&str> =
         library.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
-    assert!(order.len() > 8);
+    assert!(order.len() > 5);
     let mut files = Vec::new();
     sources(&root, &mut files);
     for file in files {
@@ -26,11 +27,48 @@ fn modules_use_only_modules_above_them() {
         let Some(place) = order.iter().position(|m| *m == module) else {
             continue;
         };
-        let text = fs::read_to_string(&file).unwrap();
-        for used in text.split("crate::").skip(1) {
-            let name: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        for name in used_modules(&file) {
             if let Some(other) = order.iter().position(|m| *m == name) {
                 assert!(other <= place, "{} uses {name}, which stands below {module}", relative.display());
+            }
+        }
+    }
+}
+
+/// Modules of its crate that a file mentions, comments left out.
+fn used_modules(file: &Path) -> Vec<String> {
+    let text = fs::read_to_string(file).unwrap();
+    let code: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+    let name = |used: &str| used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+    code.join("\n").split("crate::").skip(1).map(name).collect()
+}
+
+#[test]
+fn modules_use_only_modules_above_them() {
+    assert_order("src");
+    assert_order("jobs/src");
+}
+
+#[test]
+fn a_worker_cannot_reach_the_store_and_the_service_cannot_reach_a_solver() {
+    // Formats that are written and read by libhdf5, and what is below a scene: only workers and inspections use them.
+    let hdf5 = ["formats::checkpoint", "formats::hdf5_file", "formats::vtkhdf", "hdf5::"];
+    let solver = ["meniscus::simulation", "meniscus::schemes", ".build(", "dyn Simulation"];
+    let rooms: [(&str, &[&str], &[&str]); 4] = [
+        ("worker", &["service", "inspection", "verify"], &["rusqlite"]),
+        ("inspection", &["service", "worker", "verify"], &["rusqlite", ".build("]),
+        ("service", &["worker", "inspection", "verify"], &[hdf5.as_slice(), solver.as_slice()].concat()),
+        ("verify", &["service", "inspection"], &["rusqlite"]),
+    ];
+    for (room, modules, texts) in rooms {
+        for (path, text) in all_sources() {
+            if !path.starts_with(&format!("jobs/src/{room}/")) && path != format!("jobs/src/{room}.rs") {
+                continue;
+            }
+            let used = used_modules(&root().join(&path));
+            assert!(!used.iter().any(|name| modules.contains(&name.as_str())), "{path} uses one of {modules:?}");
+            for banned in texts.iter().filter(|_| !is_test_file(&path)) {
+                assert!(!text.contains(banned), "{path} has {banned}");
             }
         }
     }

@@ -26,7 +26,8 @@ fn files(directory: &Path, into: &mut BTreeMap<String, String>) {
 
 fn assert_resolves(place: &str, run: &Value) {
     let allowance = Allowance { threads: 1, memory_bytes: 64 << 30, local_files: false };
-    if let Err(violations) = body::parse(&job_body(run), allowance, &NoSources) {
+    if let Err(error) = body::parse(&job_body(run), allowance, &NoSources) {
+        let violations = error.violations();
         let lines: Vec<String> = violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect();
         panic!("{place}: {}", lines.join("; "));
     }

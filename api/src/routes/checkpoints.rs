@@ -11,9 +11,9 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Redirect, Response};
 use meniscus_jobs::service::store::{CheckpointRow, JobRow, Store, StoreError};
-use meniscus_jobs::spec::attempt_spec::attempt_directory;
+use meniscus_jobs::spec::attempt_files::HDF5_MEDIA_TYPE;
+use meniscus_jobs::spec::attempt_files::attempt_directory;
 use meniscus_jobs::spec::states::State as JobState;
-use meniscus_jobs::worker::observers::frames::HDF5;
 
 /// Verified checkpoints of a job, newest first.
 #[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),
@@ -103,7 +103,8 @@ pub async fn content(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let row = resource::find::<CheckpointRow>(&state, id).await?;
-    let facts = FileFacts { sha256: Some(row.sha256), media_type: HDF5.to_owned(), name: format!("{}.h5", row.id) };
+    let facts =
+        FileFacts { sha256: Some(row.sha256), media_type: HDF5_MEDIA_TYPE.to_owned(), name: format!("{}.h5", row.id) };
     let place = attempt_directory(&state.store.job_directory(&row.job), row.attempt).join(&row.path);
     file_response(&place, &facts, &headers).await
 }

@@ -12,7 +12,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::Response;
 use meniscus_jobs::service::store::{FileRow, JobRow, Store};
-use meniscus_jobs::spec::attempt_spec::attempt_directory;
+use meniscus_jobs::spec::attempt_files::attempt_directory;
 use std::io::{self, Write};
 use std::path::{self, PathBuf};
 use std::sync::Arc;

@@ -47,7 +47,7 @@ pub async fn submit(State(state): State<AppState>, request: Request) -> Result<R
         let answer = |row: JobRow| {
             stored_response(StatusCode::CREATED, Some(format!("/v1/jobs/{}", row.id)), &JobView::from(row))
         };
-        creation.respond(store.submit(NewJob::of(&body), creation.keyed.clone(), answer)?)
+        creation.respond(store.submit(NewJob::from_body(&body), creation.keyed.clone(), answer)?)
     };
     let response = state.with_store(work).await?;
     state.supervisor.wake();

@@ -13,14 +13,14 @@ use metrics::gauge;
 #[utoipa::path(get, path = "/metrics", tag = "service",
     responses((status = 200, content_type = "text/plain"), (status = 503, body = Problem)))]
 pub async fn metrics(State(state): State<AppState>) -> Result<Response, ApiError> {
-    let census = state.with_store(|store| Ok::<_, ApiError>(store.census()?)).await?;
+    let statistics = state.with_store(|store| Ok::<_, ApiError>(store.statistics()?)).await?;
     for state in JobState::ALL {
-        let count = census.by_state.get(state).copied().unwrap_or(0);
+        let count = statistics.by_state.get(state).copied().unwrap_or(0);
         gauge!("meniscus_jobs", "state" => state.word()).set(count as f64);
     }
-    gauge!("meniscus_queue_oldest_seconds").set(census.oldest_queued_s);
-    gauge!("meniscus_store_bytes").set(census.store_bytes as f64);
-    gauge!("meniscus_uploads_quarantined").set(census.quarantined as f64);
+    gauge!("meniscus_queue_oldest_seconds").set(statistics.oldest_queued_s);
+    gauge!("meniscus_store_bytes").set(statistics.store_bytes as f64);
+    gauge!("meniscus_uploads_quarantined").set(statistics.quarantined as f64);
     gauge!("meniscus_slots").set(state.config.slots as f64);
     let free = process::free_space(state.store.directory()).unwrap_or(0);
     gauge!("meniscus_disk_free_bytes").set(free as f64);

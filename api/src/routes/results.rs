@@ -14,9 +14,7 @@ use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Response};
 use meniscus_jobs::formats::csv;
 use meniscus_jobs::service::store::{JobRow, Store};
-use meniscus_jobs::spec::attempt_spec::attempt_directory;
-use meniscus_jobs::worker::attempt;
-use meniscus_jobs::worker::observers::series;
+use meniscus_jobs::spec::attempt_files::{self, attempt_directory};
 use serde::Deserialize;
 
 /// Which part of a log.
@@ -45,7 +43,7 @@ pub async fn log(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let row = resource::find::<JobRow>(&state, id.clone()).await?;
-    let read = move |store: &Store| Ok::<_, ApiError>(of_attempts(store, &row, attempt::LOG_NAME).concat());
+    let read = move |store: &Store| Ok::<_, ApiError>(of_attempts(store, &row, attempt_files::LOG).concat());
     let text = state.with_store(read).await?;
     let text = match query.tail {
         None => text,
@@ -71,7 +69,7 @@ pub async fn series(
     let row = resource::find::<JobRow>(&state, id.clone()).await?;
     let directory = state.store.job_directory(&row.id);
     // The series of the newest attempt that has one continues all earlier ones.
-    let mut places = (1..=row.attempt).rev().map(|n| attempt_directory(&directory, n).join(series::FILE_NAME));
+    let mut places = (1..=row.attempt).rev().map(|n| attempt_directory(&directory, n).join(attempt_files::SERIES));
     let newest = places.find(|place| place.is_file());
     let read = move |_: &Store| Ok::<_, ApiError>(newest.map(std::fs::read).transpose()?.unwrap_or_default());
     let text = state.with_store(read).await?;

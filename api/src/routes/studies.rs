@@ -59,9 +59,7 @@ pub async fn submit(
         }
         let sources = StoreSources::new(store);
         let (allowance, slots) = (here.config.allowance(), here.config.slots);
-        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::of);
-        sources.check()?;
-        let study = study?;
+        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::from_body)?;
         if query.dry_run {
             let view = DryRunView { points: study.points, estimate: study.estimate };
             return Ok(Json(view).into_response());
@@ -279,7 +277,7 @@ fn new_jobs(state: &AppState, store: &Store, study: &StudyRow) -> Result<Vec<New
         }
         let Some(old) = store.job(&point.job)? else { continue };
         let body = sources.understand(&old.spec, state.config.allowance(), &calibration)?;
-        let mut job = NewJob::of(&body);
+        let mut job = NewJob::from_body(&body);
         job.study = Some((study.id.clone(), point.index));
         job.retry_of = Some(point.job);
         new.push(job);

@@ -190,7 +190,7 @@ impl From<UploadRow> for UploadView {
             r#as: row.purpose.word(),
             state: row.state,
             reason: row.reason,
-            found: row.found,
+            found: serde_json::json!(row.found),
             name: row.name,
             size_bytes: row.size_bytes,
             sha256: row.sha256,

@@ -6,6 +6,7 @@
 
 use crate::formats::hdf5_file::{count_bytes, real_bytes, write};
 use crate::formats::structure::{self, Refusal};
+use crate::spec::body::resolved_scene;
 use crate::spec::records::FileRecord;
 use crate::system::artifacts;
 use crate::system::breakpoints::pass;
@@ -211,8 +212,8 @@ pub fn read(path: &Path, sha256: Option<&str>) -> Result<(Meta, State), Checkpoi
 pub fn is_same_scene(a: &Value, b: &Value) -> bool {
     let plain = |body: &Value| {
         // A build before may have left out what this one writes as null: what is resolved resolves to the same again.
-        let scene = &body["scene"];
-        let mut scene = scene::parse(scene, SCENES).map_or_else(|_| scene.clone(), |scene| scene.resolved());
+        let scene = resolved_scene(body).unwrap_or_default();
+        let mut scene = scene::parse(&scene, SCENES).map_or(scene, |scene| scene.resolved());
         let safe = meniscus::scenes::kind_of(&scene).map(scene::SceneKind::restart_safe);
         if let Some(map) = scene.as_object_mut() {
             for pointer in safe.unwrap_or_default() {

@@ -1,11 +1,12 @@
 //! Small conveniences over libhdf5: checksummed data sets of plain numbers, without times.
 
+use crate::spec::forecast::CHUNK_ROWS;
 use hdf5::{Dataset, Group, H5Type};
 
 /// Writes numbers as a data set with a Fletcher-32 checksum per chunk; `components` > 1 makes it two-dimensional.
 ///
 /// # Errors
-/// Whatever libhdf5 reports.
+/// Errors of libhdf5.
 pub fn write<T: H5Type>(group: &Group, name: &str, components: usize, values: &[T]) -> hdf5::Result<Dataset> {
     let rows = values.len() / components.max(1);
     let builder = group.new_dataset::<T>();
@@ -23,9 +24,6 @@ pub fn write<T: H5Type>(group: &Group, name: &str, components: usize, values: &[
     }
     Ok(dataset)
 }
-
-/// Rows of a chunk at most.
-pub const CHUNK_ROWS: usize = 1 << 16;
 
 /// The bytes of numbers as they stand in the file, for digests (this program runs on little-endian machines only).
 #[must_use]

@@ -1,5 +1,7 @@
 //! Surfaces in common text and binary formats: PLY (text and binary), OBJ, XYZ. Only positions, normals and faces are
-//! taken; everything else is passed over.
+//! read; everything else is ignored.
+
+mod ply;
 
 use crate::spec::uploads::MOST_POINTS;
 use std::collections::HashMap;
@@ -15,16 +17,16 @@ pub struct Mesh {
     pub faces: Vec<Vec<u32>>,
 }
 
-/// Corners of a face at most.
+/// Most corners of a face.
 const MOST_CORNERS: u64 = 1000;
 
-/// Reads a mesh by what the bytes look like.
+/// Reads a mesh; its format is guessed from the bytes.
 ///
 /// # Errors
 /// A sentence that names the line or the byte.
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     let mesh = if bytes.starts_with(b"ply") {
-        ply(bytes)?
+        ply::read(bytes)?
     } else {
         let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is no text", e.valid_up_to()))?;
         let is_obj = text.lines().map(str::trim_start).any(|l| l.starts_with("v ") || l.starts_with("v\t"));
@@ -66,7 +68,7 @@ fn real(word: &str, line: usize) -> Result<f64, String> {
     word.parse().map_err(|_| format!("line {}: {:?} is no number", line + 1, word.chars().take(40).collect::<String>()))
 }
 
-fn room(count: usize) -> Result<(), String> {
+fn check_count(count: usize) -> Result<(), String> {
     if count as u64 >= MOST_POINTS { Err(format!("there are more than {MOST_POINTS} points or faces")) } else { Ok(()) }
 }
 
@@ -79,7 +81,7 @@ fn xyz(text: &str) -> Result<Mesh, String> {
         }
         let words = line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty());
         let numbers = words.map(|word| real(word, k)).collect::<Result<Vec<f64>, _>>()?;
-        room(mesh.points.len())?;
+        check_count(mesh.points.len())?;
         match numbers.as_slice() {
             [x, y] => mesh.points.push([*x, *y, 0.0]),
             [x, y, z] => mesh.points.push([*x, *y, *z]),
@@ -107,15 +109,15 @@ fn obj(text: &str) -> Result<Mesh, String> {
         };
         match kind {
             "v" => {
-                room(mesh.points.len())?;
+                check_count(mesh.points.len())?;
                 mesh.points.push(triple(&mut words)?);
             }
             "vn" => {
-                room(normals.len())?;
+                check_count(normals.len())?;
                 normals.push(triple(&mut words)?);
             }
             "f" => {
-                room(mesh.faces.len())?;
+                check_count(mesh.faces.len())?;
                 let mut face = Vec::new();
                 for word in words {
                     if face.len() as u64 >= MOST_CORNERS {
@@ -152,165 +154,6 @@ fn index(text: Option<&str>, count: usize, line: usize) -> Result<u32, String> {
         .ok()
         .filter(|place| (*place as usize) < count)
         .ok_or_else(|| format!("line {}: there is no number {number} among {count}", line + 1))
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Encoding {
-    Text,
-    Little,
-    Big,
-}
-
-#[derive(Clone, Copy)]
-enum Scalar {
-    Int(usize),
-    Unsigned(usize),
-    Float(usize),
-}
-
-impl Scalar {
-    fn of(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "int8" => Self::Int(1),
-            "uchar" | "uint8" => Self::Unsigned(1),
-            "short" | "int16" => Self::Int(2),
-            "ushort" | "uint16" => Self::Unsigned(2),
-            "int" | "int32" => Self::Int(4),
-            "uint" | "uint32" => Self::Unsigned(4),
-            "float" | "float32" => Self::Float(4),
-            "double" | "float64" => Self::Float(8),
-            _ => return None,
-        })
-    }
-}
-
-struct Property {
-    name: String,
-    scalar: Scalar,
-    /// The type of the count, of lists.
-    list: Option<Scalar>,
-}
-
-struct Element {
-    name: String,
-    count: u64,
-    properties: Vec<Property>,
-}
-
-fn ply(bytes: &[u8]) -> Result<Mesh, String> {
-    let mut at = 0;
-    let mut line = || -> Result<&str, String> {
-        let rest = bytes.get(at..).unwrap_or_default();
-        let end = rest.iter().take(1 << 12).position(|b| *b == b'\n').ok_or("the header does not end")?;
-        at += end + 1;
-        std::str::from_utf8(&rest[..end]).map(str::trim).map_err(|_| "the header is no text".to_owned())
-    };
-    let mut encoding = None;
-    let mut elements: Vec<Element> = Vec::new();
-    line()?;
-    loop {
-        let text = line()?;
-        let words: Vec<&str> = text.split_whitespace().collect();
-        match words.as_slice() {
-            ["format", "ascii", ..] => encoding = Some(Encoding::Text),
-            ["format", "binary_little_endian", ..] => encoding = Some(Encoding::Little),
-            ["format", "binary_big_endian", ..] => encoding = Some(Encoding::Big),
-            ["element", name, count] => {
-                let count: u64 = count.parse().map_err(|_| format!("{text:?} has no count"))?;
-                if count > MOST_POINTS || elements.len() > 16 {
-                    return Err(format!("{text:?}: at most {MOST_POINTS} are understood, of 16 kinds"));
-                }
-                elements.push(Element { name: (*name).to_owned(), count, properties: Vec::new() });
-            }
-            ["property", rest @ ..] => {
-                let (list, kind, name) = match rest {
-                    ["list", count, kind, name] => (Some(*count), *kind, *name),
-                    [kind, name] => (None, *kind, *name),
-                    _ => return Err(format!("{text:?} is not understood")),
-                };
-                let scalar = |name: &str| Scalar::of(name).ok_or_else(|| format!("{name:?} is no type"));
-                let property =
-                    Property { name: name.to_owned(), scalar: scalar(kind)?, list: list.map(scalar).transpose()? };
-                let element = elements.last_mut().ok_or_else(|| format!("{text:?} belongs to no element"))?;
-                if element.properties.len() >= 64 {
-                    return Err("an element has more than 64 properties".to_owned());
-                }
-                element.properties.push(property);
-            }
-            ["end_header"] => break,
-            _ => {}
-        }
-    }
-    let encoding = encoding.ok_or("the format is missing")?;
-    let mut values = PlyValues { rest: &bytes[at..], encoding };
-    let mut mesh = Mesh::default();
-    for element in &elements {
-        for _ in 0..element.count {
-            let mut row = [f64::NAN; 6];
-            for property in &element.properties {
-                let place = ["x", "y", "z", "nx", "ny", "nz"].iter().position(|name| *name == property.name);
-                let Some(count) = property.list else {
-                    let value = values.next(property.scalar)?;
-                    if let Some(place) = place {
-                        row[place] = value;
-                    }
-                    continue;
-                };
-                let count = values.next(count)?;
-                if !(0.0..=MOST_CORNERS as f64).contains(&count) {
-                    return Err(format!("a list of {count} entries"));
-                }
-                let list =
-                    (0..count as u64).map(|_| values.next(property.scalar)).collect::<Result<Vec<f64>, String>>()?;
-                if element.name == "face" && property.name.starts_with("vert") {
-                    mesh.faces.push(list.iter().map(|v| *v as u32).collect());
-                }
-            }
-            if element.name == "vertex" {
-                mesh.points.push([row[0], row[1], row[2]]);
-                if element.properties.iter().any(|p| p.name == "nx") {
-                    mesh.normals.push([row[3], row[4], row[5]]);
-                }
-            }
-            if element.properties.is_empty() {
-                break;
-            }
-        }
-    }
-    Ok(mesh)
-}
-
-struct PlyValues<'a> {
-    rest: &'a [u8],
-    encoding: Encoding,
-}
-
-impl PlyValues<'_> {
-    fn next(&mut self, scalar: Scalar) -> Result<f64, String> {
-        if self.encoding == Encoding::Text {
-            let start = self.rest.iter().position(|b| !b.is_ascii_whitespace()).ok_or("the data end too soon")?;
-            let rest = &self.rest[start..];
-            let end = rest.iter().take(64).position(u8::is_ascii_whitespace).unwrap_or(rest.len().min(64));
-            self.rest = &rest[end..];
-            let word = std::str::from_utf8(&rest[..end]).unwrap_or_default();
-            return word.parse().map_err(|_| format!("{word:?} is no number"));
-        }
-        let (Scalar::Int(width) | Scalar::Unsigned(width) | Scalar::Float(width)) = scalar;
-        let bytes = self.rest.get(..width).ok_or("the data end too soon")?;
-        self.rest = &self.rest[width..];
-        let mut raw = [0; 8];
-        raw[..width].copy_from_slice(bytes);
-        if self.encoding == Encoding::Big {
-            raw[..width].reverse();
-        }
-        let number = u64::from_le_bytes(raw);
-        Ok(match scalar {
-            Scalar::Unsigned(_) => number as f64,
-            Scalar::Int(width) => ((number << (64 - 8 * width)).cast_signed() >> (64 - 8 * width)) as f64,
-            Scalar::Float(4) => f64::from(f32::from_bits(number as u32)),
-            Scalar::Float(_) => f64::from_bits(number),
-        })
-    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,11 @@
-//! A picture of frames side by side: particles coloured by φ, the zero level as a black line (SVG). 3D frames show
+//! A picture of frames side by side: particles colored by a number, the surface as a black line (SVG). 3D frames show
 //! the particles of a slice through the middle.
 
-use super::vtkhdf::FrameView;
+use super::frame_view::FrameView;
 use plotters::coord::Shift;
 use plotters::prelude::{
     ChartBuilder, Circle, DrawingArea, IntoDrawingArea, PathElement, RGBColor, SVGBackend, ShapeStyle, WHITE,
 };
-use serde_json::Value;
 use std::path::Path;
 
 /// Width and height of one panel in pixels.
@@ -27,18 +26,17 @@ pub fn draw(path: &Path, frames: &[FrameView], spacing: f64) -> Result<(), Strin
     root.present().map_err(|e| e.to_string())
 }
 
-/// How far points of a scene are apart in its pictures: h, or as far as so many points of a surface of unit size are, of one
-/// from outside by the diagonal of its box.
+/// How far neighboring points are apart in pictures: the spacing of the scene, or as far as the diagonal of a frame's box and
+/// the number of its points say.
 #[must_use]
-pub fn spacing(scene: &Value, frames: &[FrameView]) -> f64 {
-    let of_count = || scene["count"].as_f64().map(|count| 3.5 / count.sqrt());
+pub fn spacing(of_scene: Option<f64>, frames: &[FrameView]) -> f64 {
     let of_frame = || {
         let points = &frames.first()?.points;
         let of_axis = |d: usize| points.iter().map(move |x| x[d]);
         let side = |d: usize| of_axis(d).fold(f64::MIN, f64::max) - of_axis(d).fold(f64::MAX, f64::min);
         Some((0..3).map(|d| side(d).powi(2)).sum::<f64>().sqrt() / (points.len() as f64).sqrt())
     };
-    scene["spacing"].as_f64().or_else(of_count).or_else(of_frame).filter(|h| h.is_normal()).unwrap_or(0.05)
+    of_scene.or_else(of_frame).filter(|h| h.is_normal()).unwrap_or(0.05)
 }
 
 fn draw_panel(panel: &DrawingArea<SVGBackend, Shift>, frame: &FrameView, spacing: f64) -> Result<(), String> {
@@ -62,21 +60,22 @@ fn draw_panel(panel: &DrawingArea<SVGBackend, Shift>, frame: &FrameView, spacing
         .build_cartesian_2d(middle[0] - half..middle[0] + half, middle[1] - half..middle[1] + half)
         .map_err(|e| e.to_string())?;
     chart.configure_mesh().disable_mesh().x_labels(5).y_labels(5).draw().map_err(|e| e.to_string())?;
-    let extreme = frame.phi.iter().filter(|v| v.is_finite()).fold(1e-300_f64, |most, v| most.max(v.abs()));
+    let extreme = frame.values.iter().filter(|v| v.is_finite()).fold(1e-300_f64, |most, v| most.max(v.abs()));
     let thinning = slice.len().div_ceil(MOST_POINTS).max(1);
     let radius = (0.35 * spacing / (2.0 * half) * f64::from(PANEL)).clamp(0.5, 5.0) as i32;
     let dots = slice.iter().step_by(thinning).map(|&i| {
-        let style = ShapeStyle::from(&colour(frame.phi[i] / extreme)).filled();
+        let style = ShapeStyle::from(&color(frame.values[i] / extreme)).filled();
         Circle::new((frame.points[i][0], frame.points[i][1]), radius.max(1), style)
     });
     chart.draw_series(dots).map_err(|e| e.to_string())?;
     // Near the surface every particle knows its closest point and normal: short tangents there join to a line.
-    let line = slice.iter().filter(|&&i| frame.phi[i].abs() <= 2.0 * spacing && !frame.surface.is_empty()).map(|&i| {
-        let (point, normal) = frame.surface[i];
-        let reach = 0.35 * spacing;
-        let ends = [-1.0, 1.0].map(|s| (point[0] - s * reach * normal[1], point[1] + s * reach * normal[0]));
-        PathElement::new(ends.to_vec(), ShapeStyle::from(&RGBColor(0, 0, 0)).stroke_width(2))
-    });
+    let line =
+        slice.iter().filter(|&&i| frame.values[i].abs() <= 2.0 * spacing && !frame.surface.is_empty()).map(|&i| {
+            let (point, normal) = frame.surface[i];
+            let reach = 0.35 * spacing;
+            let ends = [-1.0, 1.0].map(|s| (point[0] - s * reach * normal[1], point[1] + s * reach * normal[0]));
+            PathElement::new(ends.to_vec(), ShapeStyle::from(&RGBColor(0, 0, 0)).stroke_width(2))
+        });
     chart.draw_series(line).map_err(|e| e.to_string())?;
     Ok(())
 }
@@ -95,7 +94,7 @@ fn slice_of(frame: &FrameView, spacing: f64) -> Vec<usize> {
 }
 
 /// Blue inside, white at the surface, red outside, grey where there is no value.
-fn colour(value: f64) -> RGBColor {
+fn color(value: f64) -> RGBColor {
     if !value.is_finite() {
         return RGBColor(200, 200, 200);
     }

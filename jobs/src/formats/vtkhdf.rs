@@ -3,7 +3,6 @@
 //! VTK's reader needs all four topology groups, and numbers only under `FieldData`.
 
 use super::hdf5_file::write;
-use super::surface_view;
 use hdf5::types::FixedAscii;
 use hdf5::{File, Group};
 use meniscus::scene::Cloud;
@@ -13,7 +12,7 @@ use std::path::Path;
 /// Writes the chosen fields of one moment; the file is closed when this returns.
 ///
 /// # Errors
-/// Whatever libhdf5 reports.
+/// Errors of libhdf5.
 pub fn write_frame(path: &Path, fields: &Fields, chosen: &[String], time: f64, step: u64) -> hdf5::Result<()> {
     let file = File::create(path)?;
     let root = file.create_group("VTKHDF")?;
@@ -51,75 +50,71 @@ fn topology(root: &Group, name: &str, offsets: &[i64], connectivity: &[i64]) -> 
     Ok(())
 }
 
-/// What a picture needs of a frame.
-#[derive(Debug, Clone, Default)]
-pub struct FrameView {
-    /// Scene time.
-    pub time: f64,
-    /// Positions.
-    pub points: Vec<[f64; 3]>,
-    /// Signed distances, NaN outside the band; of a field on a surface its values about the middle of their range.
-    pub phi: Vec<f64>,
-    /// Closest points and normals, where the frame has both.
-    pub surface: Vec<([f64; 3], [f64; 3])>,
+/// An open frame.
+pub struct Frame {
+    root: Group,
 }
 
-/// Reads a frame back, for a picture; None where it has neither `phi` nor a `value` on a surface nor is a front.
-///
-/// # Errors
-/// Whatever libhdf5 reports.
-pub fn read_frame(path: &Path) -> hdf5::Result<Option<FrameView>> {
-    let file = File::open(path)?;
-    let root = file.group("VTKHDF")?;
-    let data = root.group("PointData")?;
-    let triples = |values: Vec<f64>| values.as_chunks::<3>().0.to_vec();
-    let time = root.dataset("FieldData/Time")?.read_raw::<f64>()?.first().copied().unwrap_or(0.0);
-    let points = triples(root.dataset("Points")?.read_raw()?);
-    let Ok(phi) = data.dataset("phi") else {
-        let Ok(normals) = data.dataset("normal") else { return Ok(None) };
-        let normals = triples(normals.read_raw()?);
-        if let Ok(values) = data.dataset("value") {
-            let (points, phi) = surface_view::seen(&points, &normals, &values.read_raw::<f64>()?);
-            return Ok(Some(FrameView { time, points, phi, surface: Vec::new() }));
-        }
-        // The points of a front are all on it: a line in the plane, shaded by its slope in space.
-        if data.dataset("grid_point").is_err() {
-            return Ok(None);
-        }
-        // That of a wave front, a curve in (x, y, θ), is drawn in the plane too.
-        if normals.iter().all(|n| n[2] == 0.0) {
-            let points: Vec<[f64; 3]> = points.iter().map(|x| [x[0], x[1], 0.0]).collect();
-            let phi = vec![0.0; points.len()];
-            let surface = points.iter().copied().zip(normals).collect();
-            return Ok(Some(FrameView { time, points, phi, surface }));
-        }
-        let slopes: Vec<f64> = normals.iter().map(|n| n[2]).collect();
-        let (points, phi) = surface_view::seen(&points, &normals, &slopes);
-        return Ok(Some(FrameView { time, points, phi, surface: Vec::new() }));
-    };
-    let surface = match (data.dataset("closest_point"), data.dataset("normal")) {
-        (Ok(points), Ok(normals)) => {
-            triples(points.read_raw()?).into_iter().zip(triples(normals.read_raw()?)).collect()
-        }
-        _ => Vec::new(),
-    };
-    Ok(Some(FrameView { time, points, phi: phi.read_raw()?, surface }))
+impl Frame {
+    /// Opens a frame.
+    ///
+    /// # Errors
+    /// Errors of libhdf5.
+    pub fn open(path: &Path) -> hdf5::Result<Self> {
+        Ok(Self { root: File::open(path)?.group("VTKHDF")? })
+    }
+
+    /// Scene time.
+    ///
+    /// # Errors
+    /// Errors of libhdf5.
+    pub fn time(&self) -> hdf5::Result<f64> {
+        Ok(self.root.dataset("FieldData/Time")?.read_raw::<f64>()?.first().copied().unwrap_or(0.0))
+    }
+
+    /// Positions.
+    ///
+    /// # Errors
+    /// Errors of libhdf5.
+    pub fn points(&self) -> hdf5::Result<Vec<[f64; 3]>> {
+        Ok(triples(&self.root.dataset("Points")?.read_raw()?))
+    }
+
+    /// The numbers of a field; None where the frame does not have it.
+    ///
+    /// # Errors
+    /// Errors of libhdf5.
+    pub fn scalars(&self, field: &str) -> hdf5::Result<Option<Vec<f64>>> {
+        self.root.dataset(&format!("PointData/{field}")).ok().map(|data| data.read_raw()).transpose()
+    }
+
+    /// The vectors of a field; None where the frame does not have it.
+    ///
+    /// # Errors
+    /// Errors of libhdf5.
+    pub fn vectors(&self, field: &str) -> hdf5::Result<Option<Vec<[f64; 3]>>> {
+        Ok(self.scalars(field)?.map(|numbers| triples(&numbers)))
+    }
+}
+
+fn triples(numbers: &[f64]) -> Vec<[f64; 3]> {
+    numbers.as_chunks::<3>().0.to_vec()
 }
 
 /// φ and a scalar field of a frame, where it has both.
 ///
 /// # Errors
-/// Whatever libhdf5 reports.
+/// Errors of libhdf5.
 pub fn read_profile(path: &Path, field: &str) -> hdf5::Result<Option<Vec<(f64, f64)>>> {
-    let data = File::open(path)?.group("VTKHDF/PointData")?;
-    let (Ok(phi), Ok(values)) = (data.dataset("phi"), data.dataset(field)) else { return Ok(None) };
-    Ok(Some(phi.read_raw()?.into_iter().zip(values.read_raw()?).collect()))
+    let frame = Frame::open(path)?;
+    let pair = frame.scalars("phi")?.zip(frame.scalars(field)?);
+    Ok(pair.map(|(phi, values)| phi.into_iter().zip(values).collect()))
 }
 
 /// Reads points, and `phi` where there is one, from a frame or any file that is laid out like one.
 ///
 /// # Errors
-/// Whatever libhdf5 reports, and points that are no triples.
+/// Errors of libhdf5, and points that are no triples.
 pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
     let root = File::open(path)?.group("VTKHDF")?;
     let numbers: Vec<f64> = root.dataset("Points")?.read_raw()?;
@@ -137,7 +132,7 @@ pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
 /// Reads `normal` of the points, if they have it, from a frame or any file that is laid out like one.
 ///
 /// # Errors
-/// Whatever libhdf5 reports, and normals that are no triples.
+/// Errors of libhdf5, and normals that are no triples.
 pub fn read_normals(path: &Path) -> Result<Option<Vec<[f64; 3]>>, CloudError> {
     let Ok(normal) = File::open(path)?.dataset("VTKHDF/PointData/normal") else { return Ok(None) };
     let numbers: Vec<f64> = normal.read_raw()?;

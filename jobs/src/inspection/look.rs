@@ -3,12 +3,15 @@
 use super::sandbox;
 use crate::formats::checkpoint;
 use crate::formats::mesh;
+use crate::formats::structure::Structure;
 use crate::formats::{cloud_file, structure, vtkhdf};
+use crate::spec::body::resolved_scene;
 use crate::spec::run_options::RunOptions;
-use crate::spec::uploads::{Findings, MOST_POINTS, Purpose};
+use crate::spec::uploads::{
+    ArrayContents, CheckpointContents, Contents, FaceContents, Inspection, MOST_POINTS, PointContents, Purpose,
+};
 use meniscus::scene::{self, Cloud};
 use meniscus::scenes::SCENES;
-use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::Path;
@@ -16,73 +19,93 @@ use std::path::Path;
 /// Bytes of a mesh file at most.
 const LARGEST_MESH: u64 = 1 << 30;
 
-/// Looks into a file and says on `out` what was found: a line of JSON, `{"ready": FINDINGS}` or `{"rejected": REASON}`, and
-/// behind it, of points, the points.
+/// Looks into a file and writes to `out` what was found: an
+/// [`Inspection`] as a line of JSON and, of points, the points behind it.
 ///
 /// # Errors
-/// When nothing can be said.
+/// When it cannot be written.
 pub fn run(purpose: Purpose, path: &Path, out: &mut dyn Write) -> io::Result<()> {
     let mut out = BufWriter::new(out);
     match inspect(purpose, path) {
-        Ok((findings, cloud)) => {
-            writeln!(out, "{}", json!({"ready": findings}))?;
+        Ok((contents, cloud)) => {
+            writeln!(out, "{}", serde_json::to_string(&Inspection::Ready(contents))?)?;
             if let Some(cloud) = cloud {
                 cloud_file::write(&mut out, &cloud)?;
             }
         }
-        Err(reason) => writeln!(out, "{}", json!({"rejected": reason}))?,
+        Err(reason) => writeln!(out, "{}", serde_json::to_string(&Inspection::Rejected(reason))?)?,
     }
     out.flush()
 }
 
-fn inspect(purpose: Purpose, path: &Path) -> Result<(Findings, Option<Cloud>), String> {
+fn inspect(purpose: Purpose, path: &Path) -> Result<(Contents, Option<Cloud>), String> {
     let mut file = File::open(path).map_err(|error| error.to_string())?;
     let mut head = [0; 8];
     let length = file.read(&mut head).map_err(|error| error.to_string())?;
     let is_hdf5 = head[..length] == *structure::SIGNATURE;
     match purpose {
         Purpose::Surface | Purpose::Queries if !is_hdf5 => of_mesh(purpose, path),
-        Purpose::Checkpoint => of_checkpoint(&file, path).map(|findings| (findings, None)),
-        _ => of_points(purpose, &file, path).map(|(findings, cloud)| (findings, Some(cloud))),
+        Purpose::Checkpoint => of_checkpoint(&file, path).map(|contents| (contents, None)),
+        _ => of_points(purpose, &file, path).map(|(contents, cloud)| (contents, Some(cloud))),
     }
 }
 
-fn of_mesh(purpose: Purpose, path: &Path) -> Result<(Findings, Option<Cloud>), String> {
+fn of_mesh(purpose: Purpose, path: &Path) -> Result<(Contents, Option<Cloud>), String> {
     let size = std::fs::metadata(path).map_err(|error| error.to_string())?.len();
     if size > LARGEST_MESH {
         return Err(format!("a mesh of {size} bytes; at most {LARGEST_MESH} are read"));
     }
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     let mesh = mesh::read(&bytes)?;
-    let is_closed = if mesh.faces.is_empty() { Value::Null } else { json!(mesh.is_closed()) };
-    let extra = json!({"normals": !mesh.normals.is_empty(), "faces": mesh.faces.len(), "is_closed": is_closed});
+    let is_closed = (!mesh.faces.is_empty()).then(|| mesh.is_closed());
+    let faces = FaceContents { faces: mesh.faces.len(), is_closed };
     // Places have no normals.
-    let normals = (purpose == Purpose::Surface && !mesh.normals.is_empty()).then_some(mesh.normals);
+    let is_surface = purpose == Purpose::Surface;
+    let has_normals = !mesh.normals.is_empty();
+    let normals = (is_surface && has_normals).then_some(mesh.normals);
     let cloud = Cloud { positions: mesh.points, level: None, normals };
-    let mut findings = about(&cloud);
-    if let (Value::Object(findings), Value::Object(extra)) = (&mut findings, extra) {
-        findings.extend(extra.into_iter().filter(|_| purpose == Purpose::Surface));
-    }
-    Ok((findings, Some(cloud)))
+    let contents = PointContents {
+        normals: is_surface.then_some(has_normals),
+        faces: is_surface.then_some(faces),
+        ..point_contents(&cloud)
+    };
+    Ok((Contents::Points(contents), Some(cloud)))
 }
 
-/// Number of points, their fields and bounds.
-fn about(cloud: &Cloud) -> Findings {
+/// Number of points, their fields and the box around them.
+fn point_contents(cloud: &Cloud) -> PointContents {
     let bound = |pick: fn(f64, f64) -> f64, start: f64| -> [f64; 3] {
         std::array::from_fn(|d| cloud.positions.iter().map(|x| x[d]).fold(start, pick))
     };
-    let phi = cloud.level.as_ref().map(|_| "phi");
-    let normal = cloud.normals.as_ref().map(|_| "normal");
-    json!({
-        "points": cloud.positions.len(),
-        "fields": phi.into_iter().chain(normal).collect::<Vec<_>>(),
-        "low": bound(f64::min, f64::INFINITY),
-        "high": bound(f64::max, f64::NEG_INFINITY),
-    })
+    let phi = cloud.level.as_ref().map(|_| "phi".to_owned());
+    let normal = cloud.normals.as_ref().map(|_| "normal".to_owned());
+    PointContents {
+        points: cloud.positions.len() as u64,
+        fields: phi.into_iter().chain(normal).collect(),
+        low: bound(f64::min, f64::INFINITY),
+        high: bound(f64::max, f64::NEG_INFINITY),
+        normals: None,
+        faces: None,
+    }
 }
 
-fn of_points(purpose: Purpose, file: &File, path: &Path) -> Result<(Findings, Cloud), String> {
+fn of_points(purpose: Purpose, file: &File, path: &Path) -> Result<(Contents, Cloud), String> {
     let structure = structure::read(file).map_err(|refusal| refusal.to_string())?;
+    let has_normals = check_point_data(purpose, &structure)?;
+    sandbox::shut_the_door(file).map_err(|error| error.to_string())?;
+    let mut cloud = vtkhdf::read_cloud(path).map_err(|error| error.to_string())?;
+    if has_normals {
+        cloud.normals = vtkhdf::read_normals(path).map_err(|error| error.to_string())?;
+    }
+    // Places are asked about: what they may have beside does not matter.
+    cloud.level = cloud.level.filter(|_| purpose == Purpose::Points);
+    check_numbers(&cloud)?;
+    let normals = (purpose == Purpose::Surface).then_some(has_normals);
+    Ok((Contents::Points(PointContents { normals, ..point_contents(&cloud) }), cloud))
+}
+
+/// Checks type and extent of the data sets of points before libhdf5 reads them. Returns whether a surface has normals.
+fn check_point_data(purpose: Purpose, structure: &Structure) -> Result<bool, String> {
     let points = structure.data_sets.get("/VTKHDF/Points").ok_or("there is no data set /VTKHDF/Points")?;
     let [count, 3] = points.extent.as_slice() else {
         return Err(format!("/VTKHDF/Points has the extent {:?}, not [n, 3]", points.extent));
@@ -105,17 +128,14 @@ fn of_points(purpose: Purpose, file: &File, path: &Path) -> Result<(Findings, Cl
         let found = &normal.extent;
         return Err(format!("/VTKHDF/PointData/normal must be [{count}, 3] floating-point numbers, not {found:?}"));
     }
-    let has_normals = normal.is_some();
-    sandbox::shut_the_door(file).map_err(|error| error.to_string())?;
-    let mut cloud = vtkhdf::read_cloud(path).map_err(|error| error.to_string())?;
-    if has_normals {
-        cloud.normals = vtkhdf::read_normals(path).map_err(|error| error.to_string())?;
-    }
+    Ok(normal.is_some())
+}
+
+/// Refuses numbers that are not finite; a level may be missing at some points, where it is NaN.
+fn check_numbers(cloud: &Cloud) -> Result<(), String> {
     if let Some(k) = cloud.positions.iter().position(|x| x.iter().any(|c| !c.is_finite())) {
         return Err(format!("the position of point {k} is not finite"));
     }
-    // Places are asked about: what they may have beside does not matter.
-    cloud.level = cloud.level.filter(|_| purpose == Purpose::Points);
     if let Some(k) = cloud.normals.iter().flatten().position(|n| n.iter().any(|c| !c.is_finite())) {
         return Err(format!("the normal of point {k} is not finite"));
     }
@@ -125,14 +145,10 @@ fn of_points(purpose: Purpose, file: &File, path: &Path) -> Result<(Findings, Cl
     if cloud.level.as_ref().is_some_and(|level| level.iter().all(|level| level.is_nan())) {
         return Err("no point has a phi that is a number".to_owned());
     }
-    let mut findings = about(&cloud);
-    if purpose == Purpose::Surface {
-        findings["normals"] = json!(has_normals);
-    }
-    Ok((findings, cloud))
+    Ok(())
 }
 
-fn of_checkpoint(file: &File, path: &Path) -> Result<Findings, String> {
+fn of_checkpoint(file: &File, path: &Path) -> Result<Contents, String> {
     let structure = structure::read(file).map_err(|refusal| refusal.to_string())?;
     for name in ["/meta", "/meta_sha256"] {
         let text = structure.data_sets.get(name).ok_or_else(|| format!("there is no data set {name}"))?;
@@ -142,18 +158,25 @@ fn of_checkpoint(file: &File, path: &Path) -> Result<Findings, String> {
     }
     sandbox::shut_the_door(file).map_err(|error| error.to_string())?;
     let (meta, state) = checkpoint::read(path, None).map_err(|error| error.to_string())?;
-    let scene = scene::parse(&meta.body["scene"], SCENES).map_err(|found| {
+    let none_of_this_build = |error| format!("its body is none of this build: {error}");
+    let scene = resolved_scene(&meta.body).map_err(none_of_this_build)?;
+    let scene = scene::parse(&scene, SCENES).map_err(|found| {
         let first = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
         format!("its scene is none of this build: {first}")
     })?;
-    RunOptions::from_resolved(&meta.body).map_err(|error| format!("its body is none of this build: {error}"))?;
+    RunOptions::from_resolved(&meta.body).map_err(none_of_this_build)?;
     if !scene.clouds().is_empty() {
         return Err("its scene takes points from elsewhere, which are not part of the checkpoint".to_owned());
     }
-    let arrays: Vec<Value> =
-        meta.arrays.iter().map(|array| json!({"name": array.name, "components": array.components})).collect();
-    Ok(json!({
-        "body": meta.body, "step": state.step, "time": state.time, "isa": meta.isa, "build": meta.build,
-        "job": meta.job, "arrays": arrays,
+    let arrays = meta.arrays.iter();
+    let arrays = arrays.map(|array| ArrayContents { name: array.name.clone(), components: array.components });
+    Ok(Contents::Checkpoint(CheckpointContents {
+        arrays: arrays.collect(),
+        body: meta.body,
+        step: state.step,
+        time: state.time,
+        isa: meta.isa,
+        build: meta.build,
+        job: meta.job,
     }))
 }

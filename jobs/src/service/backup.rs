@@ -4,7 +4,7 @@
 //! after it; what a running service removes in between (an old checkpoint, a deleted job) makes the copy start over.
 
 use crate::service::store::{self, Store, StoreError};
-use crate::spec::attempt_spec::attempt_directory;
+use crate::spec::attempt_files::attempt_directory;
 use crate::system::artifacts;
 use rusqlite::{Connection, OpenFlags};
 use std::fs;

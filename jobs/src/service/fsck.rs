@@ -1,9 +1,9 @@
-//! A look over a data directory that no service is using: whether the store is whole, agrees with itself, and with the
+//! Checks a data directory that no service is using: whether the store is intact, consistent, and in agreement with the
 //! files beside it.
 
 use crate::service::store::uploads::{CLOUD, CONTENT};
 use crate::service::store::{self, JobFilter, JobRow, START_CHECKPOINT, Store, StoreError};
-use crate::spec::attempt_spec::attempt_directory;
+use crate::spec::attempt_files::attempt_directory;
 use crate::spec::states::State;
 use crate::system::digest;
 use crate::system::lock::{DirectoryLock, LockError};
@@ -27,7 +27,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// What was looked at, and what is wrong.
+/// Counts of what was checked, and everything that is wrong.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Findings {
     /// Jobs.
@@ -38,7 +38,7 @@ pub struct Findings {
     pub wrong: Vec<Finding>,
 }
 
-/// Why nothing could be looked at.
+/// Why the check could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FsckError {
     /// A service uses the directory.
@@ -58,7 +58,7 @@ pub enum FsckError {
 /// Rows that are read at once.
 const CHUNK: u64 = 500;
 
-/// Looks over a data directory. Nothing is changed, except that the schema is brought up to date as any start would.
+/// Checks a data directory. Nothing is changed, except that the schema is brought up to date as any start would.
 ///
 /// # Errors
 /// [`FsckError`].
@@ -92,14 +92,16 @@ fn of_job(store: &Store, job: &JobRow, findings: &mut Findings) -> Result<(), Fs
     findings.jobs += 1;
     let mut wrong = Vec::new();
     if job.state.is_terminal() != job.finished_at.is_some() {
-        wrong.push(format!("it is {} and finished at {:?}", job.state.word(), job.finished_at));
+        let finished_at = job.finished_at.as_deref().unwrap_or("no time");
+        wrong.push(format!("it is {} and finished at {finished_at}", job.state.word()));
     }
     if !store.events_are_whole(&job.id)? {
         wrong.push("its events are not numbered from 1 without gaps".to_owned());
     }
-    let told = store.last_told_state(&job.id)?;
-    if told != Some(job.state) {
-        wrong.push(format!("its last event says {:?}, its row {:?}", told.map(State::word), job.state.word()));
+    let last = store.state_of_last_event(&job.id)?;
+    if last != Some(job.state) {
+        let last = last.map_or("no state", State::word);
+        wrong.push(format!("its last event says {last}, its row {}", job.state.word()));
     }
     let directory = store.job_directory(&job.id);
     let listed = store.files(&job.id)?.into_iter().filter(|file| file.content.is_none());
@@ -140,7 +142,7 @@ fn of_uploads(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
             let directory = store.upload_directory(&upload.id);
             let mut wrong: Vec<String> =
                 of_file(&directory.join(CONTENT), CONTENT, upload.size_bytes, &upload.sha256).into_iter().collect();
-            let has_points = upload.found["points"].as_u64().is_some();
+            let has_points = upload.found.as_ref().is_some_and(|found| found.points().is_some());
             if has_points && !directory.join(CLOUD).is_file() {
                 wrong.push("its points are missing".to_owned());
             }
@@ -153,7 +155,7 @@ fn of_uploads(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
     }
 }
 
-/// Directories that belong to nothing. The next start removes them.
+/// Directories that belong to no job and no upload.
 fn of_directories(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
     for path in store.unknown_entries()? {
         let place = path.strip_prefix(store.directory()).unwrap_or(&path).display().to_string();

@@ -1,11 +1,10 @@
-//! The service's side of a check: starts the process that looks, holds it to its time, takes what it says.
+//! The service's side of an inspection: starts the process, limits its time, and takes its result.
 
 use crate::formats::cloud_file;
 use crate::service::store::uploads::{CLOUD, CONTENT};
 use crate::service::store::{Store, UploadRow};
-use crate::spec::uploads::Findings;
+use crate::spec::uploads::{Contents, Inspection};
 use crate::system::artifacts;
-use serde_json::Value;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -15,12 +14,12 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// Time that a check may take.
-const PATIENCE: Duration = Duration::from_secs(90);
-/// Bytes of the line that says what was found, at most.
+/// Time that an inspection may take.
+const TIME_LIMIT: Duration = Duration::from_secs(90);
+/// Longest line with the result, in bytes.
 const LONGEST_LINE: u64 = 4 << 20;
 
-/// Wakes the inspector; dropping all of them ends it.
+/// Wakes the inspector. It ends when all handles are dropped.
 #[derive(Debug, Clone)]
 pub struct InspectorHandle {
     sender: Sender<()>,
@@ -29,27 +28,27 @@ pub struct InspectorHandle {
 impl InspectorHandle {
     /// There is something to look into.
     pub fn wake(&self) {
-        // After the end there is nobody to wake.
+        // After the end there is no receiver.
         let _ = self.sender.send(());
     }
 }
 
-/// Looks into one upload after another, on a thread of its own.
+/// Inspects one upload after another, on a thread of its own.
 ///
 /// # Errors
 /// When the thread cannot be started.
 pub fn start(store: Arc<Store>, program: PathBuf) -> io::Result<InspectorHandle> {
     let (sender, receiver) = channel();
-    std::thread::Builder::new().name("inspector".to_owned()).spawn(move || attend(&store, &program, &receiver))?;
+    std::thread::Builder::new().name("inspector".to_owned()).spawn(move || inspect_all(&store, &program, &receiver))?;
     Ok(InspectorHandle { sender })
 }
 
-fn attend(store: &Store, program: &Path, receiver: &Receiver<()>) {
+fn inspect_all(store: &Store, program: &Path, receiver: &Receiver<()>) {
     loop {
         match store.quarantined_uploads() {
             Ok(waiting) => {
                 for upload in waiting {
-                    look_into(store, program, &upload);
+                    inspect(store, program, &upload);
                 }
             }
             Err(error) => tracing::error!(%error, "uploads could not be listed"),
@@ -61,26 +60,26 @@ fn attend(store: &Store, program: &Path, receiver: &Receiver<()>) {
     }
 }
 
-fn look_into(store: &Store, program: &Path, upload: &UploadRow) {
+fn inspect(store: &Store, program: &Path, upload: &UploadRow) {
     let directory = store.upload_directory(&upload.id);
-    let settled = check(program, upload, &directory).map_err(|error| error.to_string()).and_then(|verdict| {
-        let said = verdict.as_ref().map_or_else(String::as_str, |_| "ready");
-        tracing::info!(upload = upload.id, purpose = upload.purpose.word(), said, "upload checked");
-        store.settle_upload(&upload.id, &verdict).map_err(|error| error.to_string())
+    let finished = check(program, upload, &directory).map_err(|error| error.to_string()).and_then(|verdict| {
+        let outcome = verdict.as_ref().map_or_else(String::as_str, |_| "ready");
+        tracing::info!(upload = upload.id, purpose = upload.purpose.word(), outcome, "upload checked");
+        store.finish_upload(&upload.id, &verdict).map_err(|error| error.to_string())
     });
-    if let Err(error) = settled {
-        // It stays in quarantine and is looked into again.
+    if let Err(error) = finished {
+        // It stays in quarantine and is inspected again.
         tracing::error!(upload = upload.id, error, "an upload could not be checked");
     }
 }
 
-/// What a process of its own finds in an upload.
-fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Result<Findings, String>> {
+/// Inspects an upload in a process of its own.
+fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Result<Contents, String>> {
     let mut child = Command::new(program)
         .arg0("meniscus")
         .args(["inspect", "--as", upload.purpose.word()])
         .arg(directory.join(CONTENT))
-        // Nothing of our surroundings reaches libhdf5: no plug-in path, no driver of another name.
+        // No variable of this process reaches libhdf5: no plug-in path, no driver of another name.
         .env_clear()
         .env("HDF5_PLUGIN_PRELOAD", "::")
         .stdin(Stdio::null())
@@ -94,7 +93,7 @@ fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Res
         // The other side may have given up waiting.
         let _ = sender.send(take(output, &target));
     })?;
-    let taken = receiver.recv_timeout(PATIENCE);
+    let taken = receiver.recv_timeout(TIME_LIMIT);
     let is_late = taken.is_err();
     if is_late {
         child.kill()?;
@@ -104,7 +103,7 @@ fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Res
         let _ = reading.join();
     }
     if is_late {
-        return Ok(Err(format!("looking into it took longer than {} s", PATIENCE.as_secs())));
+        return Ok(Err(format!("looking into it took longer than {} s", TIME_LIMIT.as_secs())));
     }
     if let Some(signal) = status.signal() {
         return Ok(Err(format!("looking into it took more memory or time than is granted (signal {signal})")));
@@ -116,16 +115,15 @@ fn check(program: &Path, upload: &UploadRow, directory: &Path) -> io::Result<Res
 }
 
 /// Takes the line and puts the points behind it, if there are any, into a file.
-fn take(output: impl Read, target: &Path) -> io::Result<Result<Findings, String>> {
+fn take(output: impl Read, target: &Path) -> io::Result<Result<Contents, String>> {
     let mut output = BufReader::new(output);
     let mut line = Vec::new();
     (&mut output).take(LONGEST_LINE).read_until(b'\n', &mut line)?;
-    let Ok(mut said) = serde_json::from_slice::<Value>(&line) else {
-        return Ok(Err("looking into it failed".to_owned()));
+    let contents = match serde_json::from_slice(&line) {
+        Ok(Inspection::Ready(contents)) => contents,
+        Ok(Inspection::Rejected(reason)) => return Ok(Err(reason)),
+        Err(_) => return Ok(Err("looking into it failed".to_owned())),
     };
-    if let Some(reason) = said["rejected"].as_str() {
-        return Ok(Err(reason.to_owned()));
-    }
     if !output.fill_buf()?.is_empty() {
         let mut file = File::create(artifacts::unfinished(target))?;
         let written = io::copy(&mut output.take(cloud_file::MOST_BYTES), &mut file)
@@ -133,12 +131,12 @@ fn take(output: impl Read, target: &Path) -> io::Result<Result<Findings, String>
             .and_then(|()| artifacts::finish(target));
         if let Err(error) = written {
             let _ = std::fs::remove_file(artifacts::unfinished(target));
-            // Waiting for room would keep the upload itself from being deleted.
+            // An upload that waits for space could not be deleted.
             if crate::system::process::is_out_of_space(&error) {
                 return Ok(Err("there was no room on the disk for its points; delete it and send it again".to_owned()));
             }
             return Err(error);
         }
     }
-    Ok(Ok(said["ready"].take()))
+    Ok(Ok(contents))
 }

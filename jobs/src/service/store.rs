@@ -3,9 +3,9 @@
 //! One connection writes, under a lock; a few others read. Every change of a job is a compare-and-set on its `rev`
 //! inside a transaction that also writes the event, so what a client saw and what the file says never differ.
 
-pub mod answers;
+pub mod idempotency;
 pub mod calibration;
-pub mod census;
+pub mod statistics;
 pub mod events;
 pub mod ids;
 pub mod import;
@@ -14,15 +14,16 @@ pub mod listing;
 pub mod migrations;
 pub mod retention;
 pub mod rows;
-pub mod settle;
+pub mod finish_attempt;
 pub mod studies;
+mod study_limits;
 pub mod submission;
-mod together;
+mod group_commit;
 pub mod transitions;
 pub mod uploads;
 
-pub use answers::{KeptAnswer, Made, Once};
 pub use events::Event;
+pub use idempotency::{IdempotencyKey, Made, Receipt};
 pub use listing::JobFilter;
 pub use rows::{CheckpointRow, FileRow, JobRow};
 pub use studies::{NewStudy, PointRow, StudyRow};
@@ -30,7 +31,7 @@ pub use submission::{NewJob, START_CHECKPOINT};
 pub use transitions::{Change, ChangeError};
 pub use uploads::{NewUpload, UploadRow};
 
-use crate::spec::body::{Origin, RestartSource};
+use crate::spec::body::{Origin, RestartSource, resolved_scene};
 use crate::spec::states::State;
 use ids::RisingIds;
 use rusqlite::config::DbConfig;
@@ -45,13 +46,13 @@ use ulid::Ulid;
 
 /// Name of the file in the data directory.
 pub const FILE_NAME: &str = "meniscus.sqlite";
-/// Size of the log from which on it is trimmed.
+/// Size from which on the log is trimmed while there are no writers.
 const LONG_LOG_BYTES: u64 = 2 << 20;
-/// Size from which on it is trimmed though somebody writes.
+/// Size from which on the log is trimmed even while there are writers.
 const LONGEST_LOG_BYTES: u64 = 128 << 20;
-/// Pages of the log at which a commit trims it after all.
+/// Pages of the log at which a commit itself trims it.
 const LONGEST_LOG_PAGES: i64 = 65_536;
-/// Connections for reading.
+/// Number of connections for reading.
 const READERS: usize = 4;
 
 /// The store of a data directory.
@@ -59,10 +60,10 @@ pub struct Store {
     directory: PathBuf,
     writer: Arc<Mutex<Connection>>,
     /// Small transactions that wait for the writer.
-    waiting: Mutex<Sender<together::Waiting>>,
+    waiting: Mutex<Sender<group_commit::Waiting>>,
     readers: Vec<Mutex<Connection>>,
     next_reader: std::sync::atomic::AtomicUsize,
-    /// Trims the log.
+    /// Connection that trims the log.
     trimmer: Mutex<Connection>,
     ids: RisingIds,
     /// Counts changes; waiting clients watch it.
@@ -86,8 +87,8 @@ pub enum StoreError {
     UploadGone,
     /// A transaction that was shared with others failed.
     #[error("the store failed: {0}")]
-    Together(String),
-    /// A row does not say what it should.
+    GroupCommit(String),
+    /// A stored value cannot be read.
     #[error("a stored value is unreadable: {0}")]
     Json(#[from] serde_json::Error),
     /// The file was written by a later version of the program.
@@ -116,7 +117,7 @@ impl Store {
         let readers = (0..READERS).map(|_| connect(&path).map(Mutex::new)).collect::<Result<_, _>>()?;
         Ok(Self {
             directory: directory.to_owned(),
-            waiting: together::start(Arc::clone(&writer), changes.clone())?,
+            waiting: group_commit::start(Arc::clone(&writer), changes.clone())?,
             writer,
             readers,
             next_reader: std::sync::atomic::AtomicUsize::new(0),
@@ -138,7 +139,7 @@ impl Store {
         &self.directory
     }
 
-    /// Tells of every committed change.
+    /// A counter that rises with every committed change.
     #[must_use]
     pub fn watch(&self) -> watch::Receiver<u64> {
         self.changes.subscribe()
@@ -172,7 +173,7 @@ impl Store {
         self.ids.next()
     }
 
-    /// What tells two versions of a job apart: its revision and the count of its progress.
+    /// Revision of a job and count of its progress: they differ between any two versions of it.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -184,8 +185,8 @@ impl Store {
             .optional()?)
     }
 
-    /// Brings what the log has into the store's file while nobody writes: commits beside it would be late. Only a very long
-    /// log is trimmed in any case.
+    /// Moves the log into the store's file while there are no writers, whose commits would wait. Only a very long log is
+    /// trimmed in any case.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -248,13 +249,9 @@ impl Store {
         let Some(row) = rows::checkpoint(&connection, checkpoint)? else {
             return Ok(None);
         };
-        let job = rows::job(&connection, &row.job)?;
-        Ok(job.map(|job| RestartSource {
-            origin: Origin::Checkpoint(row.id),
-            scene: job.resolved["scene"].clone(),
-            isa: row.isa,
-            step: row.step,
-        }))
+        let Some(job) = rows::job(&connection, &row.job)? else { return Ok(None) };
+        let (origin, scene) = (Origin::Checkpoint(row.id), resolved_scene(&job.resolved)?);
+        Ok(Some(RestartSource { origin, scene, isa: row.isa, step: row.step }))
     }
 
     /// Deletes a job in a terminal state and its files; false where it is in another state.

@@ -1,17 +1,20 @@
-//! The supervisor: one thread of the service that starts workers, imports what they say, holds them to their limits
-//! and settles how they ended. It also brings unfinished jobs to a legal state when the service starts.
+//! The supervisor: one thread of the service that starts workers, imports their records, holds them to their limits and
+//! finishes their attempts. It also brings unfinished jobs to a legal state when the service starts.
 
 mod leftovers;
 mod limits;
+mod recovery;
+mod starting;
 
-use crate::service::executor::{Executor, Worker};
+use crate::service::executor::{EndCause, Executor, Worker};
+use crate::service::store::finish_attempt::LossCause;
 use crate::service::store::import::{Imported, ProgressPace};
-use crate::service::store::settle::Loss;
-use crate::service::store::{Change, ChangeError, JobRow, START_CHECKPOINT, Store, StoreError};
-use crate::spec::attempt_spec::{self, Order, StartCheckpoint, attempt_directory};
+use crate::service::store::{Change, ChangeError, Store, StoreError};
+use crate::spec::attempt_files::attempt_directory;
 use crate::spec::records::Usage;
+use crate::spec::requests::Request;
 use crate::spec::run_options::RunOptions;
-use crate::spec::states::{Reason, State, Trigger};
+use crate::spec::states::{Reason, Trigger};
 use crate::system::breakpoints::pass;
 use crate::system::process;
 use std::sync::Arc;
@@ -28,9 +31,9 @@ pub struct Settings {
     pub slots: usize,
     /// Term of a lease: a worker without a sign of life for so long is ended.
     pub lease: Duration,
-    /// A canceled worker that has not gone after so long is ended.
+    /// A canceled worker that has not ended after so long is killed.
     pub cancel_grace: Duration,
-    /// A pausing worker that has not gone after so long is ended.
+    /// A pausing worker that has not ended after so long is killed.
     pub pause_grace: Duration,
     /// Free space that new attempts leave untouched.
     pub disk_reserve_bytes: u64,
@@ -59,16 +62,16 @@ enum Message {
     Shutdown,
 }
 
-/// Speaks to the supervisor's thread.
+/// Sends messages to the supervisor's thread.
 #[derive(Debug, Clone)]
 pub struct SupervisorHandle {
     sender: Sender<Message>,
 }
 
 impl SupervisorHandle {
-    /// There is something to do.
+    /// Starts a round now: there may be something to do.
     pub fn wake(&self) {
-        // After a shutdown there is nobody to wake.
+        // After a shutdown there is no receiver.
         let _ = self.sender.send(Message::News);
     }
 
@@ -83,7 +86,7 @@ impl SupervisorHandle {
     }
 }
 
-/// A worker and what is known of it.
+/// A worker and the attempt that it runs.
 struct Running {
     job: String,
     epoch: u64,
@@ -91,14 +94,16 @@ struct Running {
     options: RunOptions,
     pace: ProgressPace,
     began: Instant,
+    /// Cost of the job when this service began to watch the worker.
     usage_before: Usage,
+    /// Running time of the job at its last resume, in seconds.
     leg_wall_s: f64,
-    told_pause: Option<Instant>,
-    told_cancel: Option<Instant>,
-    /// When its verdict came; the process is to end soon after.
+    pause_sent: Option<Instant>,
+    cancel_sent: Option<Instant>,
+    /// Time at which its verdict came; the process is to end soon after.
     verdict_since: Option<Instant>,
-    /// Memory that it was admitted with.
-    memory_bytes: u64,
+    /// Memory that was reserved for it.
+    reserved_bytes: u64,
     disk_checked: Instant,
     lease_renewed: Instant,
 }
@@ -111,32 +116,31 @@ pub struct Supervisor {
     running: Vec<Running>,
     sender: Sender<Message>,
     receiver: Receiver<Message>,
-    draining: bool,
+    /// Time at which a shutdown ends even if workers still run; None while there is no shutdown.
+    drain_until: Option<Instant>,
     space_checked: Instant,
-    /// When what is too old was last looked for.
+    /// Last search for jobs that are kept no longer.
     expired: Option<Instant>,
     /// Whether something failed in this round.
-    is_troubled: bool,
-    /// No worker is started before this time, after one could not be.
+    round_failed: bool,
+    /// No worker is started before this time, after one could not be started.
     start_again: Instant,
 }
 
-/// Time between two looks at workers without news.
+/// Time between two rounds without messages.
 const TICK: Duration = Duration::from_millis(100);
 /// Least time between two rounds.
-const BREATH: Duration = Duration::from_millis(10);
+const ROUND_INTERVAL: Duration = Duration::from_millis(10);
 /// Time that running jobs have to checkpoint at a shutdown.
 const DRAIN: Duration = Duration::from_secs(15);
 /// Time that a worker has to end after its verdict.
-const LAST_WORDS: Duration = Duration::from_secs(5);
-/// Free space below which a worker's last words may not have been written.
-const ROOM_FOR_A_VERDICT: u64 = 1 << 20;
+const TIME_TO_EXIT: Duration = Duration::from_secs(5);
+/// Free space below which a worker may not have been able to write its verdict.
+const VERDICT_BYTES: u64 = 1 << 20;
 /// Time without rounds after one in which something failed.
-const TROUBLE_PAUSE: Duration = Duration::from_millis(400);
-/// Time between two looks for what is kept no longer.
+const FAILURE_PAUSE: Duration = Duration::from_millis(400);
+/// Time between two searches for jobs that are kept no longer.
 const EXPIRY_INTERVAL: Duration = Duration::from_secs(600);
-/// Time without starts after one that failed.
-const START_PAUSE: Duration = Duration::from_secs(1);
 
 impl Supervisor {
     /// A supervisor that has done nothing yet.
@@ -151,126 +155,92 @@ impl Supervisor {
             running: Vec::new(),
             sender,
             receiver,
-            draining: false,
+            drain_until: None,
             space_checked: now,
             expired: None,
-            is_troubled: false,
+            round_failed: false,
             start_again: now,
         }
     }
 
-    /// How others speak to it.
+    /// The handle by which other threads send messages.
     #[must_use]
     pub fn handle(&self) -> SupervisorHandle {
         SupervisorHandle { sender: self.sender.clone() }
     }
 
-    /// Brings every job that had a worker to a legal state and names what the database does not know. To be done before the service is
-    /// ready. A restart of the service never counts as a death.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn recover(&self) -> Result<(), StoreError> {
-        for job in self.store.unfinished_attempts()? {
-            self.end_orphan(&job);
-            // What the worker managed to say before counts, its verdict above all. Records that cannot be read are as
-            // good as none: the job goes on from its last checkpoint.
-            let imported = self.store.import(&job.id, job.attempt, &mut ProgressPace::default());
-            let cleared = imported.and_then(|_| leftovers::remove(&self.store, &job.id, job.attempt));
-            if let Err(error) = cleared {
-                tracing::error!(job = job.id, %error, "records could not be imported or leftovers not removed");
-            }
-            self.store.settle(&job.id, job.attempt, Loss { reason: Reason::ServerRestart, is_death: false })?;
-            tracing::info!(job = job.id, attempt = job.attempt, "recovered");
-        }
-        for path in self.store.unknown_entries()? {
-            tracing::warn!(path = %path.display(), "not in the database; left where it is");
-        }
-        Ok(())
-    }
-
-    /// Ends a worker that outlived its service. It could not be believed any more, but it would use the machine.
-    fn end_orphan(&self, job: &JobRow) {
-        let Some(pid) = job.worker_pid else { return };
-        let directory = attempt_directory(&self.store.job_directory(&job.id), job.attempt);
-        let command = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        let wanted = directory.as_os_str().as_encoded_bytes();
-        let is_ours = command.windows(wanted.len().max(1)).any(|window| window == wanted);
-        if is_ours && let Some(pid) = rustix::process::Pid::from_raw(pid.cast_signed()) {
-            // It may have gone by itself in between.
-            let _ = rustix::process::kill_process(pid, rustix::process::Signal::KILL);
-        }
-    }
-
     /// Works until it is told to shut down.
     pub fn run(mut self) {
-        let mut drain_until = None;
         loop {
-            let wait = if self.running.is_empty() { 5 * TICK } else { TICK };
-            let first = self.receiver.recv_timeout(wait);
-            // A thousand submissions in a second are a hundred rounds, not a thousand.
-            std::thread::sleep(BREATH);
-            let mut messages: Vec<Message> = self.receiver.try_iter().collect();
-            match first {
-                Ok(message) => messages.push(message),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => messages.push(Message::Shutdown),
-            }
-            for message in messages {
-                match message {
-                    Message::News => {}
-                    Message::Checkpoint(job) => {
-                        if let Some(running) = self.running.iter_mut().find(|r| r.job == job) {
-                            running.worker.say("checkpoint");
-                        }
-                    }
-                    Message::Shutdown => {
-                        self.draining = true;
-                        drain_until = Some(Instant::now() + DRAIN);
-                    }
-                }
-            }
-            if let Err(error) = self.tick() {
+            self.take_messages();
+            if let Err(error) = self.round() {
                 tracing::error!(%error, "the supervisor could not finish its round");
-                self.is_troubled = true;
+                self.round_failed = true;
             }
-            if std::mem::take(&mut self.is_troubled) {
+            if std::mem::take(&mut self.round_failed) {
                 // What failed once a tenth of a second ago fails again now.
-                std::thread::sleep(TROUBLE_PAUSE);
+                std::thread::sleep(FAILURE_PAUSE);
             }
-            if self.draining && (self.running.is_empty() || drain_until.is_some_and(|end| Instant::now() >= end)) {
+            if self.drain_until.is_some_and(|end| self.running.is_empty() || Instant::now() >= end) {
                 return;
             }
         }
     }
 
-    /// One round: hear, hold to limits, settle, start.
-    fn tick(&mut self) -> Result<(), StoreError> {
-        let mut ended = Vec::new();
-        for k in 0..self.running.len() {
-            match self.attend(k) {
-                Ok(false) => {}
-                Ok(true) => ended.push(k),
-                // One job's trouble is not another's.
-                Err(error) => {
-                    tracing::error!(job = self.running[k].job, %error, "a worker could not be attended");
-                    self.is_troubled = true;
+    /// Waits for messages, at most until the next round is due, and takes all that have come.
+    fn take_messages(&mut self) {
+        let wait = if self.running.is_empty() { 5 * TICK } else { TICK };
+        let first = self.receiver.recv_timeout(wait);
+        // A thousand submissions in a second are a hundred rounds, not a thousand.
+        std::thread::sleep(ROUND_INTERVAL);
+        let mut messages: Vec<Message> = self.receiver.try_iter().collect();
+        match first {
+            Ok(message) => messages.push(message),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => messages.push(Message::Shutdown),
+        }
+        for message in messages {
+            match message {
+                Message::News => {}
+                Message::Checkpoint(job) => {
+                    if let Some(running) = self.running.iter_mut().find(|running| running.job == job) {
+                        running.worker.send(Request::Checkpoint);
+                    }
                 }
+                Message::Shutdown => self.drain_until = Some(Instant::now() + DRAIN),
             }
         }
-        for k in ended.into_iter().rev() {
-            self.running.swap_remove(k);
+    }
+
+    /// Whether a shutdown has begun.
+    fn is_draining(&self) -> bool {
+        self.drain_until.is_some()
+    }
+
+    /// One round: import records, hold workers to their limits, finish attempts, start workers.
+    fn round(&mut self) -> Result<(), StoreError> {
+        for mut running in std::mem::take(&mut self.running) {
+            match self.watch(&mut running) {
+                Ok(true) => continue,
+                Ok(false) => {}
+                // A failure of one job is not one of the others.
+                Err(error) => {
+                    tracing::error!(job = running.job, %error, "a worker could not be watched");
+                    self.round_failed = true;
+                }
+            }
+            self.running.push(running);
         }
         self.store.stop_failed_studies()?;
         self.expire()?;
-        if !self.draining && Instant::now() >= self.start_again {
+        if !self.is_draining() && Instant::now() >= self.start_again {
             self.resume_when_space_is_back()?;
             while self.running.len() < self.settings.slots && self.start_next()? {}
         }
         Ok(())
     }
 
-    /// Deletes what is kept no longer, every now and then.
+    /// Deletes, from time to time, jobs that are kept no longer.
     fn expire(&mut self) -> Result<(), StoreError> {
         if self.expired.is_some_and(|last| last.elapsed() < EXPIRY_INTERVAL) {
             return Ok(());
@@ -278,60 +248,62 @@ impl Supervisor {
         self.expired = Some(Instant::now());
         let gone = self.store.expire(self.settings.retention_days)?;
         if gone > 0 {
-            // There may be more; workers are attended in between.
+            // There may be more; workers are watched in between.
             self.expired = None;
             tracing::info!(gone, "jobs were kept long enough and are deleted");
         }
         Ok(())
     }
 
-    /// Looks after one worker; true when it has ended and is settled.
-    fn attend(&mut self, k: usize) -> Result<bool, StoreError> {
-        let running = &mut self.running[k];
-        // The exit is noted before the last import, so that nothing written before it is missed.
-        let exit = running.worker.poll()?;
-        // Records that cannot be read are as good as none; limits and the end are looked after all the same.
+    /// Watches one worker; true when it has ended and its attempt is finished.
+    fn watch(&self, running: &mut Running) -> Result<bool, StoreError> {
+        // The end is noted before the last import, so that nothing written before it is missed.
+        let end = running.worker.poll()?;
+        // Records that cannot be read are as good as none; limits and the end are watched all the same.
         let imported = self.store.import(&running.job, running.epoch, &mut running.pace).unwrap_or_else(|error| {
             tracing::error!(job = running.job, %error, "records could not be imported");
             Imported { is_whole: false, ..Imported::default() }
         });
         if imported.has_checkpoint {
-            self.prune_checkpoints(k)?;
+            self.prune_checkpoints(running)?;
         }
-        let running = &mut self.running[k];
-        if let Some(exit) = exit {
-            // Without room a worker cannot leave a verdict either.
-            let is_full = process::free_space(self.store.directory()).is_some_and(|free| free < ROOM_FOR_A_VERDICT);
-            let loss = match (exit.out_of_memory, is_full) {
-                (true, _) => Loss { reason: Reason::WorkerOom, is_death: true },
-                (false, true) => Loss { reason: Reason::StorageEnospc, is_death: false },
-                (false, false) => Loss { reason: Reason::WorkerCrash, is_death: true },
-            };
-            if imported.is_whole {
-                leftovers::remove(&self.store, &running.job, running.epoch)?;
-            }
-            self.book_disk(k)?;
-            let running = &self.running[k];
-            self.store.settle(&running.job, running.epoch, loss)?;
-            tracing::info!(job = running.job, attempt = running.epoch, ?exit, "worker ended");
+        if let Some(cause) = end {
+            self.finish(running, cause, imported.is_whole)?;
             return Ok(true);
         }
         if imported.verdict.is_some() {
             running.verdict_since = Some(Instant::now());
         }
-        if let Some(since) = running.verdict_since {
-            if since.elapsed() >= LAST_WORDS {
-                running.worker.kill();
-            }
-            return Ok(false);
+        match running.verdict_since {
+            Some(since) if since.elapsed() >= TIME_TO_EXIT => running.worker.kill(),
+            Some(_) => {}
+            None => self.hold_to_limits(running)?,
         }
-        self.hold_to_limits(k)?;
         Ok(false)
     }
 
+    /// Finishes the attempt of a worker that has ended.
+    fn finish(&self, running: &Running, cause: EndCause, is_whole: bool) -> Result<(), StoreError> {
+        // On a full device a worker cannot leave a verdict either.
+        let is_full = process::free_space(self.store.directory()).is_some_and(|free| free < VERDICT_BYTES);
+        let loss = match cause {
+            EndCause::OutOfMemory => LossCause { reason: Reason::WorkerOom, is_death: true },
+            _ if is_full => LossCause { reason: Reason::StorageEnospc, is_death: false },
+            EndCause::Exited { .. } | EndCause::Signaled { .. } => {
+                LossCause { reason: Reason::WorkerCrash, is_death: true }
+            }
+        };
+        if is_whole {
+            leftovers::remove(&self.store, &running.job, running.epoch)?;
+        }
+        self.book_disk(running)?;
+        self.store.finish_attempt(&running.job, running.epoch, loss)?;
+        tracing::info!(job = running.job, attempt = running.epoch, ?cause, "worker ended");
+        Ok(())
+    }
+
     /// Removes checkpoints beyond those to keep.
-    fn prune_checkpoints(&self, k: usize) -> Result<(), StoreError> {
-        let running = &self.running[k];
+    fn prune_checkpoints(&self, running: &Running) -> Result<(), StoreError> {
         pass("checkpoint/imported");
         let directory = self.store.job_directory(&running.job);
         for old in self.store.prune_checkpoints(&running.job, running.options.checkpoint.keep as usize)? {
@@ -344,116 +316,15 @@ impl Supervisor {
     }
 
     /// Books the size of a job's files.
-    fn book_disk(&self, k: usize) -> Result<(), StoreError> {
-        let running = &self.running[k];
+    fn book_disk(&self, running: &Running) -> Result<(), StoreError> {
         let Some(row) = self.store.job(&running.job)? else { return Ok(()) };
         let disk_bytes = process::directory_bytes(&self.store.job_directory(&running.job));
         self.store.book_usage(&running.job, running.epoch, &Usage { disk_bytes, ..row.usage })
     }
 
-    /// Takes and starts the next job of the queue; false when there is none that fits.
-    fn start_next(&mut self) -> Result<bool, StoreError> {
-        let free = process::free_space(self.store.directory()).unwrap_or(u64::MAX);
-        let room = free.saturating_sub(self.settings.disk_reserve_bytes);
-        // Workers that have just started have not taken their memory yet.
-        let promised: u64 = self
-            .running
-            .iter()
-            .map(|r| r.memory_bytes.saturating_sub(process::resident_bytes(r.worker.pid()).unwrap_or(0)))
-            .sum();
-        let available = process::available_memory().unwrap_or(u64::MAX).saturating_sub(promised);
-        // A job that alone is too large for this machine was refused at submission; it is not left waiting for ever.
-        let is_alone = self.running.is_empty();
-        let fits = |memory: u64, disk: u64| disk <= room && (is_alone || memory <= available);
-        let Some(job) = self.store.claim(fits)? else { return Ok(false) };
-        let Err(error) = self.start(&job) else { return Ok(true) };
-        tracing::error!(job = job.id, %error, "a worker could not be started");
-        self.start_again = Instant::now() + START_PAUSE;
-        if process::is_out_of_space(&error) {
-            let change = Change { reason: Some(Reason::StorageEnospc), message: None, epoch: Some(job.attempt) };
-            self.store_change(&job.id, Trigger::Pause, &change)?;
-        }
-        self.store.settle(&job.id, job.attempt, Loss { reason: Reason::StorageIo, is_death: true })?;
-        Ok(false)
-    }
-
-    fn start(&mut self, job: &JobRow) -> std::io::Result<()> {
-        let options = RunOptions::from_resolved(&job.resolved)?;
-        let job_directory = self.store.job_directory(&job.id);
-        let directory = attempt_directory(&job_directory, job.attempt);
-        std::fs::create_dir_all(&directory)?;
-        let order = self.order(job).map_err(std::io::Error::other)?;
-        crate::system::artifacts::write(&directory.join(attempt_spec::FILE_NAME), &serde_json::to_vec_pretty(&order)?)?;
-        let sender = self.sender.clone();
-        let news = Box::new(move || {
-            let _ = sender.send(Message::News);
-        });
-        let worker = self.executor.start(&directory, options.limits.memory_bytes, news)?;
-        tracing::info!(job = job.id, attempt = job.attempt, pid = worker.pid(), "worker started");
-        let now = Instant::now();
-        let until = limits::lease_end(self.settings.lease);
-        self.store.lease(&job.id, job.attempt, worker.pid(), &until).map_err(std::io::Error::other)?;
-        self.running.push(Running {
-            job: job.id.clone(),
-            epoch: job.attempt,
-            worker,
-            options,
-            pace: ProgressPace::default(),
-            began: now,
-            usage_before: job.usage,
-            leg_wall_s: job.leg_wall_s,
-            told_pause: None,
-            told_cancel: None,
-            verdict_since: None,
-            memory_bytes: job.estimate["memory_bytes"].as_u64().unwrap_or(0),
-            disk_checked: now,
-            lease_renewed: now,
-        });
-        Ok(())
-    }
-
-    /// What the worker needs to know: the job's own checkpoints newest first, then the one it was made from.
-    fn order(&self, job: &JobRow) -> Result<Order, StoreError> {
-        let job_directory = self.store.job_directory(&job.id);
-        let allow_other_isa = job.spec["restart"]["allow_other_isa"] == true;
-        let mut checkpoints: Vec<StartCheckpoint> = self
-            .store
-            .checkpoints(&job.id)?
-            .into_iter()
-            .map(|row| StartCheckpoint {
-                path: attempt_directory(&job_directory, row.attempt).join(&row.path),
-                id: row.id,
-                sha256: Some(row.sha256),
-                is_own: true,
-                allow_other_isa: false,
-            })
-            .collect();
-        if let Some(id) = &job.restarted_from {
-            checkpoints.push(StartCheckpoint {
-                id: id.clone(),
-                path: job_directory.join(START_CHECKPOINT),
-                sha256: job.restart_sha256.clone(),
-                is_own: false,
-                allow_other_isa,
-            });
-        }
-        Ok(Order {
-            job: job.id.clone(),
-            epoch: job.attempt,
-            body: job.resolved.clone(),
-            attempts_directory: job_directory.join("attempts"),
-            checkpoints,
-            may_start_afresh: job.restarted_from.is_none(),
-            inputs: self.store.inputs(&job.id)?,
-            time: serde_json::from_value(job.estimate["time"].clone()).unwrap_or_default(),
-            reserve_bytes: self.settings.disk_reserve_bytes,
-            usage: job.usage,
-        })
-    }
-
     /// Applies a trigger; a job that has moved on in between is no error.
-    fn store_change(&self, job: &str, trigger: Trigger, what: &Change) -> Result<(), StoreError> {
-        match self.store.change(job, trigger, what) {
+    fn change(&self, job: &str, trigger: Trigger, change: &Change) -> Result<(), StoreError> {
+        match self.store.change(job, trigger, change) {
             Err(ChangeError::Store(error)) => Err(error),
             Err(error) => {
                 tracing::debug!(job, %error, "a change came too late");
@@ -461,11 +332,6 @@ impl Supervisor {
             }
             Ok(_) => Ok(()),
         }
-    }
-
-    /// The state of a job as the store has it.
-    fn state_of(&self, job: &str) -> Result<Option<State>, StoreError> {
-        Ok(self.store.job(job)?.map(|row| row.state))
     }
 }
 

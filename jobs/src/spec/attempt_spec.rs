@@ -1,18 +1,15 @@
-//! The order that a worker gets: `attempt.json` in the attempt's directory.
+//! The specification of an attempt, from which a worker learns what to do: `attempt.json` in the attempt's directory.
 
-use crate::spec::forecast::TimeForecast;
+use crate::spec::calibration::TimeForecast;
 use crate::spec::records::Usage;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Name of the file.
-pub const FILE_NAME: &str = "attempt.json";
-
 /// Everything that a worker needs to know.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Order {
+pub struct AttemptSpec {
     /// The job.
     pub job: String,
     /// The attempt's number, the fence of its records.
@@ -51,10 +48,4 @@ pub struct StartCheckpoint {
     pub is_own: bool,
     /// Whether another instruction set is acceptable.
     pub allow_other_isa: bool,
-}
-
-/// The directory of one attempt.
-#[must_use]
-pub fn attempt_directory(job_directory: &std::path::Path, epoch: u64) -> PathBuf {
-    job_directory.join("attempts").join(epoch.to_string())
 }

@@ -5,8 +5,8 @@ mod restart;
 mod sources;
 
 pub use fields::{Labels, Name, Priority};
-pub use restart::{Origin, RestartSource, RestartSpec};
-pub use sources::{NoSources, Sources};
+pub use restart::RestartSpec;
+pub use sources::{BodyError, NoSources, Origin, RestartSource, Sources};
 
 use crate::spec::forecast::{self, Forecast, WORKER_BASE_BYTES};
 use crate::spec::run_options::{CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions};
@@ -46,7 +46,7 @@ pub struct Allowance {
     pub threads: u64,
     /// Memory a job may ask for, in bytes; also the default.
     pub memory_bytes: u64,
-    /// Whether scenes may name files of this machine: a person who runs them in the foreground may read those anyway.
+    /// Whether scenes may name files of this machine, as in the foreground, where the user may read those anyway.
     pub local_files: bool,
 }
 
@@ -78,6 +78,18 @@ impl ResolvedBody {
     }
 }
 
+/// The scene of a resolved body as it stands in a row or in a checkpoint, of earlier builds too.
+///
+/// # Errors
+/// When it has none.
+pub fn resolved_scene(body: &Value) -> Result<Value, serde_json::Error> {
+    #[derive(Deserialize)]
+    struct SceneAlone {
+        scene: Value,
+    }
+    SceneAlone::deserialize(body).map(|body| body.scene)
+}
+
 /// A valid job body with every default, and its scene.
 pub struct JobBody {
     /// The body as sent.
@@ -102,19 +114,19 @@ pub struct JobBody {
 /// what the scene and the machine allow. `sources` knows the checkpoints and uploads that a body may name.
 ///
 /// # Errors
-/// All of them at once, with pointers from the body's root.
-pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Result<JobBody, Vec<Violation>> {
+/// Everything that is wrong at once, with pointers from the body's root, or a failed look-up.
+pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Result<JobBody, BodyError<S::Error>> {
     let Value::Object(object) = spec else {
         let allowed = "an object with a scene";
-        return Err(vec![Violation::new("", "type", "a job is an object", spec.clone(), allowed)]);
+        return Err(vec![Violation::new("", "type", "a job is an object", spec.clone(), allowed)].into());
     };
     let mut errors = Vec::new();
     group::check_names(object, &JobSpec::names(), "", &mut errors);
     let parsed = JobSpec::parse_fields(object, "", &mut errors);
     // What follows reads single fields, so that an error in one of them does not hide those of others.
     let given = Given::new(object);
-    let start = start(given, sources, &mut errors);
-    let (scene, uploads, sizes) = planned_scene(&start, allowance, sources, &mut errors);
+    let start = start(given, sources, &mut errors).map_err(BodyError::Lookup)?;
+    let (scene, uploads, sizes) = planned_scene(&start, allowance, sources, &mut errors).map_err(BodyError::Lookup)?;
     let fields = field_names(given, scene.as_deref(), &mut errors);
     let limits = limits(given, allowance, &mut errors);
     let estimate = scene.as_ref().map(|scene| scene.estimate(&sizes));
@@ -125,10 +137,10 @@ pub fn parse(spec: &Value, allowance: Allowance, sources: &dyn Sources) -> Resul
         errors.extend(check_end(source, &estimate));
     }
     let (Some(parsed), Some(scene), Some(estimate), Some(limits)) = (parsed, scene, estimate, limits) else {
-        return Err(errors);
+        return Err(errors.into());
     };
     if !errors.is_empty() {
-        return Err(errors);
+        return Err(errors.into());
     }
     let options = run_options(&parsed, fields, limits);
     let forecast = forecast(scene.as_ref(), estimate, &options);
@@ -152,10 +164,10 @@ struct SceneStart {
     prefix: &'static str,
 }
 
-fn start(given: Given, sources: &dyn Sources, errors: &mut Vec<Violation>) -> SceneStart {
+fn start<S: Sources>(given: Given, sources: &S, errors: &mut Vec<Violation>) -> Result<SceneStart, S::Error> {
     let scene = given.read(JobSpec::scene()).and_then(|raw| raw.0);
     let own = |scene| SceneStart { scene, source: None, prefix: "/scene" };
-    match (scene, given.has(JobSpec::restart())) {
+    Ok(match (scene, given.has(JobSpec::restart())) {
         (None, false) => {
             let (detail, allowed) = ("a job names a scene or a restart", "an object with a kind");
             errors.push(Violation::new("/scene", "required", detail, Value::Null, allowed));
@@ -173,27 +185,30 @@ fn start(given: Given, sources: &dyn Sources, errors: &mut Vec<Violation>) -> Sc
                 let allowed = json!({"checkpoint": "ckpt_…"});
                 errors.push(Violation::new("/restart", "type", "a restart is an object", Value::Null, allowed));
             }
-            let found = spec.and_then(|spec| restart::scene(&spec, sources, errors));
+            let found = match spec {
+                Some(spec) => restart::scene(&spec, sources, errors)?,
+                None => None,
+            };
             let (source, scene) = found.unzip();
             SceneStart { scene, source, prefix: "/restart/overrides" }
         }
-    }
+    })
 }
 
 type PlannedScene = (Option<Box<dyn Scene>>, Vec<String>, CloudSizes);
 
 /// The scene, the uploads that it names, and how many points they have.
-fn planned_scene(
+fn planned_scene<S: Sources>(
     start: &SceneStart,
     allowance: Allowance,
-    sources: &dyn Sources,
+    sources: &S,
     errors: &mut Vec<Violation>,
-) -> PlannedScene {
+) -> Result<PlannedScene, S::Error> {
     let mut refuse = |found: Vec<Violation>| errors.extend(found.into_iter().map(|error| error.under(start.prefix)));
     let scene = start.scene.as_ref().and_then(|value| scene::parse(value, SCENES).map_err(&mut refuse).ok());
     let (mut uploads, mut sizes) = (Vec::new(), CloudSizes::new());
     for cloud in scene.iter().flat_map(|scene| scene.clouds()) {
-        match sources::size_of(&cloud, sources, allowance.local_files) {
+        match sources::size_of(&cloud, sources, allowance.local_files)? {
             Ok(size) => sizes.extend(size.map(|size| (cloud.pointer, size))),
             Err(violation) => errors.push(violation.under(start.prefix)),
         }
@@ -201,7 +216,7 @@ fn planned_scene(
             uploads.push(upload);
         }
     }
-    (scene, uploads, sizes)
+    Ok((scene, uploads, sizes))
 }
 
 /// The fields of frames: those given, else all of the scene.

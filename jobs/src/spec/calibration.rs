@@ -1,15 +1,11 @@
 //! What a unit of work takes, by phase: kept per build and machine, begun by a few short runs, refined by every job
 //! that finishes.
 
-use crate::spec::forecast::TimeForecast;
 use crate::system::process;
-use crate::worker::local_run;
 use meniscus::scene::PhaseWork;
 use meniscus::scene::work::Course;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::OnceLock;
 
 /// Work and the CPU seconds that it took.
@@ -38,10 +34,25 @@ pub struct Calibration {
     known: BTreeMap<(String, String), Measured>,
 }
 
+/// How long a run will take.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct TimeForecast {
+    /// CPU seconds.
+    pub cpu_s: f64,
+    /// Seconds by the clock.
+    pub wall_s: f64,
+    /// CPU seconds of phases that come at milestones, not with every step.
+    #[serde(alias = "moments")]
+    pub milestones: BTreeMap<String, f64>,
+    /// Measurements on which it rests.
+    pub basis: String,
+}
+
 /// The weight that earlier runs keep when a new one comes.
 pub const MEMORY: f64 = 0.7;
 /// The phase that relates the clock to CPU seconds, for a number of threads.
-fn wall(threads: u64) -> String {
+pub(crate) fn wall_phase(threads: u64) -> String {
     format!("wall@{threads}")
 }
 
@@ -87,10 +98,10 @@ impl Calibration {
             let seconds = phase.units * self.seconds_per_unit(family, phase.phase)?;
             forecast.cpu_s += seconds;
             if phase.course == Course::Moments {
-                *forecast.moments.entry(phase.phase.to_owned()).or_insert(0.0) += seconds;
+                *forecast.milestones.entry(phase.phase.to_owned()).or_insert(0.0) += seconds;
             }
         }
-        let clock = self.seconds_per_unit(family, &wall(threads)).unwrap_or(1.0 / threads as f64);
+        let clock = self.seconds_per_unit(family, &wall_phase(threads)).unwrap_or(1.0 / threads as f64);
         forecast.wall_s = forecast.cpu_s * clock;
         let is_known = |is_alike: &dyn Fn(&str) -> bool| self.known.keys().any(|(known, _)| is_alike(known));
         let alike = kind_and_dimension(family);
@@ -106,30 +117,6 @@ impl Calibration {
     }
 }
 
-/// What a finished run tells: its work as forecast, and the phases of its report.
-#[must_use]
-pub fn measured(estimate: &Value, cost: &Value, threads: u64) -> Vec<PhaseMeasured> {
-    let family = estimate["family"].as_str().unwrap_or_default().to_owned();
-    let Some(work) = estimate["work"].as_object() else { return Vec::new() };
-    let booked = cost["phases"].as_object();
-    let seconds = |phase: &str| booked.and_then(|b| b.get(phase)).and_then(Value::as_f64).unwrap_or(0.0);
-    let cpu_s = cost["cpu_s"].as_f64().unwrap_or(0.0);
-    let rest = cpu_s - booked.into_iter().flatten().filter_map(|(_, v)| v.as_f64()).sum::<f64>();
-    let mut found: Vec<PhaseMeasured> = work
-        .iter()
-        .filter_map(|(phase, units)| Some((phase, units.as_f64().filter(|units| *units > 0.0)?)))
-        .map(|(phase, work)| {
-            let seconds = if phase == meniscus::scenes::work_estimate::REST { rest.max(0.0) } else { seconds(phase) };
-            PhaseMeasured { family: family.clone(), phase: phase.clone(), measured: Measured { work, seconds } }
-        })
-        .collect();
-    if let Some(wall_s) = cost["wall_s"].as_f64().filter(|_| cpu_s > 0.0) {
-        let measured = Measured { work: cpu_s, seconds: wall_s };
-        found.push(PhaseMeasured { family, phase: wall(threads), measured });
-    }
-    found
-}
-
 /// The name of this machine for calibration: processor and number of cores.
 #[must_use]
 pub fn machine() -> &'static str {
@@ -138,69 +125,4 @@ pub fn machine() -> &'static str {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         format!("{} x {cores}", process::cpu_name().unwrap_or_else(|| "unknown".to_owned()))
     })
-}
-
-/// How often every calibrating run is made: a machine that others use as well is judged by the median.
-const ROUNDS: usize = 5;
-
-/// Measures this machine by the short runs that every kind of scene names, in a directory that is emptied again. The rounds
-/// go over all of them in turn, so that a slow moment spoils one round of a few, not all of one.
-///
-/// # Errors
-/// A sentence that names the run.
-pub fn measure_here(directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
-    let mut scenes: Vec<Value> = Vec::new();
-    for kind in meniscus::scenes::SCENES {
-        let named: Vec<Value> = serde_json::from_str(kind.calibration)
-            .map_err(|error| format!("calibration scenes of {}: {error}", kind.kind))?;
-        scenes.extend(named);
-    }
-    let mut rounds = Vec::new();
-    for _ in 0..ROUNDS {
-        let round: Result<Vec<_>, String> = scenes.iter().map(|scene| measure_run(scene, directory, threads)).collect();
-        rounds.push(round?.concat());
-    }
-    // Only what has just been made here.
-    let _ = std::fs::remove_dir_all(directory);
-    Ok(medians(&rounds))
-}
-
-fn measure_run(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
-    let body = json!({"scene": scene});
-    let body = local_run::run(&body, directory, threads, local_run::Keep::Report)
-        .map_err(|cause| format!("{scene}: {cause}"))?;
-    let report = std::fs::read(directory.join("report.json")).map_err(|error| error.to_string())?;
-    let report: Value = serde_json::from_slice(&report).map_err(|error| error.to_string())?;
-    Ok(measured(&body.forecast.to_json(), &report["cost"], threads))
-}
-
-/// Of every phase of every run the round in the middle; all rounds list the same.
-fn medians(rounds: &[Vec<PhaseMeasured>]) -> Vec<PhaseMeasured> {
-    let length = rounds.iter().map(Vec::len).min().unwrap_or(0);
-    let pace = |one: &PhaseMeasured| one.measured.seconds / one.measured.work;
-    (0..length)
-        .map(|k| {
-            let mut found: Vec<&PhaseMeasured> = rounds.iter().map(|round| &round[k]).collect();
-            found.sort_by(|a, b| pace(a).total_cmp(&pace(b)));
-            found[found.len() / 2].clone()
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_slow_round_does_not_count() {
-        let round = |seconds: [f64; 2]| {
-            ["fits", "queries"].into_iter().zip(seconds).map(|(phase, seconds)| {
-                let measured = Measured { work: 2.0, seconds };
-                PhaseMeasured { family: "redistance/2".to_owned(), phase: phase.to_owned(), measured }
-            })
-        };
-        let rounds = [[1.0, 9.0], [1.2, 3.0], [7.0, 2.0]].map(|seconds| round(seconds).collect()).to_vec();
-        let found: Vec<f64> = medians(&rounds).iter().map(|one| one.measured.seconds).collect();
-        assert_eq!(found, [1.2, 3.0]);
-    }
 }

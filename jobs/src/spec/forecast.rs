@@ -1,16 +1,18 @@
 //! What a run will take, before it is made: particles, steps, memory, disk, and time by what was measured before.
 
-use crate::formats::hdf5_file::CHUNK_ROWS;
-use crate::spec::calibration::Calibration;
+use crate::spec::calibration::{Calibration, Measured, PhaseMeasured, TimeForecast, wall_phase};
 use crate::spec::run_options::RunOptions;
 use meniscus::scene::{Estimate, PhaseWork};
 use meniscus::scenes::work_estimate;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Memory of a worker before it holds any particle.
 pub const WORKER_BASE_BYTES: u64 = 20 << 20;
+
+/// Rows of a chunk at most in the data sets of frames and checkpoints.
+pub const CHUNK_ROWS: usize = 1 << 16;
 
 /// The size and the cost of a run.
 #[derive(Debug, Clone)]
@@ -31,19 +33,6 @@ pub struct Forecast {
     pub time: Option<TimeForecast>,
 }
 
-/// How long a run will take.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct TimeForecast {
-    /// CPU seconds.
-    pub cpu_s: f64,
-    /// Seconds by the clock.
-    pub wall_s: f64,
-    /// CPU seconds of phases that come at some moments, not with every step.
-    pub moments: BTreeMap<String, f64>,
-    /// What it rests on.
-    pub basis: String,
-}
-
 impl Forecast {
     /// Looks up what the work takes on this machine.
     pub fn time_by(&mut self, calibration: &Calibration) {
@@ -56,26 +45,74 @@ impl Forecast {
         self.time.as_ref().map_or("nothing was measured on this machine yet", |time| &time.basis)
     }
 
-    /// As it stands in the store and in answers.
+    /// The forecast as it stands in the store.
     #[must_use]
-    pub fn to_json(&self) -> Value {
-        let work: Map<String, Value> =
-            self.work.iter().map(|phase| (phase.phase.to_owned(), json!(phase.units))).collect();
-        json!({
-            "particles": self.estimate.particles,
-            "steps": self.estimate.steps,
-            "time_step": self.estimate.time_step,
-            "end_time": self.estimate.end_time,
-            "memory_bytes": self.memory_bytes,
-            "disk_bytes": self.disk_bytes,
-            "cpu_s": self.time.as_ref().map(|time| time.cpu_s),
-            "wall_s": self.time.as_ref().map(|time| time.wall_s),
-            "basis": self.basis(),
-            "time": self.time,
-            "family": self.family,
-            "work": work,
-        })
+    pub fn record(&self) -> ForecastRecord {
+        ForecastRecord {
+            particles: self.estimate.particles,
+            steps: self.estimate.steps,
+            time_step: self.estimate.time_step,
+            end_time: self.estimate.end_time,
+            memory_bytes: self.memory_bytes,
+            disk_bytes: self.disk_bytes,
+            cpu_s: self.time.as_ref().map(|time| time.cpu_s),
+            wall_s: self.time.as_ref().map(|time| time.wall_s),
+            basis: self.basis().to_owned(),
+            time: self.time.clone(),
+            family: self.family.clone(),
+            work: self.work.iter().map(|phase| (phase.phase.to_owned(), phase.units)).collect(),
+        }
     }
+}
+
+/// A forecast as it stands in the store. Rows of earlier builds may lack some of it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ForecastRecord {
+    /// Particles.
+    pub particles: u64,
+    /// Steps to the end.
+    pub steps: u64,
+    /// Scene time of a step.
+    pub time_step: f64,
+    /// Scene time at the end.
+    pub end_time: f64,
+    /// Resident memory of the worker.
+    pub memory_bytes: u64,
+    /// Size of all files.
+    pub disk_bytes: u64,
+    /// CPU seconds.
+    pub cpu_s: Option<f64>,
+    /// Running time in seconds.
+    pub wall_s: Option<f64>,
+    /// Measurements on which it rests.
+    pub basis: String,
+    /// Time, as a worker needs it.
+    pub time: Option<TimeForecast>,
+    /// Kind, dimension and method: runs of one family are compared.
+    pub family: String,
+    /// Units of work by phase.
+    pub work: BTreeMap<String, f64>,
+}
+
+/// What a finished run tells of the machine: its work as forecast, and the phases of its report.
+#[must_use]
+pub fn measured(forecast: &ForecastRecord, cost: &Value, threads: u64) -> Vec<PhaseMeasured> {
+    let family = &forecast.family;
+    let booked = cost["phases"].as_object();
+    let seconds = |phase: &str| booked.and_then(|b| b.get(phase)).and_then(Value::as_f64).unwrap_or(0.0);
+    let cpu_s = cost["cpu_s"].as_f64().unwrap_or(0.0);
+    let rest = cpu_s - booked.into_iter().flatten().filter_map(|(_, v)| v.as_f64()).sum::<f64>();
+    let phase = |(phase, work): (&String, &f64)| {
+        let seconds = if phase == work_estimate::REST { rest.max(0.0) } else { seconds(phase) };
+        PhaseMeasured { family: family.clone(), phase: phase.clone(), measured: Measured { work: *work, seconds } }
+    };
+    let mut found: Vec<PhaseMeasured> = forecast.work.iter().filter(|(_, units)| **units > 0.0).map(phase).collect();
+    if let Some(wall_s) = cost["wall_s"].as_f64().filter(|_| cpu_s > 0.0) {
+        let measured = Measured { work: cpu_s, seconds: wall_s };
+        found.push(PhaseMeasured { family: family.clone(), phase: wall_phase(threads), measured });
+    }
+    found
 }
 
 /// Bytes of all files of a run: its frames, its series, its picture, and its checkpoints: the last one, and where they come by

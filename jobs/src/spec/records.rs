@@ -1,14 +1,13 @@
 //! Records: what a worker tells the service, one JSON line each, appended to `records.jsonl` of its attempt and
 //! stamped with the attempt's epoch. A line counts only when it is whole and its epoch is the job's.
 
+use crate::spec::attempt_files;
+use crate::system::digest;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
-
-/// Name of the file in an attempt's directory.
-pub const FILE_NAME: &str = "records.jsonl";
 
 /// One line.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -138,6 +137,18 @@ pub struct FileRecord {
     pub step: Option<u64>,
 }
 
+impl FileRecord {
+    /// The record of a finished file below an attempt's directory.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn from_file(directory: &Path, path: &str, media_type: &str) -> io::Result<Self> {
+        let (sha256, size_bytes) = digest::of_file(&directory.join(path))?;
+        let (path, media_type) = (path.to_owned(), media_type.to_owned());
+        Ok(Self { path, size_bytes, sha256, media_type, time: None, step: None })
+    }
+}
+
 /// A checkpoint in the attempt's directory.
 #[derive(Debug, Clone, Serialize, Deserialize, PartialEq)]
 pub struct CheckpointRecord {
@@ -203,7 +214,7 @@ impl RecordFile {
     /// # Errors
     /// When it cannot be made.
     pub fn open(directory: &Path, epoch: u64) -> io::Result<Self> {
-        let file = OpenOptions::new().create(true).append(true).open(directory.join(FILE_NAME))?;
+        let file = OpenOptions::new().create(true).append(true).open(directory.join(attempt_files::RECORDS))?;
         Ok(Self { file, epoch })
     }
 }
@@ -223,7 +234,7 @@ impl RecordSink for RecordFile {
 /// # Errors
 /// When the file is there but cannot be read.
 pub fn read_from(directory: &Path, offset: u64) -> io::Result<Vec<(Option<Line>, u64)>> {
-    let mut file = match File::open(directory.join(FILE_NAME)) {
+    let mut file = match File::open(directory.join(attempt_files::RECORDS)) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(error) => return Err(error),

@@ -133,6 +133,12 @@ impl RunOptions {
         Self::deserialize(body)
     }
 
+    /// Threads of the worker.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.limits.threads.max(1) as usize
+    }
+
     /// The plan that the engine sees.
     #[must_use]
     pub fn plan(&self) -> OutputPlan {

@@ -11,10 +11,10 @@ macro_rules! words {
         }
 
         impl $name {
-            /// All of them.
+            /// All values.
             pub const ALL: &[$name] = &[$($name::$variant,)*];
 
-            /// The word that stands for it in JSON and in the store.
+            /// Its word in JSON and in the store.
             #[must_use]
             pub fn word(self) -> &'static str {
                 match self {
@@ -22,7 +22,7 @@ macro_rules! words {
                 }
             }
 
-            /// From its word.
+            /// The value of a word; None for other words.
             #[must_use]
             pub fn from_word(word: &str) -> Option<Self> {
                 match word {
@@ -35,7 +35,7 @@ macro_rules! words {
 }
 
 words! {
-    /// Where a job stands.
+    /// State of a job.
     State {
         /// Waiting for a slot.
         Queued => "queued",
@@ -43,13 +43,13 @@ words! {
         Running => "running",
         /// A worker was asked to checkpoint and end.
         Pausing => "pausing",
-        /// At rest with its checkpoints.
+        /// Without a worker, with checkpoints to go on from.
         Paused => "paused",
         /// A worker was asked to drop everything.
         Canceling => "canceling",
-        /// The worker is gone without a verdict.
+        /// The worker ended without a verdict.
         Interrupted => "interrupted",
-        /// Done, everything published.
+        /// Finished, with all results published.
         Succeeded => "succeeded",
         /// Ended by an error.
         Failed => "failed",
@@ -59,15 +59,15 @@ words! {
 }
 
 words! {
-    /// What can happen to a job.
+    /// Event that changes the state of a job.
     Trigger {
         /// A slot and memory are free.
         Claim => "claim",
-        /// Somebody cancels.
+        /// A request to cancel.
         Cancel => "cancel",
-        /// Somebody pauses, or a limit does.
+        /// A request to pause, or a limit.
         Pause => "pause",
-        /// Somebody resumes, or space is back.
+        /// A request to resume, or space on the device again.
         Resume => "resume",
         /// The worker ended with everything published.
         Finish => "finish",
@@ -75,11 +75,11 @@ words! {
         Rest => "rest",
         /// The worker ended after a checkpoint because the service shuts down.
         Drain => "drain",
-        /// The worker dropped its step.
+        /// The worker dropped its step and ended.
         Drop => "drop",
         /// The run cannot go on.
         Fail => "fail",
-        /// The worker is gone without a verdict.
+        /// The worker ended without a verdict.
         Lose => "lose",
         /// A lost job goes back to the queue.
         Requeue => "requeue",
@@ -87,7 +87,7 @@ words! {
 }
 
 words! {
-    /// Why a job is in a state that is not plain.
+    /// Why a job is in its state, where the state does not say so.
     Reason {
         /// On request.
         UserCancel => "user.cancel",
@@ -127,7 +127,7 @@ words! {
         CheckpointIncompatible => "checkpoint.incompatible",
         /// An input file is damaged.
         InputDamaged => "input.damaged",
-        /// A defect of the program.
+        /// A bug in the program.
         Internal => "internal",
     }
 }
@@ -158,7 +158,7 @@ pub const TRANSITIONS: &[(State, Trigger, State)] = &[
 ];
 
 impl State {
-    /// Where a trigger leads from here; None where the table has no such row.
+    /// The state to which a trigger leads; None where the table has no such row.
     #[must_use]
     pub fn after(self, trigger: Trigger) -> Option<State> {
         TRANSITIONS.iter().find(|(from, on, _)| *from == self && *on == trigger).map(|(_, _, to)| *to)
@@ -178,13 +178,13 @@ impl State {
 }
 
 impl Reason {
-    /// What a person can do about it.
+    /// What a user can do about it.
     #[must_use]
     pub fn hint(self) -> &'static str {
         match self {
             Self::UserCancel => "canceled on request; submit the body again to run it anew",
-            Self::UserPause => "paused on request; POST …/resume goes on from the last checkpoint",
-            Self::LimitWalltime => "limits.wall_s is used up; POST …/resume grants it once more",
+            Self::UserPause => "paused on request; resume the job to go on from its last checkpoint",
+            Self::LimitWalltime => "limits.wall_s is used up; resume the job to grant it once more",
             Self::LimitMemory => {
                 "the worker outgrew limits.memory_bytes; raise it, or use a larger spacing or a narrower band"
             }
@@ -216,7 +216,7 @@ impl Reason {
             Self::CheckpointNoneValid => "no checkpoint to start from passed its checks",
             Self::CheckpointIncompatible => "the checkpoint is of another scene or another instruction set",
             Self::InputDamaged => "an input file did not pass its checks",
-            Self::Internal => "a defect of the program; please report it with the job's log",
+            Self::Internal => "a bug in the program; please report it with the job's log",
         }
     }
 }

@@ -7,7 +7,7 @@ mod sweep;
 
 pub use sweep::{Axes, MOST_POINTS, Points, Sweep, SweepPoint};
 
-use crate::spec::body::{self, Allowance, JobBody, Labels, Name, Sources};
+use crate::spec::body::{self, Allowance, BodyError, JobBody, Labels, Name, Sources};
 use crate::spec::calibration::Calibration;
 use meniscus::spec::{Group, Json, Raw, Violation, Word, group, whole};
 use serde_json::{Value, json};
@@ -100,18 +100,18 @@ pub struct Study<J> {
 /// From a client's JSON to a study; `slots` jobs run at once, `keep` makes of each body what is needed later.
 ///
 /// # Errors
-/// All violations at once (the first hundred of them); nothing is made then. A violation at an axis' pointer is reported
+/// All violations at once (the first hundred of them), or a failed look-up; nothing is made then. A violation at an axis' pointer is reported
 /// once, at the axis' value.
-pub fn parse<J>(
+pub fn parse<J, S: Sources>(
     spec: &Value,
     allowance: Allowance,
     slots: usize,
-    sources: &dyn Sources,
+    sources: &S,
     calibration: &Calibration,
     keep: impl Fn(&JobBody) -> J,
-) -> Result<Study<J>, Vec<Violation>> {
+) -> Result<Study<J>, BodyError<S::Error>> {
     let Value::Object(object) = spec else {
-        return Err(vec![Violation::new("", "type", "a study is an object", spec.clone(), StudySpec::names())]);
+        return Err(vec![Violation::new("", "type", "a study is an object", spec.clone(), StudySpec::names())].into());
     };
     let mut errors = Vec::new();
     group::check_names(object, &StudySpec::names(), "", &mut errors);
@@ -119,7 +119,7 @@ pub fn parse<J>(
     let base = parsed.as_ref().and_then(|spec| spec.base.0.clone()).or_else(|| object.get("base").cloned());
     check_base(base.as_ref(), &mut errors);
     let (Some(parsed), Some(base), true) = (parsed, base, errors.is_empty()) else {
-        return Err(errors);
+        return Err(errors.into());
     };
     let points = parsed.sweep.points().map_err(|error| vec![error])?;
     let axes = axes_of(&points)?;
@@ -170,13 +170,13 @@ fn axes_of(points: &[SweepPoint]) -> Result<Vec<String>, Vec<Violation>> {
 }
 
 /// What is kept of the body of each point, and what all of them will take.
-fn bodies<J>(
+fn bodies<J, S: Sources>(
     base: &Json,
     points: &[SweepPoint],
-    (allowance, sources): (Allowance, &dyn Sources),
+    (allowance, sources): (Allowance, &S),
     calibration: &Calibration,
     keep: impl Fn(&JobBody) -> J,
-) -> Result<(Vec<J>, Total), Vec<Violation>> {
+) -> Result<(Vec<J>, Total), BodyError<S::Error>> {
     let mut jobs = Vec::with_capacity(points.len());
     let mut total = Total { cpu_s: Some(0.0), ..Total::default() };
     let mut found = Found::default();
@@ -190,24 +190,25 @@ fn bodies<J>(
                 total.disk_bytes = total.disk_bytes.saturating_add(body.forecast.disk_bytes);
                 jobs.push(keep(&body));
             }
-            Err(violations) => found.add(point, violations),
+            Err(BodyError::Invalid(violations)) => found.add(point, violations),
+            Err(error) => return Err(error),
         }
     }
-    if found.by_pointer.is_empty() { Ok((jobs, total)) } else { Err(found.listed()) }
+    if found.by_pointer.is_empty() { Ok((jobs, total)) } else { Err(found.listed().into()) }
 }
 
 /// The body of one point.
-fn point_body(
+fn point_body<S: Sources>(
     base: &Value,
     point: &SweepPoint,
     allowance: Allowance,
-    sources: &dyn Sources,
-) -> Result<JobBody, Vec<Violation>> {
+    sources: &S,
+) -> Result<JobBody, BodyError<S::Error>> {
     let mut body = base.clone();
     for (pointer, value) in &point.values {
         if !place_value(&mut body, pointer, value) {
             let detail = "the pointer leads through something that is no object";
-            return Err(vec![Violation::new(pointer.clone(), "type", detail, value.clone(), Value::Null)]);
+            return Err(vec![Violation::new(pointer.clone(), "type", detail, value.clone(), Value::Null)].into());
         }
     }
     body::parse(&body, allowance, sources)
@@ -291,7 +292,7 @@ mod tests {
     }
 
     fn errors(spec: &Value) -> Vec<(String, &'static str)> {
-        let found = parse(spec, ALLOWANCE, 1, &NoSources, &Calibration::default(), |_| ()).err().unwrap();
+        let found = parse(spec, ALLOWANCE, 1, &NoSources, &Calibration::default(), |_| ()).err().unwrap().violations();
         found.into_iter().map(|v| (v.pointer, v.code)).collect()
     }
 

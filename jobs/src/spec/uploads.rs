@@ -42,9 +42,117 @@ impl Purpose {
     }
 }
 
-/// What was found in a file, as JSON for clients: of points `points`, `fields`, `low`, `high`; of checkpoints `body`,
-/// `step`, `time`, `isa`, `build`.
-pub type Findings = Value;
+/// Outcome of an inspection, a line of JSON from the process that looks into a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Inspection {
+    /// The file is what it is to be used as; of points, the points follow the line.
+    Ready(Contents),
+    /// It is not, for a reason that the client is told.
+    Rejected(String),
+}
+
+/// What an inspection found in a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Contents {
+    /// A checkpoint.
+    Checkpoint(CheckpointContents),
+    /// Points, with or without a surface.
+    Points(PointContents),
+}
+
+/// A checkpoint that was uploaded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CheckpointContents {
+    /// Resolved body of the job that wrote it.
+    pub body: Value,
+    /// Step.
+    pub step: u64,
+    /// Scene time.
+    pub time: f64,
+    /// Instruction set that it was written on.
+    pub isa: String,
+    /// Program that wrote it.
+    pub build: String,
+    /// Job that wrote it.
+    pub job: String,
+    /// Arrays of the state.
+    pub arrays: Vec<ArrayContents>,
+}
+
+/// An array of an uploaded checkpoint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ArrayContents {
+    /// Name.
+    pub name: String,
+    /// Numbers per entry; 0 marks whole numbers.
+    pub components: usize,
+}
+
+/// Points that were uploaded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointContents {
+    /// Number of points.
+    pub points: u64,
+    /// Fields that they have.
+    pub fields: Vec<String>,
+    /// Lower corner of the box around them.
+    pub low: [f64; 3],
+    /// Upper corner of the box around them.
+    pub high: [f64; 3],
+    /// Whether a surface came with normals.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normals: Option<bool>,
+    /// Faces, of a surface from a mesh file.
+    #[serde(flatten)]
+    pub faces: Option<FaceContents>,
+}
+
+/// Faces of a mesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FaceContents {
+    /// Number of faces.
+    pub faces: usize,
+    /// Whether every edge has two faces; None without faces.
+    pub is_closed: Option<bool>,
+}
+
+impl Contents {
+    /// Number of points; None for a checkpoint.
+    #[must_use]
+    pub fn points(&self) -> Option<u64> {
+        match self {
+            Self::Checkpoint(_) => None,
+            Self::Points(found) => Some(found.points),
+        }
+    }
+}
 
 /// Points that a file may hold at most.
 pub const MOST_POINTS: u64 = 20_000_000;
+
+#[cfg(test)]
+mod tests {
+    use super::{Contents, Inspection};
+    use serde_json::json;
+
+    #[test]
+    fn contents_come_back_from_their_json_and_keep_what_clients_saw() {
+        let points = json!({"points": 3, "fields": ["phi"], "low": [0.0, 0.0, 0.0], "high": [1.0, 1.0, 0.0]});
+        let mesh = json!({
+            "points": 3, "fields": ["normal"], "low": [0.0, 0.0, 0.0], "high": [1.0, 1.0, 0.0],
+            "normals": true, "faces": 0, "is_closed": null,
+        });
+        let checkpoint = json!({
+            "body": {"scene": {}}, "step": 7, "time": 0.5, "isa": "x86_64", "build": "0.1.0", "job": "job_1",
+            "arrays": [{"name": "phi", "components": 1}],
+        });
+        for json in [points, mesh, checkpoint] {
+            let contents: Contents = serde_json::from_value(json.clone()).unwrap();
+            assert_eq!(matches!(contents, Contents::Checkpoint(_)), contents.points().is_none());
+            assert_eq!(serde_json::to_value(&contents).unwrap(), json);
+            assert_eq!(serde_json::to_value(Inspection::Ready(contents)).unwrap(), json!({"ready": json}));
+        }
+    }
+}

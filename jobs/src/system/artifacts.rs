@@ -1,9 +1,7 @@
 //! Writing files so that a reader sees them whole or not at all: beside the target, synced, renamed, the directory
 //! synced after.
 
-use crate::spec::records::FileRecord;
 use crate::system::breakpoints::pass;
-use crate::system::digest;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -48,20 +46,4 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.write_all(bytes)?;
     drop(file);
     finish(path)
-}
-
-/// The record of a finished file below an attempt's directory.
-///
-/// # Errors
-/// When the file cannot be read.
-pub fn record(directory: &Path, path: &str, media_type: &str) -> io::Result<FileRecord> {
-    let (sha256, size_bytes) = digest::of_file(&directory.join(path))?;
-    Ok(FileRecord {
-        path: path.to_owned(),
-        size_bytes,
-        sha256,
-        media_type: media_type.to_owned(),
-        time: None,
-        step: None,
-    })
 }

@@ -1,10 +1,10 @@
-//! One service a data directory.
+//! The lock of a data directory: one service at a time uses it.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Holds the directory until it is dropped, or the process ends in whatever way.
+/// Holds the directory until it is dropped or the process ends.
 #[derive(Debug)]
 pub struct DirectoryLock {
     _file: File,

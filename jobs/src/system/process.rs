@@ -1,4 +1,4 @@
-//! What the system says of processes: CPU time, memory, free space.
+//! Facts of the operating system: CPU time, memory, free space.
 
 use rustix::process::{getpriority_process, setpriority_process};
 use rustix::time::{ClockId, clock_gettime};
@@ -12,10 +12,10 @@ pub fn cpu_seconds() -> f64 {
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
-/// Makes this process stand back for others.
+/// Lowers the priority of this process.
 pub fn be_nice() {
     if getpriority_process(None).is_ok_and(|priority| priority < 10) {
-        // Failing to stand back is no reason not to work.
+        // A process that cannot lower its priority works all the same.
         let _ = setpriority_process(None, 10);
     }
 }

@@ -4,9 +4,11 @@ use super::measure::{self, Quantity};
 use super::plot::{Content, Plot, PointsLine, RunsLine};
 use super::workspace::Workspace;
 use crate::formats::chart::{self, Chart};
-use crate::formats::{csv, picture, speed_error, vtkhdf};
+use crate::formats::{csv, frame_view, picture, speed_error, vtkhdf};
+use crate::spec::attempt_files;
 use crate::worker::local_run::Keep;
-use crate::worker::observers::series;
+use meniscus::scene;
+use meniscus::scenes::SCENES;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -79,7 +81,7 @@ impl Workspace {
     /// A column of the series of a run over time.
     fn history(&self, scene: &Value, column: &str) -> Result<Vec<(f64, f64)>, String> {
         let directory = self.run(&json!({"scene": scene}), Keep::Report)?;
-        let text = fs::read_to_string(directory.join(series::FILE_NAME)).map_err(|error| error.to_string())?;
+        let text = fs::read_to_string(directory.join(attempt_files::SERIES)).map_err(|error| error.to_string())?;
         let rows = csv::to_json(&text)["rows"].take();
         let number = |row: &Value, name: &str| row[name].as_f64().unwrap_or(f64::NAN);
         Ok(rows.as_array().into_iter().flatten().map(|row| (number(row, "time"), number(row, column))).collect())
@@ -108,17 +110,19 @@ impl Workspace {
     fn frames(&self, scene: &Value, every_time: f64, chosen: &[usize], path: &Path) -> Result<(), String> {
         let body = json!({"scene": scene, "output": {"every_time": every_time}});
         let files = frames_of(&self.run(&body, Keep::Frames)?)?;
+        let parsed = scene::parse(scene, SCENES)
+            .map_err(|found| found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail)))?;
         let mut views = Vec::new();
         for file in chosen.iter().filter_map(|k| files.get(*k)) {
-            views.extend(vtkhdf::read_frame(file).map_err(|error| error.to_string())?);
+            views.extend(frame_view::read(file, parsed.view()).map_err(|error| error.to_string())?);
         }
-        picture::draw(path, &views, picture::spacing(scene, &views))
+        picture::draw(path, &views, picture::spacing(parsed.spacing(), &views))
     }
 }
 
 /// The frames of a run, in the order of time.
 fn frames_of(directory: &Path) -> Result<Vec<PathBuf>, String> {
-    let entries = fs::read_dir(directory.join("frames")).map_err(|error| error.to_string())?;
+    let entries = fs::read_dir(directory.join(attempt_files::FRAMES)).map_err(|error| error.to_string())?;
     let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
     files.retain(|file| file.extension().is_some_and(|extension| extension == "vtkhdf"));
     files.sort();

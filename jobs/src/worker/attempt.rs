@@ -1,39 +1,39 @@
 //! One attempt at a job: build, restore, run under observers, finish, say how it ended.
 
 use crate::formats::checkpoint::{self, CheckpointError, Counters, Meta};
-use crate::formats::{picture, vtkhdf};
-use crate::spec::attempt_spec::{Order, StartCheckpoint};
-use crate::spec::records::{Record, RecordSink, Verdict};
+use crate::formats::{frame_view, picture};
+use crate::spec::attempt_files;
+use crate::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
+use crate::spec::body::ResolvedBody;
+use crate::spec::records::{FileRecord, Record, RecordSink, Verdict};
 use crate::spec::run_options::RunOptions;
 use crate::spec::states::Reason;
-use crate::system::artifacts;
 use crate::system::process;
+use crate::system::{artifacts, digest};
 use crate::worker::inputs;
 use crate::worker::observers::checkpoints::Checkpoints;
 use crate::worker::observers::frames::Frames;
 use crate::worker::observers::progress::ProgressMeter;
-use crate::worker::observers::series::{self, Series};
+use crate::worker::observers::series::Series;
 use crate::worker::observers::{Control, Observers};
 use crate::worker::report;
-use meniscus::scene::{self, BuildContext};
+use meniscus::scene::{self, BuildContext, Scene};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
 use meniscus::simulation::{CpuClock, RunError, Simulation, State, StepError, run};
+use serde::Deserialize;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-/// Name of the log in an attempt's directory.
-pub const LOG_NAME: &str = "log.txt";
-
 /// Runs one attempt to its verdict, which is also its last record. Panics become a verdict.
-pub fn run_attempt(order: &Order, directory: &Path, control: &Control, sink: &mut dyn RecordSink) -> Verdict {
-    let log = Log { path: directory.join(LOG_NAME) };
-    let outcome = catch_unwind(AssertUnwindSafe(|| attempt(order, directory, control, sink, &log)));
+pub fn run_attempt(spec: &AttemptSpec, directory: &Path, control: &Control, sink: &mut dyn RecordSink) -> Verdict {
+    let log = Log { path: directory.join(attempt_files::LOG) };
+    let outcome = catch_unwind(AssertUnwindSafe(|| attempt(spec, directory, control, sink, &log)));
     let verdict = match outcome {
         Ok(Ok(verdict)) => verdict,
-        Ok(Err(failure)) => without_places(failure.verdict(directory), order, directory),
+        Ok(Err(failure)) => without_places(failure.verdict(directory), spec, directory),
         Err(_) => Verdict::Failed { reason: Reason::Internal, message: "the worker panicked".to_owned() },
     };
     log.line(&format!("{verdict:?}"));
@@ -43,17 +43,17 @@ pub fn run_attempt(order: &Order, directory: &Path, control: &Control, sink: &mu
 }
 
 /// A verdict whose message names no place of this machine: clients read it.
-fn without_places(verdict: Verdict, order: &Order, directory: &Path) -> Verdict {
+fn without_places(verdict: Verdict, spec: &AttemptSpec, directory: &Path) -> Verdict {
     match verdict {
-        Verdict::Failed { reason, message } => Verdict::Failed { reason, message: hide(&message, order, directory) },
+        Verdict::Failed { reason, message } => Verdict::Failed { reason, message: hide(&message, spec, directory) },
         other => other,
     }
 }
 
 /// A text without the directories of the job.
-fn hide(text: &str, order: &Order, directory: &Path) -> String {
-    let attempts = order.attempts_directory.display().to_string();
-    let job = order.attempts_directory.parent().map(|p| p.display().to_string()).filter(|p| p.len() > 1);
+fn hide(text: &str, spec: &AttemptSpec, directory: &Path) -> String {
+    let attempts = spec.attempts_directory.display().to_string();
+    let job = spec.attempts_directory.parent().map(|p| p.display().to_string()).filter(|p| p.len() > 1);
     let hidden = text.replace(&directory.display().to_string(), "…").replace(&attempts, "…");
     job.map_or_else(|| hidden.clone(), |job| hidden.replace(&job, "…"))
 }
@@ -104,43 +104,29 @@ fn storage_verdict(error: &(dyn std::error::Error + 'static), directory: &Path) 
 }
 
 fn attempt(
-    order: &Order,
+    spec: &AttemptSpec,
     directory: &Path,
     control: &Control,
     sink: &mut dyn RecordSink,
     log: &Log,
 ) -> Result<Verdict, Failure> {
     let internal = |error: &dyn std::error::Error| Failure::Known(Reason::Internal, error.to_string());
-    let options = RunOptions::from_resolved(&order.body).map_err(|error| internal(&error))?;
-    let scene = scene::parse(&order.body["scene"], SCENES).map_err(|violations| {
+    let ResolvedBody { scene, options, .. } =
+        ResolvedBody::deserialize(&spec.body).map_err(|error| internal(&error))?;
+    let scene_sha256 = digest::of_bytes(scene.to_string().as_bytes());
+    let scene = scene::parse(&scene, SCENES).map_err(|violations| {
         Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
     })?;
-    let threads = options.limits.threads.max(1) as usize;
+    let threads = options.threads();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
-    log.line(&format!("attempt {} of {} on {} threads", order.epoch, order.job, threads));
+    log.line(&format!("attempt {} of {} on {} threads", spec.epoch, spec.job, threads));
     // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
-    let mut progress = ProgressMeter::new(order.usage, order.time.clone());
+    let mut progress = ProgressMeter::new(spec.usage, spec.time.clone());
     pool.install(|| {
-        let clouds =
-            inputs::read(scene.as_ref(), order).map_err(|cause| Failure::Known(Reason::InputDamaged, cause))?;
-        let context = BuildContext {
-            clouds,
-            plan: options.plan(),
-            interrupt: control.interrupt().clone(),
-            cpu_clock: CpuClock(process::cpu_seconds),
-        };
-        let built = scene.build(context);
-        // What was dropped on the way says nothing of the input.
-        if control.interrupt().is_raised() {
-            return Err(Failure::Canceled);
-        }
-        let mut simulation = built.map_err(|found| {
-            let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
-            Failure::Known(Reason::InputDamaged, cause)
-        })?;
-        let start = restore(order, simulation.as_mut(), sink, log)?;
+        let mut simulation = build(spec, scene.as_ref(), &options, control)?;
+        let start = restore(spec, simulation.as_mut(), sink, log)?;
         progress.continue_phases(start.counters.phases.clone());
-        let mut observers = prepare(order, directory, &options, control, sink, &start, progress)?;
+        let mut observers = prepare(spec, directory, &options, control, sink, &start, progress)?;
         let step = simulation.clock().step;
         observers.sink.put(
             &Record::Started {
@@ -158,10 +144,36 @@ fn attempt(
             Ending::Stopped if control.interrupt().is_raised() => Ok(Verdict::Canceled),
             Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),
             Ending::Finished => {
-                finish(order, directory, simulation.as_ref(), &mut observers, threads, log)?;
+                let ended = Ended { simulation: simulation.as_ref(), scene: scene.as_ref(), scene_sha256, threads };
+                finish(spec, directory, &ended, &mut observers, log)?;
                 Ok(Verdict::Succeeded)
             }
         }
+    })
+}
+
+/// The simulation at the start of its scene, with the points that it takes from files.
+fn build(
+    spec: &AttemptSpec,
+    scene: &dyn Scene,
+    options: &RunOptions,
+    control: &Control,
+) -> Result<Box<dyn Simulation>, Failure> {
+    let clouds = inputs::read(scene, spec).map_err(|cause| Failure::Known(Reason::InputDamaged, cause))?;
+    let context = BuildContext {
+        clouds,
+        plan: options.plan(),
+        interrupt: control.interrupt().clone(),
+        cpu_clock: CpuClock(process::cpu_seconds),
+    };
+    let built = scene.build(context);
+    // A build that was dropped on request says nothing about the input.
+    if control.interrupt().is_raised() {
+        return Err(Failure::Canceled);
+    }
+    built.map_err(|found| {
+        let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
+        Failure::Known(Reason::InputDamaged, cause)
     })
 }
 
@@ -174,15 +186,15 @@ struct Start {
     step: u64,
 }
 
-/// Restores the newest sound checkpoint of the order; damaged ones are reported and passed over.
+/// Restores the newest sound checkpoint of the spec; damaged ones are reported and passed over.
 fn restore(
-    order: &Order,
+    spec: &AttemptSpec,
     simulation: &mut dyn Simulation,
     sink: &mut dyn RecordSink,
     log: &Log,
 ) -> Result<Start, Failure> {
-    for candidate in &order.checkpoints {
-        match open_start(order, candidate) {
+    for candidate in &spec.checkpoints {
+        match open_start(spec, candidate) {
             Ok((meta, state)) => match simulation.restore(&state) {
                 Ok(()) => {
                     log.line(&format!("restored {} at step {}", candidate.id, meta.step));
@@ -194,20 +206,20 @@ fn restore(
                     }
                     return Ok(Start { counters, is_own: candidate.is_own, step: state.step });
                 }
-                Err(error) => refuse(order, candidate, &error.to_string(), sink, log)?,
+                Err(error) => refuse(spec, candidate, &error.to_string(), sink, log)?,
             },
             Err(Refusal::Incompatible(message)) if !candidate.is_own => {
                 return Err(Failure::Known(Reason::CheckpointIncompatible, message));
             }
             Err(Refusal::Incompatible(message) | Refusal::Damaged(message)) => {
-                refuse(order, candidate, &message, sink, log)?;
+                refuse(spec, candidate, &message, sink, log)?;
             }
         }
     }
-    if order.may_start_afresh {
+    if spec.may_start_afresh {
         return Ok(Start::default());
     }
-    Err(Failure::Known(Reason::CheckpointNoneValid, format!("{} checkpoints were tried", order.checkpoints.len())))
+    Err(Failure::Known(Reason::CheckpointNoneValid, format!("{} checkpoints were tried", spec.checkpoints.len())))
 }
 
 enum Refusal {
@@ -215,10 +227,10 @@ enum Refusal {
     Incompatible(String),
 }
 
-fn open_start(order: &Order, candidate: &StartCheckpoint) -> Result<(Meta, State), Refusal> {
+fn open_start(spec: &AttemptSpec, candidate: &StartCheckpoint) -> Result<(Meta, State), Refusal> {
     let (meta, state) = checkpoint::read(&candidate.path, candidate.sha256.as_deref())
         .map_err(|error| Refusal::Damaged(error.to_string()))?;
-    if !checkpoint::is_same_scene(&meta.body, &order.body) {
+    if !checkpoint::is_same_scene(&meta.body, &spec.body) {
         let message = "the checkpoint is of another scene: fields that are not restart-safe differ";
         return Err(Refusal::Incompatible(message.to_owned()));
     }
@@ -233,21 +245,21 @@ fn open_start(order: &Order, candidate: &StartCheckpoint) -> Result<(Meta, State
 }
 
 fn refuse(
-    order: &Order,
+    spec: &AttemptSpec,
     candidate: &StartCheckpoint,
     message: &str,
     sink: &mut dyn RecordSink,
     log: &Log,
 ) -> Result<(), Failure> {
     let message = format!("checkpoint {} is passed over: {message}", candidate.id);
-    let message = hide(&message, order, &order.attempts_directory);
+    let message = hide(&message, spec, &spec.attempts_directory);
     log.line(&message);
     sink.put(&Record::Warning { code: "checkpoint.refused".to_owned(), message }, true)?;
     Ok(())
 }
 
 fn prepare<'a>(
-    order: &Order,
+    spec: &AttemptSpec,
     directory: &Path,
     options: &RunOptions,
     control: &'a Control,
@@ -259,24 +271,24 @@ fn prepare<'a>(
     let counters = &start.counters;
     let earlier = start.is_own.then(|| {
         (
-            order.attempts_directory.join(counters.series_epoch.to_string()).join(series::FILE_NAME),
+            spec.attempts_directory.join(counters.series_epoch.to_string()).join(attempt_files::SERIES),
             counters.series_bytes,
         )
     });
     Ok(Observers {
         frames: Frames::new(
             directory.to_owned(),
-            order.epoch,
+            spec.epoch,
             plan,
             options.output.fields.clone(),
             counters.frames.clone(),
             counters.frames_before,
         ),
-        series: Series::open(directory, order.epoch, plan, earlier)?,
+        series: Series::open(directory, spec.epoch, plan, earlier)?,
         checkpoints: Checkpoints::new(
             directory.to_owned(),
-            order.job.clone(),
-            order.body.clone(),
+            spec.job.clone(),
+            spec.body.clone(),
             options.checkpoint.every_wall_s,
             options.checkpoint.every_steps,
         ),
@@ -284,30 +296,38 @@ fn prepare<'a>(
         control,
         sink,
         directory: directory.to_owned(),
-        reserve_bytes: order.reserve_bytes,
+        reserve_bytes: spec.reserve_bytes,
         is_starved: false,
         restored: start.is_own.then_some(start.step),
     })
 }
 
+/// A run that has come to its end.
+struct Ended<'a> {
+    simulation: &'a dyn Simulation,
+    scene: &'a dyn Scene,
+    scene_sha256: String,
+    threads: usize,
+}
+
 /// Report, picture and digests of a finished run.
 fn finish(
-    order: &Order,
+    spec: &AttemptSpec,
     directory: &Path,
-    simulation: &dyn Simulation,
+    ended: &Ended,
     observers: &mut Observers,
-    threads: usize,
     log: &Log,
 ) -> Result<(), Failure> {
+    let simulation = ended.simulation;
     let mut files: Vec<_> = observers.frames.written().iter().map(|(_, file)| file.clone()).collect();
     // The frames may be an earlier attempt's; the index of all is this one's in any case.
     files.push(observers.frames.write_index()?);
     observers.sink.put(&Record::File(files[files.len() - 1].clone()), false)?;
     observers.series.sync()?;
-    let series = artifacts::record(directory, series::FILE_NAME, "text/csv")?;
+    let series = FileRecord::from_file(directory, attempt_files::SERIES, "text/csv")?;
     files.push(series.clone());
     observers.sink.put(&Record::File(series), false)?;
-    if let Some(drawn) = draw_picture(order, directory, observers, log) {
+    if let Some(drawn) = draw_picture(spec, directory, ended.scene, observers, log) {
         files.push(drawn.clone());
         observers.sink.put(&Record::File(drawn), false)?;
     }
@@ -315,50 +335,53 @@ fn finish(
     let usage = observers.progress.usage();
     let steps = simulation.clock().step;
     let particles = simulation.particle_count() as u64;
-    let report =
-        report::compose(&simulation.report(), &usage, &phases, steps, particles, threads, &order.body["scene"]);
-    artifacts::write(&directory.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
-    let report = artifacts::record(directory, "report.json", "application/json")?;
+    let (threads, scene_sha256) = (ended.threads, &ended.scene_sha256);
+    let report = report::compose(&simulation.report(), &usage, &phases, steps, particles, threads, scene_sha256);
+    artifacts::write(&directory.join(attempt_files::REPORT), &serde_json::to_vec_pretty(&report)?)?;
+    let report = FileRecord::from_file(directory, attempt_files::REPORT, "application/json")?;
     files.push(report.clone());
     observers.sink.put(&Record::File(report), false)?;
     files.sort_by(|a, b| a.path.cmp(&b.path));
     let sums: String = files.iter().map(|file| format!("{}  {}\n", file.sha256, file.path)).collect();
-    artifacts::write(&directory.join("SHA256SUMS"), sums.as_bytes())?;
-    let sums = artifacts::record(directory, "SHA256SUMS", "text/plain")?;
+    artifacts::write(&directory.join(attempt_files::DIGESTS), sums.as_bytes())?;
+    let sums = FileRecord::from_file(directory, attempt_files::DIGESTS, "text/plain")?;
     observers.sink.put(&Record::File(sums), true)?;
     Ok(())
 }
 
 /// The first, the middle and the last frame side by side; a picture that fails is logged and left out.
 fn draw_picture(
-    order: &Order,
+    spec: &AttemptSpec,
     directory: &Path,
+    scene: &dyn Scene,
     observers: &Observers,
     log: &Log,
-) -> Option<crate::spec::records::FileRecord> {
+) -> Option<FileRecord> {
     let frames = observers.frames.written();
     let mut chosen = vec![0, frames.len() / 2, frames.len().saturating_sub(1)];
     chosen.dedup();
     let place = |epoch: u64| {
-        if epoch == order.epoch { directory.to_owned() } else { order.attempts_directory.join(epoch.to_string()) }
+        if epoch == spec.epoch { directory.to_owned() } else { spec.attempts_directory.join(epoch.to_string()) }
     };
     let mut views = Vec::new();
     for (epoch, file) in chosen.iter().filter_map(|k| frames.get(*k)) {
-        match vtkhdf::read_frame(&place(*epoch).join(&file.path)) {
-            Ok(Some(view)) => views.push(view),
+        match frame_view::read(&place(*epoch).join(&file.path), scene.view()) {
+            Ok(Some(frame)) => views.push(frame),
             Ok(None) => return None,
             Err(error) => {
-                log.line(&hide(&format!("no picture: {error}"), order, directory));
+                log.line(&hide(&format!("no picture: {error}"), spec, directory));
                 return None;
             }
         }
     }
-    let spacing = picture::spacing(&order.body["scene"], &views);
-    let path = directory.join("picture.svg");
+    let spacing = picture::spacing(scene.spacing(), &views);
+    let path = directory.join(attempt_files::PICTURE);
     let drawn = picture::draw(&artifacts::unfinished(&path), &views, spacing)
         .and_then(|()| artifacts::finish(&path).map_err(|e| e.to_string()))
-        .and_then(|()| artifacts::record(directory, "picture.svg", "image/svg+xml").map_err(|e| e.to_string()));
-    drawn.map_err(|error| log.line(&hide(&format!("no picture: {error}"), order, directory))).ok()
+        .and_then(|()| {
+            FileRecord::from_file(directory, attempt_files::PICTURE, "image/svg+xml").map_err(|e| e.to_string())
+        });
+    drawn.map_err(|error| log.line(&hide(&format!("no picture: {error}"), spec, directory))).ok()
 }
 
 /// The attempt's log: whole lines with a time, each written at once.

@@ -1,30 +1,30 @@
-//! Points that a scene takes from files, as its worker reads them: uploads in the plain format that their check left
-//! behind, local files (of `meniscus run`, named by whoever runs it) as they are.
+//! Points that a scene takes from files, as its worker reads them: uploads in the plain format that their inspection
+//! wrote, local files of `meniscus run` as they are.
 
 use crate::formats::mesh;
 use crate::formats::{cloud_file, structure, vtkhdf};
-use crate::spec::attempt_spec::Order;
+use crate::spec::attempt_spec::AttemptSpec;
 use meniscus::scene::{Cloud, CloudReference, CloudSource, Clouds, Scene};
 use std::fs::File;
 use std::path::Path;
 
-/// All that a scene names.
+/// Reads all points that a scene names.
 ///
 /// # Errors
 /// A sentence with the pointer, the name and the cause.
-pub fn read(scene: &dyn Scene, order: &Order) -> Result<Clouds, String> {
+pub fn read(scene: &dyn Scene, spec: &AttemptSpec) -> Result<Clouds, String> {
     let read = |CloudReference { pointer, source }: CloudReference| {
         let (name, found) = match &source {
             CloudSource::File(file) => (file, read_local(Path::new(file), pointer)),
-            CloudSource::Upload(id) => (id, read_upload(id, order)),
+            CloudSource::Upload(id) => (id, read_upload(id, spec)),
         };
         found.map(|points| (pointer, points)).map_err(|cause| format!("{pointer} ({name}): {cause}"))
     };
     scene.clouds().into_iter().map(read).collect()
 }
 
-fn read_upload(id: &str, order: &Order) -> Result<Cloud, String> {
-    let path = order.inputs.get(id).ok_or("the upload is gone")?;
+fn read_upload(id: &str, spec: &AttemptSpec) -> Result<Cloud, String> {
+    let path = spec.inputs.get(id).ok_or("the upload is gone")?;
     File::open(path).and_then(|mut file| cloud_file::read(&mut file)).map_err(|error| error.to_string())
 }
 

@@ -1,6 +1,7 @@
 //! One job in this process, on so many threads, for its report alone or its frames too.
 
-use crate::spec::attempt_spec::Order;
+use crate::spec::attempt_files;
+use crate::spec::attempt_spec::AttemptSpec;
 use crate::spec::body::{self, Allowance, JobBody, NoSources};
 use crate::spec::records::{Record, RecordSink, Usage, Verdict};
 use crate::system::process;
@@ -33,10 +34,11 @@ pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<J
     fs::create_dir_all(directory).map_err(system)?;
     let memory_bytes = process::total_memory().unwrap_or(4 << 30) / 5 * 4;
     let allowance = Allowance { threads, memory_bytes, local_files: false };
-    let body = body::parse(body, allowance, &NoSources).map_err(|violations| {
+    let body = body::parse(body, allowance, &NoSources).map_err(|error| {
+        let violations = error.violations();
         violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
     })?;
-    let order = Order {
+    let spec = AttemptSpec {
         job: "local".to_owned(),
         epoch: 1,
         body: body.resolved.to_json(),
@@ -48,11 +50,11 @@ pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<J
         reserve_bytes: 0,
         usage: Usage::default(),
     };
-    match attempt::run_attempt(&order, directory, &Control::default(), &mut Silent) {
+    match attempt::run_attempt(&spec, directory, &Control::default(), &mut Silent) {
         Verdict::Succeeded => {
-            let _ = fs::remove_dir_all(directory.join("checkpoints"));
+            let _ = fs::remove_dir_all(directory.join(attempt_files::CHECKPOINTS));
             if keep == Keep::Report {
-                let _ = fs::remove_dir_all(directory.join("frames"));
+                let _ = fs::remove_dir_all(directory.join(attempt_files::FRAMES));
             }
             Ok(body)
         }

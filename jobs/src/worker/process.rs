@@ -1,7 +1,10 @@
-//! The inside of a worker's process: the ear on standard input, the pulse on standard output, and the attempt.
+//! The process of a worker that the local executor started: it receives requests on standard input, gives signs of life on
+//! standard output, and runs its attempt.
 
-use crate::spec::attempt_spec::{FILE_NAME, Order};
+use crate::spec::attempt_files;
+use crate::spec::attempt_spec::AttemptSpec;
 use crate::spec::records::{Record, RecordFile, RecordSink, Verdict};
+use crate::spec::requests::Request;
 use crate::system::process;
 use crate::worker::attempt::run_attempt;
 use crate::worker::observers::Control;
@@ -10,29 +13,29 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Time between two signs of life.
-const PULSE: Duration = Duration::from_secs(1);
+const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Runs the order in an attempt's directory; the verdict stands in the records.
+/// Runs the attempt whose specification stands in a directory. The verdict is also its last record.
 ///
 /// # Errors
-/// When the order cannot be read or the records cannot be opened.
+/// When the specification cannot be read or the records cannot be opened.
 pub fn run(directory: &Path) -> io::Result<Verdict> {
     process::be_nice();
-    let order: Order = serde_json::from_slice(&std::fs::read(directory.join(FILE_NAME))?)?;
+    let spec: AttemptSpec = serde_json::from_slice(&std::fs::read(directory.join(attempt_files::ATTEMPT_SPEC))?)?;
     let control = Control::default();
-    listen(control.clone())?;
-    pulse()?;
-    let mut sink = Announced(RecordFile::open(directory, order.epoch)?);
-    Ok(run_attempt(&order, directory, &control, &mut sink))
+    receive_requests(control.clone())?;
+    give_heartbeats()?;
+    let mut sink = AnnouncedRecords(RecordFile::open(directory, spec.epoch)?);
+    Ok(run_attempt(&spec, directory, &control, &mut sink))
 }
 
-/// Hears requests; the end of the input is the end of the service and of this process.
-fn listen(control: Control) -> io::Result<()> {
-    std::thread::Builder::new().name("ear".to_owned()).spawn(move || {
+/// Receives requests on a thread of its own. The end of the input means that the service has ended: this process ends too.
+fn receive_requests(control: Control) -> io::Result<()> {
+    std::thread::Builder::new().name("requests".to_owned()).spawn(move || {
         for line in io::stdin().lock().lines() {
-            match line {
-                Ok(word) => control.hear(&word),
-                Err(_) => break,
+            let Ok(word) = line else { break };
+            if let Some(request) = Request::from_word(word.trim()) {
+                control.receive(request);
             }
         }
         end_at_once();
@@ -40,19 +43,19 @@ fn listen(control: Control) -> io::Result<()> {
     Ok(())
 }
 
-/// Ends this process when its standard input does: whoever holds the other end has gone.
+/// Ends this process when its standard input ends: the process at the other end has gone.
 ///
 /// # Errors
 /// When no thread can be started.
 pub fn end_with_input() -> io::Result<()> {
-    listen(Control::default())
+    receive_requests(Control::default())
 }
 
-fn pulse() -> io::Result<()> {
-    std::thread::Builder::new().name("pulse".to_owned()).spawn(|| {
+fn give_heartbeats() -> io::Result<()> {
+    std::thread::Builder::new().name("heartbeat".to_owned()).spawn(|| {
         loop {
-            std::thread::sleep(PULSE);
-            if hint().is_err() {
+            std::thread::sleep(HEARTBEAT_INTERVAL);
+            if heartbeat().is_err() {
                 end_at_once();
             }
         }
@@ -60,26 +63,27 @@ fn pulse() -> io::Result<()> {
     Ok(())
 }
 
-fn hint() -> io::Result<()> {
+/// One sign of life; it also hints that there may be new records.
+fn heartbeat() -> io::Result<()> {
     let mut output = io::stdout().lock();
     output.write_all(b"\n")?;
     output.flush()
 }
 
-/// Ends without exit handlers, which could wait for a library that another thread is inside of. Whatever was being
-/// written has an unfinished name.
+/// Ends without exit handlers, which could wait for a library that another thread is inside of. A file in the making has an
+/// unfinished name.
 fn end_at_once() {
     let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::KILL);
 }
 
-/// Records that are hinted at on standard output.
-struct Announced(RecordFile);
+/// Records each of which is followed by a sign of life.
+struct AnnouncedRecords(RecordFile);
 
-impl RecordSink for Announced {
+impl RecordSink for AnnouncedRecords {
     fn put(&mut self, record: &Record, durable: bool) -> io::Result<()> {
         self.0.put(record, durable)?;
-        // The pulse notices a closed pipe.
-        let _ = hint();
+        // The next heartbeat notices a closed pipe.
+        let _ = heartbeat();
         Ok(())
     }
 }

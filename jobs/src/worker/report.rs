@@ -2,7 +2,6 @@
 
 use crate::spec::records::Usage;
 use crate::system::build;
-use crate::system::digest;
 use crate::system::process;
 use meniscus::simulation::Report;
 use serde_json::{Value, json};
@@ -17,7 +16,7 @@ pub fn compose(
     steps: u64,
     particles: u64,
     threads: usize,
-    scene: &Value,
+    scene_sha256: &str,
 ) -> Value {
     json!({
         "errors": report.errors,
@@ -48,7 +47,7 @@ pub fn compose(
             "cpu": process::cpu_name(),
             "isa": build::isa(),
             "threads": threads,
-            "scene_sha256": digest::of_bytes(scene.to_string().as_bytes()),
+            "scene_sha256": scene_sha256,
         },
     })
 }

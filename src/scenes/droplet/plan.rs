@@ -13,7 +13,7 @@ use crate::parallel::Interrupt;
 use crate::polynomials::multi_index::term_count;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
@@ -376,6 +376,11 @@ impl<const D: usize> Scene for DropletScene<D> {
 
     fn resolved(&self) -> Value {
         scene::resolved(super::KIND.kind, &self.spec)
+    }
+
+    fn view(&self) -> View {
+        let has_distance = self.parts.has_tension() && matches!(self.parts.geometry, Geometry::Pcp { .. });
+        if has_distance { View::DISTANCE } else { View::Nothing }
     }
 
     fn field_names(&self) -> Vec<&'static str> {

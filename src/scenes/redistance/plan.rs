@@ -6,7 +6,7 @@ use crate::geometry::Surface;
 use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::pcp_spec::PcpContext;
 use crate::scenes::shapes::Shape;
@@ -199,6 +199,10 @@ impl<const D: usize> Scene for RedistanceScene<D> {
 
     fn resolved(&self) -> Value {
         scene::resolved(super::KIND.kind, &self.spec)
+    }
+
+    fn view(&self) -> View {
+        View::DISTANCE
     }
 
     fn field_names(&self) -> Vec<&'static str> {

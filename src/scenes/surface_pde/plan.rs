@@ -16,7 +16,7 @@ use crate::operators::charts::tangent::Metric;
 use crate::point_clouds::{Bump, normals};
 use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::PhaseWork;
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::work_estimate;
 use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
 use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method, SurfaceCloud, SurfaceEquation};
@@ -430,6 +430,12 @@ impl Scene for SurfaceScene {
 
     fn resolved(&self) -> Value {
         scene::resolved(super::KIND.kind, &self.spec)
+    }
+
+    fn view(&self) -> View {
+        let has_values = self.problem.field_names(&self.shape).contains(&"value");
+        let field = View::SurfaceField { field: "value", normal: "normal", is_plane: self.shape.is_curve() };
+        if has_values { field } else { View::Nothing }
     }
 
     fn field_names(&self) -> Vec<&'static str> {

@@ -154,12 +154,12 @@ pub fn scenes(count: u64, seed: u64) -> String {
         }
         let Ok(spec) = strict_json::parse(&text) else { continue };
         match body::parse(&spec, ALLOWANCE, &NoSources) {
-            Err(found) => assert!(!found.is_empty(), "refused without a word: {spec}"),
+            Err(found) => assert!(!found.violations().is_empty(), "refused without a word: {spec}"),
             Ok(body) => {
                 accepted += 1;
                 let again = parse(&body.resolved.scene, SCENES)
                     .unwrap_or_else(|found| panic!("what is resolved is refused: {spec}: {found:?}"));
-                assert_eq!(again.resolved(), body.resolved["scene"], "{spec}");
+                assert_eq!(again.resolved(), body.resolved.scene, "{spec}");
                 let plan = OutputPlan { every_time: None, series_every_steps: 10 };
                 let work = again.work(&again.estimate(&CloudSizes::new()), &plan);
                 assert!(work.iter().all(|phase| phase.units >= 0.0), "{spec}: {work:?}");
@@ -189,11 +189,11 @@ pub fn studies(count: u64, seed: u64) -> String {
         for _ in 0..=draws.below(3) {
             mutate(&mut spec, &mut draws, &words);
         }
-        match study::parse(&spec, ALLOWANCE, 2, &NoSources, &Calibration::default()) {
-            Err(found) => assert!(!found.is_empty(), "refused without a word: {spec}"),
+        match study::parse(&spec, ALLOWANCE, 2, &NoSources, &Calibration::default(), |_| ()) {
+            Err(found) => assert!(!found.violations().is_empty(), "refused without a word: {spec}"),
             Ok(study) => {
                 accepted += 1;
-                assert_eq!(study.points.len(), study.new.jobs.len());
+                assert_eq!(study.points.len(), study.jobs.len());
             }
         }
     }

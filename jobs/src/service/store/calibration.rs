@@ -6,7 +6,7 @@ use crate::system::build;
 use rusqlite::{Connection, Transaction, params};
 
 impl Store {
-    /// Everything that is known here and now.
+    /// Everything that was measured on this machine with this build.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -14,7 +14,7 @@ impl Store {
         Ok(read(&self.read())?)
     }
 
-    /// Adds what runs have told.
+    /// Adds the measurements of finished runs.
     ///
     /// # Errors
     /// [`StoreError`].

@@ -11,11 +11,11 @@ pub struct Event {
     pub id: u64,
     /// `state`, `progress`, `checkpoint`, `frame`, `warning`, `finding`.
     pub kind: String,
-    /// When.
+    /// Time of the event.
     pub at: String,
-    /// Attempt.
+    /// Attempt in which it happened.
     pub attempt: u64,
-    /// Particulars.
+    /// Details, by kind.
     pub data: Value,
 }
 

@@ -2,14 +2,14 @@
 //! job is at the record's attempt.
 
 use super::{Store, StoreError, calibration, events, rows};
-use crate::spec::calibration::measured;
-use crate::spec::records::{self, CheckpointRecord, Line, Progress, Record, Usage, Verdict};
+use crate::spec::attempt_files::{self, attempt_directory};
+use crate::spec::forecast::measured;
+use crate::spec::records::{self, CheckpointRecord, FileRecord, Line, Progress, Record, Usage, Verdict};
+use crate::spec::run_options::RunOptions;
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-/// The file of a finished run's errors and cost.
-pub const REPORT: &str = "report.json";
 /// Least time between two progress events of a job.
 const PROGRESS_EVENT_INTERVAL: Duration = Duration::from_secs(1);
 
@@ -19,16 +19,16 @@ pub struct ProgressPace {
     last: Option<Instant>,
 }
 
-/// What an import brought.
+/// Outcome of an import.
 #[derive(Debug)]
 pub struct Imported {
     /// Whether every whole record that the worker has written is taken.
     pub is_whole: bool,
-    /// The worker's last word.
+    /// The worker's verdict, if it came.
     pub verdict: Option<Verdict>,
-    /// Whether a checkpoint came.
+    /// Whether a checkpoint was among them.
     pub has_checkpoint: bool,
-    /// Whether anything came.
+    /// Whether there were new records.
     pub any: bool,
 }
 
@@ -47,7 +47,7 @@ impl Store {
         let Some(row) = self.job(job)?.filter(|row| row.attempt == epoch) else {
             return Ok(Imported::default());
         };
-        let directory = crate::spec::attempt_spec::attempt_directory(&self.job_directory(job), epoch);
+        let directory = attempt_directory(&self.job_directory(job), epoch);
         let lines = records::read_from(&directory, row.records_offset)?;
         let Some((_, end)) = lines.last() else {
             return Ok(Imported::default());
@@ -138,7 +138,7 @@ impl Store {
         if !deleted {
             return Ok(false);
         }
-        let directory = crate::spec::attempt_spec::attempt_directory(&self.job_directory(&row.job), row.attempt);
+        let directory = attempt_directory(&self.job_directory(&row.job), row.attempt);
         match std::fs::remove_file(directory.join(&row.path)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
             _ => Ok(true),
@@ -164,7 +164,7 @@ impl Store {
     }
 }
 
-/// Whose records are taken.
+/// The attempt whose records are taken.
 struct Attempt<'a> {
     job: &'a str,
     study: Option<&'a str>,
@@ -172,7 +172,7 @@ struct Attempt<'a> {
 }
 
 impl Attempt<'_> {
-    fn tell(&self, transaction: &Transaction, kind: &str, data: &serde_json::Value) -> Result<(), StoreError> {
+    fn append_event(&self, transaction: &Transaction, kind: &str, data: &serde_json::Value) -> Result<(), StoreError> {
         Ok(events::append(transaction, self.job, self.study, self.epoch, kind, data)?)
     }
 }
@@ -180,63 +180,28 @@ impl Attempt<'_> {
 impl Store {
     /// Keeps the errors and the cost of a finished run in its row, so that tables of thousands open no file.
     fn keep_results(&self, transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
-        let directory = crate::spec::attempt_spec::attempt_directory(&self.job_directory(of.job), of.epoch);
-        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(directory.join(REPORT))?)?;
+        let directory = attempt_directory(&self.job_directory(of.job), of.epoch);
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(directory.join(attempt_files::REPORT))?)?;
         let results = json!({"errors": report["errors"], "cost": report["cost"]});
         // Runs that began in the middle or were cut off tell nothing about whole ones.
         if let Some(row) =
             rows::job(transaction, of.job)?.filter(|row| row.attempt == 1 && row.restarted_from.is_none())
         {
-            let threads = row.resolved["limits"]["threads"].as_u64().unwrap_or(1);
-            calibration::add(transaction, &measured(&row.estimate, &report["cost"], threads))?;
+            let threads = RunOptions::from_resolved(&row.resolved)?.limits.threads;
+            calibration::add(transaction, &measured(&row.forecast, &report["cost"], threads))?;
         }
         transaction.execute("UPDATE jobs SET results = ?2 WHERE id = ?1", params![of.job, results.to_string()])?;
         Ok(())
     }
 
     fn take(&self, transaction: &Transaction, of: &Attempt, record: &Record) -> Result<(), StoreError> {
-        let Attempt { job, epoch, .. } = *of;
+        let job = of.job;
         match record {
-            Record::Started { frames, pid, step, .. } => {
-                // Frames after the checkpoint are written again; until then they are not part of the job.
-                let paths: Vec<String> = {
-                    let mut statement = transaction.prepare_cached(
-                        "SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path",
-                    )?;
-                    let rows = statement.query_map([job], |row| row.get(0))?;
-                    rows.collect::<Result<_, _>>()?
-                };
-                for path in paths.iter().skip(*frames as usize) {
-                    transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
-                }
-                transaction.execute("UPDATE jobs SET worker_pid = ?2 WHERE id = ?1", params![job, pid])?;
-                // Checkpoints of steps that are to come again were refused by the worker.
-                transaction
-                    .execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, *step as i64])?;
-            }
+            Record::Started { frames, step, .. } => take_start(transaction, job, *frames, *step)?,
             Record::File(file) => {
-                transaction
-                    .prepare_cached(
-                        "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
-                     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-                    )?
-                    .execute(params![
-                        job,
-                        file.path,
-                        epoch as i64,
-                        file.size_bytes as i64,
-                        file.sha256,
-                        file.media_type,
-                        file.time,
-                        file.step.map(|step| step as i64),
-                    ])?;
-                if file.path == REPORT {
+                take_file(transaction, of, file)?;
+                if file.path == attempt_files::REPORT {
                     self.keep_results(transaction, of)?;
-                }
-                if file.step.is_some() {
-                    let data =
-                        json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
-                    of.tell(transaction, "frame", &data)?;
                 }
             }
             Record::Warning { code, message } => {
@@ -248,16 +213,55 @@ impl Store {
                     "UPDATE jobs SET warnings = ?2, progress_count = progress_count + 1 WHERE id = ?1",
                     params![job, serde_json::to_string(&warnings)?],
                 )?;
-                of.tell(transaction, "warning", &json!({"code": code, "message": message}))?;
+                of.append_event(transaction, "warning", &json!({"code": code, "message": message}))?;
             }
             Record::Finding { name, message, time } => {
                 let data = json!({"name": name, "message": message, "time": time});
-                of.tell(transaction, "finding", &data)?;
+                of.append_event(transaction, "finding", &data)?;
             }
             Record::Progress(_) | Record::Checkpoint(_) | Record::Verdict(_) => {}
         }
         Ok(())
     }
+}
+
+/// Takes the start of an attempt from a checkpoint: what was published after the checkpoint is void until it comes again.
+fn take_start(transaction: &Transaction, job: &str, frames: u64, step: u64) -> Result<(), StoreError> {
+    let paths: Vec<String> = {
+        let mut statement = transaction
+            .prepare_cached("SELECT path FROM files WHERE job = ?1 AND path LIKE 'frames/%' ORDER BY path")?;
+        let rows = statement.query_map([job], |row| row.get(0))?;
+        rows.collect::<Result<_, _>>()?
+    };
+    for path in paths.iter().skip(frames as usize) {
+        transaction.execute("DELETE FROM files WHERE job = ?1 AND path = ?2", params![job, path])?;
+    }
+    // The worker refused the checkpoints of steps that are to come again.
+    transaction.execute("DELETE FROM checkpoints WHERE job = ?1 AND step > ?2", params![job, step as i64])?;
+    Ok(())
+}
+
+fn take_file(transaction: &Transaction, of: &Attempt, file: &FileRecord) -> Result<(), StoreError> {
+    transaction
+        .prepare_cached(
+            "INSERT OR REPLACE INTO files (job, path, attempt, size_bytes, sha256, media_type, time, step)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        )?
+        .execute(params![
+            of.job,
+            file.path,
+            of.epoch as i64,
+            file.size_bytes as i64,
+            file.sha256,
+            file.media_type,
+            file.time,
+            file.step.map(|step| step as i64),
+        ])?;
+    if file.step.is_some() {
+        let data = json!({"path": file.path, "time": file.time, "step": file.step, "size_bytes": file.size_bytes});
+        of.append_event(transaction, "frame", &data)?;
+    }
+    Ok(())
 }
 
 fn take_checkpoint(transaction: &Transaction, of: &Attempt, checkpoint: &CheckpointRecord) -> Result<(), StoreError> {
@@ -282,14 +286,14 @@ fn take_checkpoint(transaction: &Transaction, of: &Attempt, checkpoint: &Checkpo
         ])?;
     transaction.execute("UPDATE jobs SET checkpoint_since = 1 WHERE id = ?1", [job])?;
     let data = json!({"id": checkpoint.id, "step": checkpoint.step, "time": checkpoint.time, "size_bytes": checkpoint.size_bytes});
-    of.tell(transaction, "checkpoint", &data)
+    of.append_event(transaction, "checkpoint", &data)
 }
 
 /// The last progress as an event, if the coalescing held it back: the end of a run is never missing.
 fn flush_progress(transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
     let job = of.job;
     let Some(row) = rows::job(transaction, job)? else { return Ok(()) };
-    let told: Option<u64> = transaction
+    let last_step: Option<u64> = transaction
         .query_row(
             "SELECT json_extract(data, '$.step') FROM events WHERE job = ?1 AND type = 'progress' ORDER BY id DESC LIMIT 1",
             [job],
@@ -298,7 +302,7 @@ fn flush_progress(transaction: &Transaction, of: &Attempt) -> Result<(), StoreEr
         .optional()?
         .flatten()
         .map(|step| step as u64);
-    if row.progress_count > 0 && told != Some(row.progress.step) {
+    if row.progress_count > 0 && last_step != Some(row.progress.step) {
         append_progress(transaction, of, &row.progress)?;
     }
     Ok(())
@@ -309,7 +313,7 @@ fn append_progress(transaction: &Transaction, of: &Attempt, progress: &Progress)
         "fraction": progress.fraction, "time": progress.time, "step": progress.step,
         "steps_per_s": progress.steps_per_s, "eta_s": progress.eta_s,
     });
-    of.tell(transaction, "progress", &data)
+    of.append_event(transaction, "progress", &data)
 }
 
 fn take_progress(

@@ -52,11 +52,11 @@ impl Store {
             .unwrap_or(false))
     }
 
-    /// The state that the last event of that kind speaks of.
+    /// The state that the last event of a change of state names.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn last_told_state(&self, job: &str) -> Result<Option<State>, StoreError> {
+    pub fn state_of_last_event(&self, job: &str) -> Result<Option<State>, StoreError> {
         let connection = self.read();
         let word: Option<String> = connection
             .prepare_cached(

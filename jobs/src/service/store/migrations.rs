@@ -1,4 +1,4 @@
-//! Numbered changes of the schema; `user_version` says how many have been made.
+//! Numbered changes of the schema; `user_version` counts those that have been made.
 
 use super::StoreError;
 use rusqlite::Connection;
@@ -152,6 +152,26 @@ const MIGRATIONS: &[&str] = &[
         PRIMARY KEY (build, machine, kind, phase)
     ) STRICT, WITHOUT ROWID;
 ",
+    // What clients were told is opaque to the store; a worker is known by the handle that its executor gave.
+    "
+    CREATE TABLE receipts (
+        owner TEXT NOT NULL,
+        key TEXT NOT NULL,
+        fingerprint TEXT NOT NULL,
+        receipt BLOB NOT NULL,
+        created_at TEXT NOT NULL,
+        PRIMARY KEY (owner, key)
+    ) STRICT, WITHOUT ROWID;
+    INSERT INTO receipts (owner, key, fingerprint, receipt, created_at)
+        SELECT owner, key, request_sha256,
+            CAST(json_object('status', status, 'location', location, 'body', body) AS BLOB), created_at
+        FROM answers;
+    DROP TABLE answers;
+    ALTER TABLE jobs ADD COLUMN worker_handle TEXT;
+    UPDATE jobs SET worker_handle = CAST(worker_pid AS TEXT) WHERE worker_pid IS NOT NULL;
+    ALTER TABLE jobs DROP COLUMN worker_pid;
+    ALTER TABLE jobs RENAME COLUMN condemned TO kill_reason;
+",
 ];
 
 /// Makes the changes that are missing, each in a transaction of its own.
@@ -171,4 +191,36 @@ pub fn apply(connection: &mut Connection) -> Result<(), StoreError> {
         transaction.commit()?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MIGRATIONS, apply};
+    use rusqlite::Connection;
+
+    #[test]
+    fn a_store_of_the_build_before_keeps_its_answers_and_its_workers() {
+        let mut connection = Connection::open_in_memory().unwrap();
+        for change in &MIGRATIONS[..2] {
+            connection.execute_batch(change).unwrap();
+        }
+        connection
+            .execute_batch(
+                "PRAGMA user_version = 2;
+                 INSERT INTO answers VALUES ('owner', 'key', 'digest', 201, '/v1/jobs/job_1', '{\"id\":\"job_1\"}', 'now');
+                 INSERT INTO jobs (id, rev, state, labels, kind, spec, resolved, estimate, priority, created_at, worker_pid,
+                     condemned)
+                 VALUES ('job_1', 1, 'running', '{}', 'vortex', '{}', '{}', '{}', 0, 'now', 4711, 'limit.memory');",
+            )
+            .unwrap();
+        apply(&mut connection).unwrap();
+        let receipt: Vec<u8> =
+            connection.query_row("SELECT receipt FROM receipts WHERE key = 'key'", [], |row| row.get(0)).unwrap();
+        let expected = r#"{"status":201,"location":"/v1/jobs/job_1","body":"{\"id\":\"job_1\"}"}"#;
+        assert_eq!(String::from_utf8(receipt).unwrap(), expected);
+        let worker: (String, String) = connection
+            .query_row("SELECT worker_handle, kill_reason FROM jobs", [], |row| Ok((row.get(0)?, row.get(1)?)))
+            .unwrap();
+        assert_eq!(worker, ("4711".to_owned(), "limit.memory".to_owned()));
+    }
 }

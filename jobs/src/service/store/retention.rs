@@ -1,21 +1,17 @@
-//! What is kept for how long.
+//! How long jobs, studies and receipts are kept.
 
-use super::{Store, StoreError, answers};
+use super::{Store, StoreError, idempotency};
 use rusqlite::params;
 
 impl Store {
     /// Deletes jobs that came to their end more than so many days ago, with their files, and studies of which nothing is
-    /// left, twenty at a time. Answers kept for repeated requests go after a week. Says how many jobs went.
+    /// left, twenty at a time. Receipts for repeated requests go after a week. Returns how many jobs were deleted.
     ///
     /// # Errors
     /// [`StoreError`].
     pub fn expire(&self, days: Option<u32>) -> Result<usize, StoreError> {
         let day = 86_400;
-        self.write(|transaction| -> Result<(), StoreError> {
-            let before = crate::system::clock::from_now(-answers::KEPT_DAYS * day);
-            transaction.execute("DELETE FROM answers WHERE created_at < ?1", [before])?;
-            Ok(())
-        })?;
+        self.write(|transaction| -> Result<(), StoreError> { idempotency::expire(transaction) })?;
         let Some(days) = days else { return Ok(0) };
         let before = crate::system::clock::from_now(-i64::from(days) * day);
         let old: Vec<String> = {

@@ -1,7 +1,8 @@
-//! Rows as values.
+//! Rows of the store as values.
 
 use super::StoreError;
 use crate::formats::frame_index;
+use crate::spec::forecast::ForecastRecord;
 use crate::spec::records::{Progress, Usage, Verdict};
 use crate::spec::states::{Reason, State};
 use crate::system::digest;
@@ -12,21 +13,21 @@ use std::collections::BTreeMap;
 /// A job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobRow {
-    /// Id.
+    /// Id of the job.
     pub id: String,
     /// Counts changes of state.
     pub rev: i64,
-    /// State.
+    /// State of the job.
     pub state: State,
-    /// Why, if the state is not plain.
+    /// Reason of the state, if it has one.
     pub reason: Option<Reason>,
-    /// What to do about it.
+    /// What a user can do about it.
     pub hint: Option<String>,
-    /// Numbers and places of a failure.
+    /// Numbers and places of a failure, in a sentence.
     pub message: Option<String>,
-    /// Name.
+    /// Name, for people.
     pub name: Option<String>,
-    /// Labels.
+    /// Labels, for filters.
     pub labels: BTreeMap<String, String>,
     /// Kind of the scene.
     pub kind: String,
@@ -34,15 +35,15 @@ pub struct JobRow {
     pub spec: Value,
     /// Body with every default.
     pub resolved: Value,
-    /// Size of the run as estimated.
-    pub estimate: Value,
-    /// Priority.
+    /// What the run was forecast to take.
+    pub forecast: ForecastRecord,
+    /// Priority: higher goes first.
     pub priority: i64,
-    /// Made.
+    /// Time at which it was made.
     pub created_at: String,
-    /// First started.
+    /// Time at which it first started.
     pub started_at: Option<String>,
-    /// Came to a terminal state.
+    /// Time at which it came to a terminal state.
     pub finished_at: Option<String>,
     /// Number of the latest attempt: the epoch.
     pub attempt: u64,
@@ -52,19 +53,19 @@ pub struct JobRow {
     pub records_offset: u64,
     /// Whether this attempt has made a checkpoint.
     pub has_new_checkpoint: bool,
-    /// Process of the latest attempt.
-    pub worker_pid: Option<u32>,
-    /// The worker's last word in this attempt, once it has come.
+    /// Handle of the latest attempt's worker, as its executor gave it.
+    pub worker_handle: Option<String>,
+    /// The verdict of this attempt's worker, once it has come.
     pub verdict: Option<Verdict>,
-    /// Why the service ended the worker, written before it did.
-    pub condemned: Option<Reason>,
-    /// Progress.
+    /// Why the service killed the worker, written before it did.
+    pub kill_reason: Option<Reason>,
+    /// Progress as last reported.
     pub progress: Progress,
     /// Counts changes of progress.
     pub progress_count: i64,
     /// Warnings.
     pub warnings: Vec<String>,
-    /// Cost of attempts that ended.
+    /// Cost so far, over all attempts.
     pub usage: Usage,
     /// Running time at the last resume.
     pub leg_wall_s: f64,
@@ -86,7 +87,7 @@ impl JobRow {
     /// Bytes that its files will still need, beside what is there.
     #[must_use]
     pub fn disk_bytes_to_come(&self) -> u64 {
-        self.estimate["disk_bytes"].as_u64().unwrap_or(0).saturating_sub(self.usage.disk_bytes)
+        self.forecast.disk_bytes.saturating_sub(self.usage.disk_bytes)
     }
 }
 
@@ -97,15 +98,15 @@ pub struct FileRow {
     pub path: String,
     /// Attempt that wrote it.
     pub attempt: u64,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
     /// Media type.
     pub media_type: String,
     /// Scene time.
     pub time: Option<f64>,
-    /// Step.
+    /// Step of the simulation.
     pub step: Option<u64>,
     /// The whole content, where no attempt has written it.
     pub content: Option<String>,
@@ -114,7 +115,7 @@ pub struct FileRow {
 /// A verified checkpoint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckpointRow {
-    /// Id.
+    /// Id of the checkpoint.
     pub id: String,
     /// Job that wrote it.
     pub job: String,
@@ -122,19 +123,19 @@ pub struct CheckpointRow {
     pub attempt: u64,
     /// Path below the attempt's directory.
     pub path: String,
-    /// Step.
+    /// Step of the simulation.
     pub step: u64,
     /// Scene time.
     pub time: f64,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
-    /// When.
+    /// Time at which it was imported.
     pub created_at: String,
-    /// Instruction set.
+    /// Instruction set that it was written on.
     pub isa: String,
-    /// Program.
+    /// Program that wrote it.
     pub build: String,
 }
 
@@ -165,7 +166,7 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         kind: row.get("kind")?,
         spec: json(row, "spec")?,
         resolved: json(row, "resolved")?,
-        estimate: json(row, "estimate")?,
+        forecast: json(row, "estimate")?,
         priority: row.get("priority")?,
         created_at: row.get("created_at")?,
         started_at: row.get("started_at")?,
@@ -174,9 +175,9 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         deaths: row.get("deaths")?,
         records_offset: row.get::<_, i64>("records_offset")? as u64,
         has_new_checkpoint: row.get::<_, i64>("checkpoint_since")? != 0,
-        worker_pid: row.get("worker_pid")?,
+        worker_handle: row.get("worker_handle")?,
         verdict: json(row, "verdict")?,
-        condemned: row.get::<_, Option<String>>("condemned")?.as_deref().and_then(Reason::from_word),
+        kill_reason: row.get::<_, Option<String>>("kill_reason")?.as_deref().and_then(Reason::from_word),
         progress: json(row, "progress")?,
         progress_count: row.get("progress_count")?,
         warnings: json(row, "warnings")?,

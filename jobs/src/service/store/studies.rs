@@ -1,20 +1,21 @@
-//! Studies: sweeps of jobs as one object. A study has no state of its own but what its jobs are in.
+//! Studies: sweeps of jobs as one object. Its state is that of its jobs.
 
-use super::answers::{KeptAnswer, Made, Once};
+use super::idempotency::{IdempotencyKey, Made, Receipt};
 use super::submission::{NewJob, insert};
 use super::transitions::apply;
 use super::{Change, ChangeError, Store, StoreError, remove_directory, rows};
+use crate::spec::forecast::ForecastRecord;
 use crate::spec::records::{Progress, Usage};
 use crate::spec::states::{Reason, State, Trigger};
 use crate::spec::study::Study;
-use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
+use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde_json::{Map, Value};
 use std::collections::{BTreeMap, HashSet};
 
 /// A study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyRow {
-    /// Id.
+    /// Id of the study.
     pub id: String,
     /// Name.
     pub name: Option<String>,
@@ -26,9 +27,9 @@ pub struct StudyRow {
     pub sweep: Value,
     /// Pointers that vary.
     pub axes: Vec<String>,
-    /// Points.
+    /// Number of points.
     pub points: u64,
-    /// Jobs at once.
+    /// Most jobs that run at once.
     pub max_parallel: Option<u64>,
     /// `continue` or `stop`.
     pub on_failure: String,
@@ -36,7 +37,7 @@ pub struct StudyRow {
     pub is_stopping: bool,
     /// Estimated total.
     pub estimate: Value,
-    /// Made.
+    /// Time at which it was made.
     pub created_at: String,
     /// Points by the state of their latest job.
     pub counts: BTreeMap<State, u64>,
@@ -55,13 +56,13 @@ pub struct NewStudy {
     pub sweep: Value,
     /// Pointers that vary.
     pub axes: Vec<String>,
-    /// Jobs at once.
+    /// Most jobs that run at once.
     pub max_parallel: Option<u64>,
     /// `continue` or `stop`.
     pub on_failure: &'static str,
     /// Estimated total.
     pub estimate: Value,
-    /// One a point.
+    /// Jobs, one for each point.
     pub jobs: Vec<NewJob>,
 }
 
@@ -79,13 +80,13 @@ pub struct PointRow {
     pub index: u64,
     /// Latest job.
     pub job: String,
-    /// Its state.
+    /// State of that job.
     pub state: State,
-    /// Why, if not plain.
+    /// Reason of that state, if it has one.
     pub reason: Option<String>,
     /// Its value at every axis: as it was sent, else the default that it got.
     pub values: Vec<Value>,
-    /// Its spacing.
+    /// Spacing of its scene.
     pub spacing: Option<f64>,
     /// CPU seconds and seconds by the clock.
     pub spent: [f64; 2],
@@ -108,8 +109,8 @@ impl Store {
     pub fn make_study(
         &self,
         study: NewStudy,
-        once: Option<&Once>,
-        answer: impl FnOnce(&StudyRow) -> KeptAnswer,
+        key: Option<&IdempotencyKey>,
+        receipt: impl FnOnce(&StudyRow) -> Receipt,
     ) -> Result<Made, StoreError> {
         let id = format!("std_{}", self.next_id());
         let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs } = study;
@@ -120,7 +121,7 @@ impl Store {
             job.study = Some((id.clone(), index as u64));
             prepared.push((job_id, job, start));
         }
-        let made = self.make_once(once, |transaction| {
+        let made = self.make_once(key, |transaction| {
             transaction.execute(
                 "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at)
                  VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
@@ -141,7 +142,7 @@ impl Store {
             for (job_id, job, start) in &prepared {
                 insert(transaction, job_id, job, start.as_deref())?;
             }
-            Ok(answer(&study_of(transaction, &id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
+            Ok(receipt(&study_of(transaction, &id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
         });
         if !matches!(made, Ok(Made::New(_))) {
             for (job_id, ..) in prepared.iter().filter(|(.., start)| start.is_some()) {
@@ -159,8 +160,8 @@ impl Store {
         &self,
         study: &str,
         jobs: &[NewJob],
-        once: Option<&Once>,
-        answer: impl FnOnce(&StudyRow) -> KeptAnswer,
+        key: Option<&IdempotencyKey>,
+        receipt: impl FnOnce(&StudyRow) -> Receipt,
     ) -> Result<Made, StoreError> {
         let mut prepared = Vec::with_capacity(jobs.len());
         for job in jobs {
@@ -168,10 +169,10 @@ impl Store {
             let start = self.prepare_start(&id, job)?;
             prepared.push((id, job, start));
         }
-        let made = self.make_once(once, |transaction| {
+        let made = self.make_once(key, |transaction| {
             transaction.execute("UPDATE studies SET stopping = 0 WHERE id = ?1", [study])?;
             for (id, job, start) in &prepared {
-                // Somebody else may have repeated it in the meantime.
+                // Another request may have repeated it in the meantime.
                 let is_latest: bool = transaction
                     .prepare_cached("SELECT EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND superseded = 0)")?
                     .query_row([&job.retry_of], |row| row.get(0))?;
@@ -179,7 +180,7 @@ impl Store {
                     insert(transaction, id, job, start.as_deref())?;
                 }
             }
-            Ok(answer(&study_of(transaction, study)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
+            Ok(receipt(&study_of(transaction, study)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
         });
         // Directories of jobs that were not made after all.
         for (id, ..) in prepared.iter().filter(|(.., start)| start.is_some()) {
@@ -258,7 +259,7 @@ impl Store {
             all.into_iter().filter(|(_, state)| from.contains(state.as_str())).map(|(id, _)| id).collect()
         };
         if trigger == Trigger::Pause {
-            // Those that rest for want of space must not go on by themselves any more.
+            // Jobs that were paused for lack of space must not resume by themselves any more.
             self.keep_paused_where("study", study)?;
         }
         for chunk in ids.chunks(CHUNK) {
@@ -276,7 +277,7 @@ impl Store {
         Ok(())
     }
 
-    /// Cancels what is left of studies that stop at their first failure.
+    /// Cancels the remaining jobs of studies that stop at their first failure.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -288,7 +289,8 @@ impl Store {
             rows.collect::<Result<_, _>>()?
         };
         for id in ids {
-            let message = "another point of the study failed, and on_failure is \"stop\"; POST …/retry runs it anew";
+            let message =
+                "another point of the study failed, and on_failure is \"stop\"; retry the study to run it anew";
             let change = Change { message: Some(message.to_owned()), ..Change::because(Reason::UserCancel) };
             self.change_study(&id, Trigger::Cancel, &change)?;
             self.write(|transaction| -> Result<(), StoreError> {
@@ -328,28 +330,6 @@ impl Store {
     }
 }
 
-/// A study whose point has failed stops if it is to; the rest is canceled by the supervisor.
-pub(super) fn note_failure(transaction: &Transaction, study: &str) -> rusqlite::Result<()> {
-    transaction
-        .prepare_cached("UPDATE studies SET stopping = 1 WHERE id = ?1 AND on_failure = 'stop' AND stopping = 0")?
-        .execute([study])
-        .map(|_| ())
-}
-
-/// Studies none of whose queued jobs may start now: as many run as may, or one has failed and the rest is to be canceled.
-pub(super) fn without_a_free_place(connection: &Connection) -> rusqlite::Result<HashSet<String>> {
-    let mut statement = connection.prepare_cached(
-        "SELECT id FROM studies WHERE stopping = 1
-         UNION
-         SELECT s.id FROM studies s JOIN
-             (SELECT study, COUNT(*) AS many FROM jobs
-              WHERE state IN ('running', 'pausing', 'canceling', 'interrupted') AND study IS NOT NULL GROUP BY study) r
-             ON r.study = s.id WHERE r.many >= s.max_parallel",
-    )?;
-    let rows = statement.query_map([], |row| row.get(0))?;
-    rows.collect()
-}
-
 fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, StoreError> {
     let found = connection
         .prepare_cached("SELECT * FROM studies WHERE id = ?1")?
@@ -386,7 +366,7 @@ fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, Store
 
 fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
     let state: String = row.get("state")?;
-    let estimate: Value = rows::json(row, "estimate")?;
+    let forecast: ForecastRecord = rows::json(row, "estimate")?;
     let progress: Progress = rows::json(row, "progress")?;
     let usage: Usage = rows::json(row, "usage")?;
     let (spec, resolved): (Value, Value) = (rows::json(row, "spec")?, rows::json(row, "resolved")?);
@@ -403,11 +383,7 @@ fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
         values: axes.iter().map(|axis| value_at(axis)).collect(),
         spacing: value_at("/scene/spacing").as_f64(),
         spent: [usage.cpu_s, usage.wall_s],
-        particles: if progress.particles > 0 {
-            progress.particles
-        } else {
-            estimate["particles"].as_u64().unwrap_or(0)
-        },
+        particles: if progress.particles > 0 { progress.particles } else { forecast.particles },
         steps: progress.step,
         errors: results.map(|results| errors_of(&results)),
     })

@@ -1,7 +1,8 @@
 //! Making jobs: one, or all of a study, together with the answer to the request.
 
-use super::answers::{self, KeptAnswer, Made, Once};
+use super::idempotency::{self, IdempotencyKey, Made, Receipt};
 use super::{JobRow, Store, StoreError, events, remove_directory, rows};
+use crate::spec::attempt_files::attempt_directory;
 use crate::spec::body::{JobBody, Origin};
 use crate::spec::states::State;
 use rusqlite::{Transaction, params};
@@ -29,16 +30,16 @@ pub struct NewJob {
 }
 
 impl NewJob {
-    /// From a body that was understood.
+    /// A job that is no point of a study, from its parsed body.
     #[must_use]
-    pub fn of(body: &JobBody) -> Self {
+    pub fn from_body(body: &JobBody) -> Self {
         Self {
             name: body.resolved.name.clone(),
             labels: json!(body.resolved.labels).to_string(),
             kind: body.kind.clone(),
             spec: body.spec.to_string(),
             resolved: body.resolved.to_json().to_string(),
-            estimate: body.forecast.to_json().to_string(),
+            estimate: json!(body.forecast.record()).to_string(),
             memory_bytes: body.forecast.memory_bytes,
             disk_bytes: body.forecast.disk_bytes,
             priority: body.resolved.priority,
@@ -57,48 +58,31 @@ pub const AGING_S: f64 = 600.0;
 pub const START_CHECKPOINT: &str = "start.h5";
 
 impl Store {
-    /// Makes a job; it is durable when this returns. `answer` renders what the client is told; it is kept under the
-    /// client's key in the same transaction.
+    /// Makes a job; it is durable when this returns. The receipt of the new job is kept under the client's key in the same
+    /// transaction.
     ///
     /// # Errors
     /// [`StoreError`].
     pub fn submit(
         &self,
         job: NewJob,
-        once: Option<Once>,
-        answer: impl FnOnce(JobRow) -> KeptAnswer + Send + 'static,
+        key: Option<IdempotencyKey>,
+        receipt: impl FnOnce(JobRow) -> Receipt + Send + 'static,
     ) -> Result<Made, StoreError> {
         let id = format!("job_{}", self.next_id());
         let start = self.prepare_start(&id, &job)?;
         let (sha256, new) = (start.clone(), id.clone());
-        let made = self.write_together(Box::new(move |transaction| {
-            once_in(transaction, once.as_ref(), |transaction| {
+        let made = self.write_in_group(Box::new(move |transaction| {
+            idempotency::make_once(transaction, key.as_ref(), |transaction| {
                 insert(transaction, &new, &job, sha256.as_deref())?;
                 let row = rows::job(transaction, &new)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
-                Ok(answer(row))
+                Ok(receipt(row))
             })
         }));
         if start.is_some() && !matches!(made, Ok(Made::New(_))) {
             remove_directory(&self.job_directory(&id))?;
         }
         made
-    }
-
-    /// Carries out work that makes something, unless the client's key says that it was done before.
-    pub(super) fn make_once(
-        &self,
-        once: Option<&Once>,
-        work: impl FnOnce(&Transaction) -> Result<KeptAnswer, StoreError>,
-    ) -> Result<Made, StoreError> {
-        self.write(|transaction| once_in(transaction, once, work))
-    }
-
-    /// The answer that was given under a client's key before, so that nothing needs to be worked out again.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn recall(&self, once: &Once) -> Result<Option<Made>, StoreError> {
-        answers::recall(&self.read(), once)
     }
 
     /// Links the checkpoint that a job begins with into its directory, so that deleting the source takes nothing away;
@@ -108,7 +92,7 @@ impl Store {
             None => return Ok(None),
             Some(Origin::Checkpoint(checkpoint)) => {
                 let row = self.checkpoint(checkpoint)?.ok_or(StoreError::CheckpointGone)?;
-                let attempt = crate::spec::attempt_spec::attempt_directory(&self.job_directory(&row.job), row.attempt);
+                let attempt = attempt_directory(&self.job_directory(&row.job), row.attempt);
                 (attempt.join(&row.path), row.sha256)
             }
             Some(Origin::Upload(upload)) => {
@@ -127,22 +111,6 @@ impl Store {
         crate::system::artifacts::sync_directory(&folder)?;
         Ok(Some(sha256))
     }
-}
-
-/// Carries out work in a transaction, unless the client's key says that it was done before.
-fn once_in(
-    transaction: &Transaction,
-    once: Option<&Once>,
-    work: impl FnOnce(&Transaction) -> Result<KeptAnswer, StoreError>,
-) -> Result<Made, StoreError> {
-    if let Some(made) = once.map(|once| answers::recall(transaction, once)).transpose()?.flatten() {
-        return Ok(made);
-    }
-    let answer = work(transaction)?;
-    if let Some(once) = once {
-        answers::keep(transaction, once, &answer)?;
-    }
-    Ok(Made::New(answer))
 }
 
 /// Writes the row, the first event and the inputs of a job.
@@ -199,9 +167,9 @@ pub(super) fn insert(
 impl Store {
     /// Makes a job for a test.
     pub(crate) fn submit_row(&self, body: &JobBody) -> JobRow {
-        let answer = |row: JobRow| KeptAnswer { status: 201, location: None, body: row.id };
-        match self.submit(NewJob::of(body), None, answer).unwrap() {
-            Made::New(kept) => self.job(&kept.body).unwrap().unwrap(),
+        let receipt = |row: JobRow| Receipt(row.id.into_bytes());
+        match self.submit(NewJob::from_body(body), None, receipt).unwrap() {
+            Made::New(Receipt(id)) => self.job(&String::from_utf8(id).unwrap()).unwrap().unwrap(),
             other => panic!("{other:?}"),
         }
     }

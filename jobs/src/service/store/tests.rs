@@ -1,9 +1,9 @@
 //! Properties of the store on a real file.
 
+use super::finish_attempt::LossCause;
 use super::import::ProgressPace;
-use super::settle::Loss;
 use super::{Change, ChangeError, JobFilter, JobRow, Store};
-use crate::spec::attempt_spec::attempt_directory;
+use crate::spec::attempt_files::attempt_directory;
 use crate::spec::body::{self, Allowance, NoSources};
 use crate::spec::records::{CheckpointRecord, FileRecord, Progress, Record, RecordFile, RecordSink, Verdict};
 use crate::spec::states::{Reason, State, Trigger};
@@ -83,7 +83,7 @@ fn records_are_taken_once_and_never_from_another_attempt() {
     store.change(&job.id, Trigger::Lose, &Change::default()).unwrap();
     store.change(&job.id, Trigger::Requeue, &Change::default()).unwrap();
     store.claim(|_, _| true).unwrap();
-    // The orphan of attempt 1 goes on writing; nobody believes it.
+    // The orphan of attempt 1 goes on writing; its records do not count.
     first.put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
     assert!(store.import(&job.id, 1, &mut pace).unwrap().verdict.is_none());
     // Attempt 2 goes on after one frame: the second is void until it is written again.
@@ -106,8 +106,8 @@ fn progress_never_falls_and_deaths_count_only_without_checkpoints() {
         assert!((store.job(&job.id).unwrap().unwrap().progress.fraction - 0.5).abs() < 1e-15);
     }
     let die = |epoch: u64| {
-        let loss = Loss { reason: Reason::WorkerCrash, is_death: true };
-        store.settle(&job.id, epoch, loss).unwrap();
+        let loss = LossCause { reason: Reason::WorkerCrash, is_death: true };
+        store.finish_attempt(&job.id, epoch, loss).unwrap();
         let row = store.job(&job.id).unwrap().unwrap();
         assert_eq!(row.state, State::Queued);
         store.claim(|_, _| true).unwrap();
@@ -188,7 +188,7 @@ fn entries_that_the_database_does_not_list_are_named() {
 }
 
 #[test]
-fn a_verdict_survives_the_crash_between_import_and_settlement() {
+fn a_verdict_survives_the_crash_between_import_and_end_of_attempt() {
     let (directory, store) = store();
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
@@ -196,36 +196,36 @@ fn a_verdict_survives_the_crash_between_import_and_settlement() {
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
     drop(store);
     let store = Store::open(directory.path()).unwrap();
-    store.settle(&job.id, 1, Loss { reason: Reason::ServerRestart, is_death: false }).unwrap();
+    store.finish_attempt(&job.id, 1, LossCause { reason: Reason::ServerRestart, is_death: false }).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Succeeded);
 }
 
 #[test]
 fn requests_that_come_while_a_worker_ends_are_kept() {
     let (_directory, store) = store();
-    let loss = Loss { reason: Reason::WorkerCrash, is_death: true };
-    // A cancel before the settlement of a success.
+    let loss = LossCause { reason: Reason::WorkerCrash, is_death: true };
+    // A cancellation before the end of a successful attempt.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     records(&store, &job, 1).put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
     store.change(&job.id, Trigger::Cancel, &Change::because(Reason::UserCancel)).unwrap();
-    store.settle(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, loss).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Canceled);
-    // A pause whose worker had to be ended: it rests, and nobody died.
+    // A pause whose worker had to be killed: the job is paused, and no death counts.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     store.change(&job.id, Trigger::Pause, &Change::because(Reason::UserPause)).unwrap();
-    store.settle(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, loss).unwrap();
     let row = store.job(&job.id).unwrap().unwrap();
     assert_eq!((row.state, row.reason, row.deaths), (State::Paused, Some(Reason::UserPause), 0));
-    // A drain whose service was killed before it heard the verdict.
+    // A drain whose service was killed before it imported the verdict.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     store.change(&job.id, Trigger::Pause, &Change::because(Reason::ServerRestart)).unwrap();
     records(&store, &job, 1).put(&Record::Verdict(Verdict::Paused { reason: None }), true).unwrap();
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
-    store.settle(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, loss).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Queued);
     // A full disk during a person's pause does not make it go on by itself.
     let job = submit(&store, &json!({"priority": 9}));
@@ -234,6 +234,6 @@ fn requests_that_come_while_a_worker_ends_are_kept() {
     let verdict = Verdict::Paused { reason: Some(Reason::StorageEnospc) };
     records(&store, &job, 1).put(&Record::Verdict(verdict), true).unwrap();
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
-    store.settle(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, loss).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().reason, Some(Reason::UserPause));
 }

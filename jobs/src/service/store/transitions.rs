@@ -1,6 +1,6 @@
 //! Changing the state of a job: the table of [`crate::spec::states`] applied as a compare-and-set.
 
-use super::{JobRow, Store, StoreError, events, rows, studies};
+use super::{JobRow, Store, StoreError, events, rows, study_limits};
 use crate::spec::states::{Reason, State, Trigger};
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
@@ -8,7 +8,7 @@ use serde_json::json;
 /// Why a change was not made.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
-    /// No such job.
+    /// There is no such job.
     #[error("there is no such job")]
     NotFound,
     /// The table has no such row.
@@ -31,11 +31,11 @@ impl From<rusqlite::Error> for ChangeError {
 /// A change to make.
 #[derive(Debug, Clone, Default)]
 pub struct Change {
-    /// Why.
+    /// Reason of the new state.
     pub reason: Option<Reason>,
-    /// Numbers and places of a failure.
+    /// Numbers and places of a failure, in a sentence.
     pub message: Option<String>,
-    /// Only if the job is at this attempt.
+    /// If given, the change is made only while the job is at this attempt.
     pub epoch: Option<u64>,
 }
 
@@ -67,7 +67,7 @@ impl Store {
     pub fn claim(&self, fits: impl Fn(u64, u64) -> bool) -> Result<Option<JobRow>, StoreError> {
         let next: Option<String> = {
             let connection = self.read();
-            let full = studies::without_a_free_place(&connection)?;
+            let full = study_limits::without_a_free_place(&connection)?;
             // The index of the queue has every column that is asked for.
             let mut statement = connection.prepare_cached(
                 "SELECT id, study, memory_bytes, disk_bytes FROM jobs WHERE state = 'queued' ORDER BY rank, id",
@@ -91,6 +91,19 @@ impl Store {
             Err(ChangeError::Illegal(..) | ChangeError::NotFound | ChangeError::Stale) => Ok(None),
             Err(ChangeError::Store(error)) => Err(error),
         }
+    }
+
+    /// State of a job; None where there is no such job.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn state(&self, id: &str) -> Result<Option<State>, StoreError> {
+        let connection = self.read();
+        let word: Option<String> = connection
+            .prepare_cached("SELECT state FROM jobs WHERE id = ?1")?
+            .query_row([id], |row| row.get(0))
+            .optional()?;
+        Ok(word.as_deref().and_then(State::from_word))
     }
 
     /// Jobs that should have a worker, and those cut off between two states.
@@ -118,20 +131,20 @@ impl Store {
         Ok(rows.collect::<Result<_, _>>()?)
     }
 
-    /// Writes down why the worker of an attempt is about to be ended.
+    /// Writes down why the worker of an attempt is about to be killed.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn condemn(&self, id: &str, epoch: u64, reason: Reason) -> Result<(), StoreError> {
+    pub fn note_kill(&self, id: &str, epoch: u64, reason: Reason) -> Result<(), StoreError> {
         self.write(|transaction| {
             transaction
-                .prepare_cached("UPDATE jobs SET condemned = ?3 WHERE id = ?1 AND attempt = ?2")?
+                .prepare_cached("UPDATE jobs SET kill_reason = ?3 WHERE id = ?1 AND attempt = ?2")?
                 .execute(params![id, epoch as i64, reason.word()])?;
             Ok(())
         })
     }
 
-    /// A pause asked for by a person of a job that rests for another reason: it must not go on by itself.
+    /// Marks a paused job as paused on request: it must not resume by itself.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -139,7 +152,7 @@ impl Store {
         self.keep_paused_where("id", id)
     }
 
-    /// The same for every job with a value in a column.
+    /// Does so for every job with a value in a column.
     pub(super) fn keep_paused_where(&self, column: &str, value: &str) -> Result<(), StoreError> {
         self.write(|transaction| {
             let reason = Reason::UserPause;
@@ -154,22 +167,22 @@ impl Store {
         })
     }
 
-    /// Notes the process of an attempt and its lease.
+    /// Notes the handle of an attempt's worker and the end of its lease.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn lease(&self, id: &str, epoch: u64, pid: u32, until: &str) -> Result<(), StoreError> {
+    pub fn lease(&self, id: &str, epoch: u64, handle: &str, until: &str) -> Result<(), StoreError> {
         self.write(|transaction| {
             transaction
-                .prepare_cached("UPDATE jobs SET worker_pid = ?3, lease_until = ?4 WHERE id = ?1 AND attempt = ?2")?
-                .execute(params![id, epoch as i64, pid, until])?;
+                .prepare_cached("UPDATE jobs SET worker_handle = ?3, lease_until = ?4 WHERE id = ?1 AND attempt = ?2")?
+                .execute(params![id, epoch as i64, handle, until])?;
             Ok(())
         })
     }
 }
 
 pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, change: &Change) -> Result<(), ChangeError> {
-    let job = standing(transaction, id)?.ok_or(ChangeError::NotFound)?;
+    let job = current(transaction, id)?.ok_or(ChangeError::NotFound)?;
     if change.epoch.is_some_and(|epoch| epoch != job.attempt) {
         return Err(ChangeError::Stale);
     }
@@ -189,8 +202,8 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
             "UPDATE jobs SET rev = rev + 1, state = ?3, reason = ?4, hint = ?5, message = ?6,
                  attempt = attempt + ?7, records_offset = CASE WHEN ?7 = 1 THEN 0 ELSE records_offset END,
                  verdict = CASE WHEN ?7 = 1 THEN NULL ELSE verdict END,
-                 condemned = CASE WHEN ?7 = 1 THEN NULL ELSE condemned END,
-                 worker_pid = CASE WHEN ?7 = 1 THEN NULL ELSE worker_pid END,
+                 kill_reason = CASE WHEN ?7 = 1 THEN NULL ELSE kill_reason END,
+                 worker_handle = CASE WHEN ?7 = 1 THEN NULL ELSE worker_handle END,
                  started_at = CASE WHEN ?7 = 1 THEN COALESCE(started_at, ?8) ELSE started_at END,
                  finished_at = CASE WHEN ?9 THEN ?8 ELSE NULL END, deaths = ?10, leg_wall_s = ?11
              WHERE id = ?1 AND rev = ?2",
@@ -211,21 +224,21 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     if changed != 1 {
         return Err(ChangeError::Stale);
     }
-    let told = reason.map_or("", Reason::word);
-    metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => told).increment(1);
+    let reason_word = reason.map_or("", Reason::word);
+    metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => reason_word).increment(1);
     let attempt = job.attempt + u64::from(is_claim);
     let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
     events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
     if to == State::Failed
         && let Some(study) = &job.study
     {
-        studies::note_failure(transaction, study)?;
+        study_limits::note_failure(transaction, study)?;
     }
     Ok(())
 }
 
-/// What a transition needs to know of a job: a study changes ten thousand at once.
-struct Standing {
+/// The columns of a job that a transition reads: a study changes ten thousand jobs at once.
+struct Current {
     rev: i64,
     state: State,
     reason: Option<Reason>,
@@ -237,7 +250,7 @@ struct Standing {
     study: Option<String>,
 }
 
-fn standing(transaction: &Transaction, id: &str) -> Result<Option<Standing>, ChangeError> {
+fn current(transaction: &Transaction, id: &str) -> Result<Option<Current>, ChangeError> {
     let found = transaction
         .prepare_cached(
             "SELECT rev, state, reason, message, attempt, deaths, leg_wall_s, study,
@@ -245,7 +258,7 @@ fn standing(transaction: &Transaction, id: &str) -> Result<Option<Standing>, Cha
         )?
         .query_row([id], |row| {
             let (state, reason): (String, Option<String>) = (row.get("state")?, row.get("reason")?);
-            Ok(Standing {
+            Ok(Current {
                 rev: row.get("rev")?,
                 state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
                 reason: reason.as_deref().and_then(Reason::from_word),

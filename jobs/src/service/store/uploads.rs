@@ -1,11 +1,10 @@
-//! Uploads: files from outside, quarantined until a process of its own has looked into them.
+//! Uploads: files from outside, quarantined until a process of its own has inspected them.
 
-use super::answers::{KeptAnswer, Made, Once};
+use super::idempotency::{IdempotencyKey, Made, Receipt};
 use super::{Store, StoreError, remove_directory, rows};
-use crate::spec::body::RestartSource;
-use crate::spec::uploads::{Findings, Purpose};
+use crate::spec::body::{Origin, RestartSource, resolved_scene};
+use crate::spec::uploads::{Contents, Purpose};
 use rusqlite::{Connection, OptionalExtension, Row, params};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -17,7 +16,7 @@ pub const CLOUD: &str = "cloud.bin";
 /// An upload.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UploadRow {
-    /// Id.
+    /// Id of the upload.
     pub id: String,
     /// What it is to be used as.
     pub purpose: Purpose,
@@ -25,17 +24,17 @@ pub struct UploadRow {
     pub state: String,
     /// Why it was rejected.
     pub reason: Option<String>,
-    /// What was found in it.
-    pub found: Value,
+    /// What the inspection found in it; None before and where it was rejected.
+    pub found: Option<Contents>,
     /// Name that the client gave.
     pub name: Option<String>,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
-    /// Made.
+    /// Time at which it came in.
     pub created_at: String,
-    /// When the check ended.
+    /// Time at which the inspection ended.
     pub checked_at: Option<String>,
 }
 
@@ -48,9 +47,9 @@ pub struct NewUpload {
     pub purpose: Purpose,
     /// Name that the client gave.
     pub name: Option<String>,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
 }
 
@@ -72,7 +71,7 @@ impl Store {
         Ok((id, directory))
     }
 
-    /// Removes the directory of an upload that did not come to its end.
+    /// Removes the directory of an upload that was cut short.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -87,10 +86,10 @@ impl Store {
     pub fn make_upload(
         &self,
         upload: &NewUpload,
-        once: Option<&Once>,
-        answer: impl FnOnce(&UploadRow) -> KeptAnswer,
+        key: Option<&IdempotencyKey>,
+        receipt: impl FnOnce(&UploadRow) -> Receipt,
     ) -> Result<Made, StoreError> {
-        let made = self.make_once(once, |transaction| {
+        let made = self.make_once(key, |transaction| {
             transaction.execute(
                 "INSERT INTO uploads (id, purpose, state, name, size_bytes, sha256, created_at)
                  VALUES (?1, ?2, 'quarantined', ?3, ?4, ?5, ?6)",
@@ -103,7 +102,7 @@ impl Store {
                     crate::system::clock::now()
                 ],
             )?;
-            Ok(answer(&upload_of_id(transaction, &upload.id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
+            Ok(receipt(&upload_of_id(transaction, &upload.id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
         });
         if !matches!(made, Ok(Made::New(_))) {
             self.abandon_upload(&upload.id)?;
@@ -111,11 +110,11 @@ impl Store {
         made
     }
 
-    /// Enters what the check of an upload came to.
+    /// Enters the outcome of an inspection.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn settle_upload(&self, id: &str, verdict: &Result<Findings, String>) -> Result<(), StoreError> {
+    pub fn finish_upload(&self, id: &str, verdict: &Result<Contents, String>) -> Result<(), StoreError> {
         let (state, reason, found) = match verdict {
             Ok(found) => ("ready", None, Some(serde_json::to_string(found)?)),
             Err(reason) => ("rejected", Some(reason), None),
@@ -149,7 +148,7 @@ impl Store {
         Ok(rows.collect::<Result<_, _>>()?)
     }
 
-    /// Uploads that nobody has looked into yet.
+    /// Uploads that were not inspected yet.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -173,7 +172,7 @@ impl Store {
         Ok(ids.map(|id| id.map(place)).collect::<Result<_, _>>()?)
     }
 
-    /// Deletes an upload; false while a job that has not ended uses it, or nobody has looked into it yet.
+    /// Deletes an upload; false while a job that has not ended uses it, or before it was inspected.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -199,7 +198,7 @@ impl Store {
     }
 
     /// What a restart from an uploaded checkpoint needs to know; None where it is not there, is no checkpoint, or has not
-    /// passed its check.
+    /// passed its inspection.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -208,12 +207,9 @@ impl Store {
         else {
             return Ok(None);
         };
-        Ok(Some(RestartSource {
-            origin: crate::spec::body::Origin::Upload(row.id),
-            scene: row.found["body"]["scene"].clone(),
-            isa: row.found["isa"].as_str().unwrap_or_default().to_owned(),
-            step: row.found["step"].as_u64().unwrap_or(0),
-        }))
+        let Some(Contents::Checkpoint(found)) = row.found else { return Ok(None) };
+        let (origin, scene) = (Origin::Upload(row.id), resolved_scene(&found.body)?);
+        Ok(Some(RestartSource { origin, scene, isa: found.isa, step: found.step }))
     }
 }
 

@@ -2,13 +2,16 @@
 //! not get out. While no worker runs, nothing reads them.
 
 use crate::service::store::{Store, StoreError};
-use crate::spec::attempt_spec::attempt_directory;
+use crate::spec::attempt_files::{self, attempt_directory};
 use std::collections::HashSet;
 use std::fs;
 use std::path::PathBuf;
 
 /// The folders that a worker writes into, with the ending of the files that it numbers there.
-const NUMBERED: [(&str, &str); 2] = [("frames", "vtkhdf"), ("checkpoints", "h5")];
+const NUMBERED: [(&str, &str); 2] = [
+    (attempt_files::FRAMES, attempt_files::FRAME_ENDING),
+    (attempt_files::CHECKPOINTS, attempt_files::CHECKPOINT_ENDING),
+];
 
 /// Removes frames and checkpoints of a job that the store does not list. Only for jobs without a worker whose records
 /// are all imported. Attempts after `last_attempt` and files that no worker names so stay where they are.

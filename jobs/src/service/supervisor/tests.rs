@@ -1,10 +1,14 @@
 //! Limits and losses, with processes that stand in for workers because real ones keep to their limits.
 
 use super::{Settings, Supervisor};
-use crate::service::executor::{Executor, Exit, Worker};
+use crate::service::executor::{
+    Adoption, Capacity, EndCause, Executor, Needs, NotStarted, Notify, Phase, Reservation, Worker, WorkerUsage,
+};
 use crate::service::store::{JobRow, Store};
 use crate::spec::body::{self, Allowance, NoSources};
+use crate::spec::requests::Request;
 use crate::spec::states::{Reason, State};
+use crate::system::process;
 use serde_json::json;
 use std::io;
 use std::os::unix::process::ExitStatusExt;
@@ -13,42 +17,66 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Starts a command instead of a worker, with a fixed silence.
+/// Starts a command instead of a worker, with a fixed time since the last heartbeat.
 struct StandIn {
     command: &'static [&'static str],
-    silence: Duration,
+    time_since_heartbeat: Duration,
 }
 
 struct StandInWorker {
     child: Child,
-    silence: Duration,
+    handle: String,
+    time_since_heartbeat: Duration,
 }
 
 impl Executor for StandIn {
-    fn start(&self, _: &Path, _: u64, _: Box<dyn Fn() + Send>) -> io::Result<Box<dyn Worker>> {
+    fn start(&self, _: &Path, _: &Needs, _: Notify) -> Result<Box<dyn Worker>, NotStarted> {
         let child = Command::new(self.command[0])
             .args(&self.command[1..])
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .spawn()?;
-        Ok(Box::new(StandInWorker { child, silence: self.silence }))
+        let handle = child.id().to_string();
+        Ok(Box::new(StandInWorker { child, handle, time_since_heartbeat: self.time_since_heartbeat }))
+    }
+
+    fn adopt(&self, attempt_directory: &Path, handle: &str, notify: Notify) -> Adoption {
+        // It finds every worker again, as a cluster does.
+        assert!(attempt_directory.ends_with("attempts/1") && handle == "queued-17");
+        let needs = Needs { memory_bytes: 0, threads: 1, wall_s: None };
+        Adoption::Running(self.start(attempt_directory, &needs, notify).unwrap())
+    }
+
+    fn capacity(&self, _: &[Reservation]) -> Capacity {
+        Capacity { memory_bytes: u64::MAX }
     }
 }
 
 impl Worker for StandInWorker {
-    fn pid(&self) -> u32 {
-        self.child.id()
+    fn handle(&self) -> &str {
+        &self.handle
     }
 
-    fn say(&mut self, _: &str) {}
+    fn send(&mut self, _: Request) {}
 
-    fn silence(&self) -> Duration {
-        self.silence
+    fn time_since_heartbeat(&self) -> Duration {
+        self.time_since_heartbeat
     }
 
-    fn poll(&mut self) -> io::Result<Option<Exit>> {
+    fn phase(&self) -> Phase {
+        Phase::Running
+    }
+
+    fn usage(&self) -> WorkerUsage {
+        WorkerUsage { memory_bytes: process::resident_bytes(self.child.id()) }
+    }
+
+    fn poll(&mut self) -> io::Result<Option<EndCause>> {
         let status = self.child.try_wait()?;
-        Ok(status.map(|s| Exit { code: s.code(), signal: s.signal(), out_of_memory: false }))
+        Ok(status.map(|status| match status.signal() {
+            Some(signal) => EndCause::Signaled { signal },
+            None => EndCause::Exited { code: status.code().unwrap() },
+        }))
     }
 
     fn kill(&mut self) {
@@ -56,14 +84,17 @@ impl Worker for StandInWorker {
     }
 }
 
+fn submit(store: &Store) -> String {
+    let spec = json!({"scene": {"kind": "redistance"}, "limits": {"memory_bytes": 64_000_000}});
+    let allowance = Allowance { threads: 1, memory_bytes: 1 << 33, local_files: false };
+    let body = body::parse(&spec, allowance, &NoSources).ok().unwrap();
+    store.submit_row(&body).id
+}
+
 fn end_of(stand_in: StandIn, until: impl Fn(&JobRow) -> bool) -> JobRow {
     let directory = tempfile::tempdir().unwrap();
     let store = Arc::new(Store::open(directory.path()).unwrap());
-    let spec = json!({"scene": {"kind": "redistance"}, "limits": {"memory_bytes": 64_000_000}});
-    let body = body::parse(&spec, Allowance { threads: 1, memory_bytes: 1 << 33, local_files: false }, &NoSources)
-        .ok()
-        .unwrap();
-    let id = store.submit_row(&body).id;
+    let id = submit(&store);
     let supervisor = Supervisor::new(Arc::clone(&store), Box::new(stand_in), Settings::with_slots(1));
     let handle = supervisor.handle();
     let thread = std::thread::spawn(move || supervisor.run());
@@ -84,7 +115,7 @@ fn end_of(stand_in: StandIn, until: impl Fn(&JobRow) -> bool) -> JobRow {
 fn a_worker_above_its_memory_is_ended_with_the_reason() {
     // dd holds one block of 256 MB.
     let command = &["dd", "if=/dev/zero", "of=/dev/null", "bs=256M", "count=100000"];
-    let job = end_of(StandIn { command, silence: Duration::ZERO }, |job| job.state.is_terminal());
+    let job = end_of(StandIn { command, time_since_heartbeat: Duration::ZERO }, |job| job.state.is_terminal());
     assert_eq!((job.state, job.reason), (State::Failed, Some(Reason::LimitMemory)));
     assert_eq!(job.attempt, 1);
 }
@@ -92,12 +123,30 @@ fn a_worker_above_its_memory_is_ended_with_the_reason() {
 #[test]
 fn a_silent_worker_is_ended_and_the_third_fails_the_job() {
     let command = &["sleep", "1000"];
-    let job = end_of(StandIn { command, silence: Duration::from_secs(31) }, |job| job.state.is_terminal());
+    let job = end_of(StandIn { command, time_since_heartbeat: Duration::from_secs(31) }, |job| job.state.is_terminal());
     assert_eq!((job.state, job.reason, job.attempt), (State::Failed, Some(Reason::WorkerStalled), 3));
 }
 
 #[test]
 fn a_worker_that_ends_without_a_word_is_lost() {
-    let job = end_of(StandIn { command: &["true"], silence: Duration::ZERO }, |job| job.state.is_terminal());
+    let job =
+        end_of(StandIn { command: &["true"], time_since_heartbeat: Duration::ZERO }, |job| job.state.is_terminal());
     assert_eq!((job.state, job.reason, job.deaths), (State::Failed, Some(Reason::WorkerCrash), 3));
+}
+
+#[test]
+fn a_worker_that_outlived_its_service_is_adopted_in_the_same_attempt() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = Arc::new(Store::open(directory.path()).unwrap());
+    let id = submit(&store);
+    store.claim(|_, _| true).unwrap();
+    store.lease(&id, 1, "queued-17", "2026-11-28T00:00:00.000Z").unwrap();
+    let stand_in = StandIn { command: &["sleep", "1000"], time_since_heartbeat: Duration::ZERO };
+    let mut supervisor = Supervisor::new(Arc::clone(&store), Box::new(stand_in), Settings::with_slots(1));
+    supervisor.recover().unwrap();
+    let job = store.job(&id).unwrap().unwrap();
+    assert_eq!((job.state, job.attempt, supervisor.running.len()), (State::Running, 1, 1));
+    for mut running in supervisor.running {
+        running.worker.kill();
+    }
 }

@@ -1,47 +1,15 @@
 //! `restart`: a scene taken from a checkpoint, with overrides of restart-safe fields.
 
-use super::Sources;
+use super::sources::{RestartSource, Sources};
 use meniscus::spec::{Json, Object, Parameter, Violation, escape};
 use serde_json::json;
-
-/// Where the checkpoint of a restart lies.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Origin {
-    /// With the job that wrote it.
-    Checkpoint(String),
-    /// Among the uploads.
-    Upload(String),
-}
-
-impl Origin {
-    /// The id.
-    #[must_use]
-    pub fn id(&self) -> &str {
-        match self {
-            Self::Checkpoint(id) | Self::Upload(id) => id,
-        }
-    }
-}
-
-/// The checkpoint that a restart begins with, as the store knows it.
-#[derive(Debug, Clone)]
-pub struct RestartSource {
-    /// Where it lies.
-    pub origin: Origin,
-    /// The resolved scene of the job that wrote it.
-    pub scene: Json,
-    /// Instruction set it was written on.
-    pub isa: String,
-    /// Its step.
-    pub step: u64,
-}
 
 meniscus::group! {
     /// A scene taken from a checkpoint.
     pub struct RestartSpec {
         /// id of a checkpoint
         checkpoint: Option<String>;
-        /// id of an upload made with ?as=checkpoint that is ready
+        /// id of an upload that was made as a checkpoint and is ready
         upload: Option<String>;
         /// new values of fields that a restart may change, by JSON pointers into the scene
         overrides: Option<Overrides>;
@@ -82,12 +50,19 @@ impl Parameter for Overrides {
 }
 
 /// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields.
-pub(super) fn scene(
+///
+/// # Errors
+/// When the look-up fails.
+pub(super) fn scene<S: Sources>(
     spec: &RestartSpec,
-    sources: &dyn Sources,
+    sources: &S,
     errors: &mut Vec<Violation>,
-) -> Option<(RestartSource, Json)> {
-    let source = source(spec, sources).map_err(|error| errors.push(error)).ok()?;
+) -> Result<Option<(RestartSource, Json)>, S::Error> {
+    let source = source(spec, sources)?.map_err(|error| errors.push(error)).ok();
+    Ok(source.and_then(|source| overridden(spec, source, errors)))
+}
+
+fn overridden(spec: &RestartSpec, source: RestartSource, errors: &mut Vec<Violation>) -> Option<(RestartSource, Json)> {
     let own = crate::system::build::isa();
     if source.isa != own && spec.allow_other_isa != Some(true) {
         let detail = format!(
@@ -113,16 +88,16 @@ pub(super) fn scene(
     Some((source, scene))
 }
 
-fn source(spec: &RestartSpec, sources: &dyn Sources) -> Result<RestartSource, Violation> {
+fn source<S: Sources>(spec: &RestartSpec, sources: &S) -> Result<Result<RestartSource, Violation>, S::Error> {
     let by_checkpoint = "the id of a checkpoint, ckpt_…";
-    match (&spec.checkpoint, &spec.upload) {
-        (Some(id), None) => sources.checkpoint(id).ok_or_else(|| {
+    Ok(match (&spec.checkpoint, &spec.upload) {
+        (Some(id), None) => sources.checkpoint(id)?.ok_or_else(|| {
             let detail = "there is no such checkpoint";
             Violation::new("/restart/checkpoint", "not_found", detail, id.as_str(), by_checkpoint)
         }),
-        (None, Some(id)) => sources.uploaded_checkpoint(id).ok_or_else(|| {
+        (None, Some(id)) => sources.uploaded_checkpoint(id)?.ok_or_else(|| {
             let detail = "there is no such upload, or it is no checkpoint that passed its check";
-            let allowed = "the id of an upload made with ?as=checkpoint that is ready, upl_…";
+            let allowed = "the id of an upload that was made as a checkpoint and is ready, upl_…";
             Violation::new("/restart/upload", "not_found", detail, id.as_str(), allowed)
         }),
         (None, None) => {
@@ -133,5 +108,5 @@ fn source(spec: &RestartSpec, sources: &dyn Sources) -> Result<RestartSource, Vi
             let detail = "a restart begins with a checkpoint or with an upload; give one of them";
             Err(Violation::new("/restart/upload", "conflict", detail, id.as_str(), Json::Null))
         }
-    }
+    })
 }

@@ -1,51 +1,126 @@
 //! What a body may name beside itself: checkpoints and uploads.
 
-use super::RestartSource;
 use crate::spec::uploads::Purpose;
 use meniscus::scene::{CloudReference, CloudSource};
 use meniscus::spec::Violation;
 use serde_json::{Value, json};
+use std::convert::Infallible;
 
-/// Knows checkpoints and uploads.
-pub trait Sources {
-    /// What a restart from a checkpoint needs to know.
-    fn checkpoint(&self, id: &str) -> Option<RestartSource>;
-
-    /// The same of an uploaded checkpoint that has passed its check.
-    fn uploaded_checkpoint(&self, id: &str) -> Option<RestartSource>;
-
-    /// Purpose of an upload that has passed its check, and the number of points in it.
-    fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)>;
+/// Where the checkpoint of a restart lies.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Origin {
+    /// With the job that wrote it.
+    Checkpoint(String),
+    /// Among the uploads.
+    Upload(String),
 }
 
-/// Knows nothing.
+impl Origin {
+    /// The id.
+    #[must_use]
+    pub fn id(&self) -> &str {
+        match self {
+            Self::Checkpoint(id) | Self::Upload(id) => id,
+        }
+    }
+}
+
+/// The checkpoint that a restart begins with, as the store knows it.
+#[derive(Debug, Clone)]
+pub struct RestartSource {
+    /// Where it lies.
+    pub origin: Origin,
+    /// The resolved scene of the job that wrote it.
+    pub scene: Value,
+    /// Instruction set it was written on.
+    pub isa: String,
+    /// Its step.
+    pub step: u64,
+}
+
+/// Looks up the checkpoints and uploads that bodies name.
+pub trait Sources {
+    /// Why a look-up failed. It does not say that there is no such id.
+    type Error;
+
+    /// What a restart from a checkpoint needs to know; None where there is no such checkpoint.
+    ///
+    /// # Errors
+    /// When the look-up fails.
+    fn checkpoint(&self, id: &str) -> Result<Option<RestartSource>, Self::Error>;
+
+    /// The same of an uploaded checkpoint that has passed its inspection.
+    ///
+    /// # Errors
+    /// When the look-up fails.
+    fn uploaded_checkpoint(&self, id: &str) -> Result<Option<RestartSource>, Self::Error>;
+
+    /// Purpose of an upload that has passed its inspection, and the number of points in it.
+    ///
+    /// # Errors
+    /// When the look-up fails.
+    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, Self::Error>;
+}
+
+/// No checkpoints and no uploads.
 #[derive(Debug, Clone, Copy)]
 pub struct NoSources;
 
 impl Sources for NoSources {
-    fn checkpoint(&self, _: &str) -> Option<RestartSource> {
-        None
+    type Error = Infallible;
+
+    fn checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
+        Ok(None)
     }
 
-    fn uploaded_checkpoint(&self, _: &str) -> Option<RestartSource> {
-        None
+    fn uploaded_checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
+        Ok(None)
     }
 
-    fn uploaded_points(&self, _: &str) -> Option<(Purpose, u64)> {
-        None
+    fn uploaded_points(&self, _: &str) -> Result<Option<(Purpose, u64)>, Infallible> {
+        Ok(None)
+    }
+}
+
+/// Why a body was not parsed.
+#[derive(Debug)]
+pub enum BodyError<E> {
+    /// Everything that is wrong with it.
+    Invalid(Vec<Violation>),
+    /// A checkpoint or an upload that it names could not be looked up.
+    Lookup(E),
+}
+
+impl<E> From<Vec<Violation>> for BodyError<E> {
+    fn from(violations: Vec<Violation>) -> Self {
+        Self::Invalid(violations)
+    }
+}
+
+impl BodyError<Infallible> {
+    /// Everything that is wrong with the body, where look-ups cannot fail.
+    #[must_use]
+    pub fn violations(self) -> Vec<Violation> {
+        match self {
+            Self::Invalid(violations) => violations,
+            Self::Lookup(never) => match never {},
+        }
     }
 }
 
 /// How many points a scene is going to get from somewhere, where that is known.
-pub(super) fn size_of(
+///
+/// # Errors
+/// When the look-up fails; the inner error is what is wrong with the reference.
+pub(super) fn size_of<S: Sources>(
     cloud: &CloudReference,
-    sources: &dyn Sources,
+    sources: &S,
     local_files: bool,
-) -> Result<Option<u64>, Violation> {
-    match &cloud.source {
+) -> Result<Result<Option<u64>, Violation>, S::Error> {
+    Ok(match &cloud.source {
         CloudSource::File(_) if local_files => Ok(None),
         CloudSource::File(file) => {
-            let detail = "a local file is valid for `meniscus run` alone; POST /v1/uploads takes files";
+            let detail = "a local file is valid for `meniscus run` alone; upload it and name the upload";
             Err(Violation::new(cloud.pointer, "not_here", detail, file.as_str(), json!({"upload": "upl_…"})))
         }
         CloudSource::Upload(upload) => {
@@ -55,12 +130,11 @@ pub(super) fn size_of(
                 "/surface" => &[Purpose::Surface],
                 _ => &[Purpose::Points],
             };
-            let found = sources.uploaded_points(upload).filter(|(purpose, _)| wanted.contains(purpose));
-            let names: Vec<String> = wanted.iter().map(|purpose| format!("?as={}", purpose.word())).collect();
-            let detail =
-                format!("there is no upload of this id that is ready and was made with {}", names.join(" or "));
+            let found = sources.uploaded_points(upload)?.filter(|(purpose, _)| wanted.contains(purpose));
+            let names: Vec<&str> = wanted.iter().map(|purpose| purpose.word()).collect();
+            let detail = format!("there is no upload of this id that is ready and was made as {}", names.join(" or "));
             let missing = || Violation::new(cloud.pointer, "not_found", detail, upload.as_str(), Value::Null);
             found.map(|(_, points)| Some(points)).ok_or_else(missing)
         }
-    }
+    })
 }

@@ -1,31 +1,74 @@
-use super::{Allowance, NoSources, Origin, RestartSource, Sources, parse};
+use super::{Allowance, BodyError, JobBody, NoSources, Origin, RestartSource, Sources};
 use crate::spec::run_options::RunOptions;
 use crate::spec::uploads::Purpose;
+use meniscus::spec::Violation;
 use serde_json::{Value, json};
+use std::convert::Infallible;
 
 const ALLOWANCE: Allowance = Allowance { threads: 2, memory_bytes: 4 << 30, local_files: false };
+
+fn parse(
+    spec: &Value,
+    allowance: Allowance,
+    sources: &impl Sources<Error = Infallible>,
+) -> Result<JobBody, Vec<Violation>> {
+    super::parse(spec, allowance, sources).map_err(BodyError::violations)
+}
 
 /// Knows one checkpoint of a vortex.
 struct OneCheckpoint;
 
 impl Sources for OneCheckpoint {
-    fn checkpoint(&self, _: &str) -> Option<RestartSource> {
-        let first = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok()?;
-        let origin = Origin::Checkpoint("ckpt_1".into());
-        Some(RestartSource { origin, scene: first.resolved.scene, isa: crate::system::build::isa(), step: 240 })
+    type Error = Infallible;
+
+    fn checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
+        let first = parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok().unwrap();
+        let (origin, scene) = (Origin::Checkpoint("ckpt_1".into()), first.resolved.scene);
+        Ok(Some(RestartSource { origin, scene, isa: crate::system::build::isa(), step: 240 }))
     }
 
-    fn uploaded_checkpoint(&self, _: &str) -> Option<RestartSource> {
-        None
+    fn uploaded_checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
+        Ok(None)
     }
 
-    fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
+    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, Infallible> {
         let purpose = match id {
             "upl_places" => Purpose::Queries,
             "upl_surface" => Purpose::Surface,
             _ => Purpose::Points,
         };
-        Some((purpose, 5000))
+        Ok(Some((purpose, 5000)))
+    }
+}
+
+/// Look-ups that fail.
+struct Broken;
+
+impl Sources for Broken {
+    type Error = &'static str;
+
+    fn checkpoint(&self, _: &str) -> Result<Option<RestartSource>, &'static str> {
+        Err("the store failed")
+    }
+
+    fn uploaded_checkpoint(&self, _: &str) -> Result<Option<RestartSource>, &'static str> {
+        Err("the store failed")
+    }
+
+    fn uploaded_points(&self, _: &str) -> Result<Option<(Purpose, u64)>, &'static str> {
+        Err("the store failed")
+    }
+}
+
+#[test]
+fn a_failed_lookup_is_no_violation() {
+    let points = json!({"type": "points", "upload": "upl_1"});
+    for body in [
+        json!({"restart": {"checkpoint": "ckpt_1"}}),
+        json!({"restart": {"upload": "upl_1"}}),
+        json!({"scene": {"kind": "redistance", "spacing": 0.05, "shape": points}}),
+    ] {
+        assert!(matches!(super::parse(&body, ALLOWANCE, &Broken), Err(BodyError::Lookup("the store failed"))));
     }
 }
 

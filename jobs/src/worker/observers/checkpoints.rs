@@ -1,6 +1,7 @@
 //! Checkpoints by the wall clock, by steps, on request, and always of the final state.
 
 use crate::formats::checkpoint::{self, CheckpointError, Counters};
+use crate::spec::attempt_files;
 use crate::spec::records::CheckpointRecord;
 use crate::system::build;
 use meniscus::simulation::Simulation;
@@ -52,16 +53,16 @@ impl Checkpoints {
         counters: Counters,
     ) -> Result<CheckpointRecord, CheckpointError> {
         let clock = simulation.clock();
-        let folder = self.directory.join("checkpoints");
+        let folder = self.directory.join(attempt_files::CHECKPOINTS);
         std::fs::create_dir_all(&folder)?;
-        let name = format!("{:012}.h5", clock.step);
+        let name = format!("{:012}.{}", clock.step, attempt_files::CHECKPOINT_ENDING);
         let meta = checkpoint::meta(&self.job, &self.body, clock.step, clock.time, counters);
         let (sha256, size_bytes) = checkpoint::write_verified(&folder.join(&name), meta, &simulation.state())?;
         self.last = Instant::now();
         self.last_step = Some(clock.step);
         Ok(CheckpointRecord {
             id: format!("ckpt_{}", Ulid::generate()),
-            path: format!("checkpoints/{name}"),
+            path: format!("{}/{name}", attempt_files::CHECKPOINTS),
             step: clock.step,
             time: clock.time,
             size_bytes,

@@ -1,10 +1,11 @@
-//! Requests to a running worker: pause, cancel, checkpoint now. Nothing else flows into a run.
+//! Requests to a running worker, as its run sees them.
 
+use crate::spec::requests::Request;
 use meniscus::parallel::Interrupt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Shared between whoever hears requests and the run.
+/// Flags shared between the thread that receives requests and the run.
 #[derive(Debug, Clone, Default)]
 pub struct Control {
     interrupt: Interrupt,
@@ -13,44 +14,28 @@ pub struct Control {
 }
 
 impl Control {
-    /// Drops the running step.
-    pub fn cancel(&self) {
-        self.interrupt.raise();
-    }
-
-    /// Ends the run after a checkpoint at the end of the step.
-    pub fn pause(&self) {
-        self.pausing.store(true, Ordering::Relaxed);
-    }
-
-    /// Writes a checkpoint at the end of the step.
-    pub fn checkpoint(&self) {
-        self.checkpoint.store(true, Ordering::Relaxed);
-    }
-
-    /// A request by its word, as the service sends it.
-    pub fn hear(&self, word: &str) {
-        match word.trim() {
-            "cancel" => self.cancel(),
-            "pause" => self.pause(),
-            "checkpoint" => self.checkpoint(),
-            _ => {}
+    /// Takes a request.
+    pub fn receive(&self, request: Request) {
+        match request {
+            Request::Cancel => self.interrupt.raise(),
+            Request::Pause => self.pausing.store(true, Ordering::Relaxed),
+            Request::Checkpoint => self.checkpoint.store(true, Ordering::Relaxed),
         }
     }
 
-    /// The flag that solvers poll.
+    /// The flag that solvers poll: the step in progress is dropped.
     #[must_use]
     pub fn interrupt(&self) -> &Interrupt {
         &self.interrupt
     }
 
-    /// Whether the run is to end after this step.
+    /// Whether the run ends after this step.
     #[must_use]
     pub fn is_pausing(&self) -> bool {
         self.pausing.load(Ordering::Relaxed)
     }
 
-    /// Whether a checkpoint was asked for since the last call.
+    /// Whether a checkpoint was requested since the last call.
     #[must_use]
     pub fn take_checkpoint_request(&self) -> bool {
         self.checkpoint.swap(false, Ordering::Relaxed)

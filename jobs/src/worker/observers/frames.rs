@@ -1,6 +1,7 @@
 //! Frames: one closed VTKHDF file each, and ParaView's index of them.
 
 use crate::formats::{frame_index, vtkhdf};
+use crate::spec::attempt_files;
 use crate::spec::records::FileRecord;
 use crate::system::artifacts;
 use crate::system::digest;
@@ -8,9 +9,6 @@ use meniscus::simulation::run::ObserverError;
 use meniscus::simulation::{OutputPlan, Simulation};
 use meniscus::time::FixedStep;
 use std::path::PathBuf;
-
-/// Media type of HDF5 files.
-pub const HDF5: &str = "application/x-hdf5";
 
 /// Writes frames when they are due.
 pub struct Frames {
@@ -61,9 +59,12 @@ impl Frames {
             return Ok(None);
         }
         self.is_first = false;
-        let name = format!("frames/{:06}.vtkhdf", self.before + self.written.len() as u64);
+        let name = {
+            let number = self.before + self.written.len() as u64;
+            format!("{}/{number:06}.{}", attempt_files::FRAMES, attempt_files::FRAME_ENDING)
+        };
         let path = self.directory.join(&name);
-        std::fs::create_dir_all(self.directory.join("frames"))?;
+        std::fs::create_dir_all(self.directory.join(attempt_files::FRAMES))?;
         vtkhdf::write_frame(&artifacts::unfinished(&path), &simulation.fields(), &self.chosen, clock.time, clock.step)?;
         artifacts::finish(&path)?;
         let (sha256, size_bytes) = digest::of_file(&path)?;
@@ -71,7 +72,7 @@ impl Frames {
             path: name,
             size_bytes,
             sha256,
-            media_type: HDF5.to_owned(),
+            media_type: attempt_files::HDF5_MEDIA_TYPE.to_owned(),
             time: Some(clock.time),
             step: Some(clock.step),
         };
@@ -87,7 +88,7 @@ impl Frames {
     pub fn write_index(&self) -> Result<FileRecord, ObserverError> {
         let text = frame_index::text(self.written.iter().map(|(_, frame)| (frame.path.as_str(), frame.time)));
         artifacts::write(&self.directory.join(frame_index::PATH), text.as_bytes())?;
-        Ok(artifacts::record(&self.directory, frame_index::PATH, frame_index::MEDIA_TYPE)?)
+        Ok(FileRecord::from_file(&self.directory, frame_index::PATH, frame_index::MEDIA_TYPE)?)
     }
 }
 

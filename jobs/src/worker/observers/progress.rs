@@ -1,6 +1,6 @@
 //! How far a run is, how fast it goes, what it costs.
 
-use crate::spec::forecast::TimeForecast;
+use crate::spec::calibration::TimeForecast;
 use crate::spec::records::{HealthRecord, Progress, Usage};
 use crate::system::process;
 use meniscus::scenes::work_estimate::REST;
@@ -13,8 +13,8 @@ const TELLING_S: f64 = 1.0;
 /// Least time between two records.
 const INTERVAL: Duration = Duration::from_millis(400);
 
-/// CPU seconds of a phase that comes at some moments.
-struct Moment {
+/// CPU seconds of a phase that comes at milestones.
+struct Milestone {
     spent: f64,
     /// As forecast for the whole run.
     all: f64,
@@ -29,8 +29,8 @@ pub struct ProgressMeter {
     own_phases: BTreeMap<&'static str, f64>,
     first_step: Option<u64>,
     stepping_since: Instant,
-    /// CPU seconds of phases at moments when the stepping began.
-    moments_before: f64,
+    /// CPU seconds of phases at milestones when the stepping began.
+    milestones_before: f64,
     forecast: Option<TimeForecast>,
     last: Option<Instant>,
 }
@@ -48,7 +48,7 @@ impl ProgressMeter {
             own_phases: BTreeMap::new(),
             first_step: None,
             stepping_since: now,
-            moments_before: 0.0,
+            milestones_before: 0.0,
             forecast,
             last: None,
         }
@@ -89,13 +89,13 @@ impl ProgressMeter {
         total
     }
 
-    /// What phases that come at some moments have cost and will cost; empty without a forecast.
-    fn moments(&self, simulation: &dyn Simulation) -> Vec<Moment> {
+    /// Past and forecast cost of phases that come at milestones; empty without a forecast.
+    fn milestones(&self, simulation: &dyn Simulation) -> Vec<Milestone> {
         let Some(forecast) = &self.forecast else { return Vec::new() };
         let booked = self.phases(simulation);
         let rest = (self.usage().cpu_s - booked.values().sum::<f64>()).max(0.0);
         let spent = |phase: &String| if phase == REST { rest } else { booked.get(phase).copied().unwrap_or(0.0) };
-        forecast.moments.iter().map(|(phase, all)| Moment { spent: spent(phase), all: *all }).collect()
+        forecast.milestones.iter().map(|(phase, all)| Milestone { spent: spent(phase), all: *all }).collect()
     }
 
     /// Seconds to the end, and what they rest on: the steps that are left at the speed so far, and what the forecast has
@@ -107,20 +107,20 @@ impl ProgressMeter {
         left: u64,
         seconds: f64,
     ) -> (Option<f64>, Option<String>) {
-        let moments = self.moments(simulation);
+        let milestones = self.milestones(simulation);
         let clock_per_cpu = self.forecast.as_ref().map_or(1.0, |f| f.wall_s / f.cpu_s.max(1e-9));
-        let beside = moments.iter().map(|moment| moment.spent).sum::<f64>() - self.moments_before;
+        let beside = milestones.iter().map(|milestone| milestone.spent).sum::<f64>() - self.milestones_before;
         let per_step = (seconds - beside * clock_per_cpu).max(0.02 * seconds) / done as f64;
         let forecast_per_step = self.forecast.as_ref().map_or(0.0, |forecast| {
-            let stepping = forecast.cpu_s - moments.iter().map(|moment| moment.all).sum::<f64>();
+            let stepping = forecast.cpu_s - milestones.iter().map(|milestone| milestone.all).sum::<f64>();
             stepping * clock_per_cpu / simulation.end().step.max(1) as f64
         });
         // The first steps tell little: caches are cold, files are opened.
         let is_telling = seconds >= TELLING_S && forecast_per_step > 0.0;
         let pace = if is_telling { (per_step / forecast_per_step).clamp(0.5, 3.0) } else { 1.0 };
-        let to_come: f64 = moments.iter().map(|moment| (moment.all - moment.spent).max(0.0)).sum();
+        let to_come: f64 = milestones.iter().map(|milestone| (milestone.all - milestone.spent).max(0.0)).sum();
         let eta = left as f64 * per_step + to_come * clock_per_cpu * pace;
-        let basis = if moments.is_empty() {
+        let basis = if milestones.is_empty() {
             format!("mean speed of the last {done} steps")
         } else {
             format!("mean speed of the last {done} steps, and the forecast of output and errors still to come")
@@ -128,13 +128,13 @@ impl ProgressMeter {
         (Some(eta), Some(basis))
     }
 
-    /// A record of this moment, at most every 0.4 s unless it `must` be made.
+    /// A record of the present state, at most every 0.4 s unless it `must` be made.
     pub fn observe(&mut self, simulation: &dyn Simulation, must: bool) -> Option<Progress> {
         let clock = simulation.clock();
         if self.first_step.is_none() {
             self.first_step = Some(clock.step);
             self.stepping_since = Instant::now();
-            self.moments_before = self.moments(simulation).iter().map(|moment| moment.spent).sum();
+            self.milestones_before = self.milestones(simulation).iter().map(|milestone| milestone.spent).sum();
         } else if !must && self.last.is_some_and(|last| last.elapsed() < INTERVAL) {
             return None;
         }

@@ -2,15 +2,13 @@
 
 use super::frames::fixed_step;
 use crate::formats::csv;
+use crate::spec::attempt_files;
 use crate::system::artifacts;
 use meniscus::simulation::run::ObserverError;
 use meniscus::simulation::{OutputPlan, Simulation};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-
-/// Name of the file in an attempt's directory and among the job's files.
-pub const FILE_NAME: &str = "series.csv";
 
 /// Writes rows when they are due.
 pub struct Series {
@@ -26,7 +24,7 @@ impl Series {
     /// # Errors
     /// When a file cannot be read or written.
     pub fn open(directory: &Path, epoch: u64, plan: OutputPlan, earlier: Option<(PathBuf, u64)>) -> io::Result<Self> {
-        let path = directory.join(FILE_NAME);
+        let path = directory.join(attempt_files::SERIES);
         let mut held = Vec::new();
         if let Some((earlier, bytes)) = earlier
             && bytes > 0

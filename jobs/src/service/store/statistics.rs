@@ -1,4 +1,4 @@
-//! How many of what there are.
+//! Counts of jobs and uploads by state, and the size of the store.
 
 use super::{FILE_NAME, Store, StoreError};
 use crate::spec::states::State;
@@ -6,18 +6,18 @@ use std::collections::BTreeMap;
 
 /// Counts over the whole store.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Census {
+pub struct Statistics {
     /// Jobs by state.
     pub by_state: BTreeMap<State, u64>,
     /// Seconds that the oldest job of the queue has waited.
     pub oldest_queued_s: f64,
-    /// Uploads that nobody has looked into yet.
+    /// Uploads that were not inspected yet.
     pub quarantined: u64,
     /// Size of the SQLite file and its log.
     pub store_bytes: u64,
 }
 
-impl Census {
+impl Statistics {
     /// Jobs that have not ended.
     #[must_use]
     pub fn unfinished(&self) -> u64 {
@@ -26,32 +26,32 @@ impl Census {
 }
 
 impl Store {
-    /// Counts.
+    /// Counts jobs and uploads.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn census(&self) -> Result<Census, StoreError> {
+    pub fn statistics(&self) -> Result<Statistics, StoreError> {
         let connection = self.read();
-        let mut census = Census::default();
+        let mut statistics = Statistics::default();
         {
             let mut statement = connection.prepare_cached("SELECT state, COUNT(*) FROM jobs GROUP BY state")?;
             let rows = statement.query_map([], |row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)? as u64)))?;
             for row in rows {
                 let (word, count) = row?;
-                census.by_state.extend(State::from_word(&word).map(|state| (state, count)));
+                statistics.by_state.extend(State::from_word(&word).map(|state| (state, count)));
             }
         }
-        census.oldest_queued_s = connection.query_row(
+        statistics.oldest_queued_s = connection.query_row(
             "SELECT COALESCE(?1 - MIN(unixepoch(created_at)), 0) FROM jobs WHERE state = 'queued'",
             [crate::system::clock::milliseconds() as f64 * 1e-3],
             |row| row.get(0),
         )?;
-        census.quarantined =
+        statistics.quarantined =
             connection
                 .query_row("SELECT COUNT(*) FROM uploads WHERE state = 'quarantined'", [], |row| row.get::<_, i64>(0))?
                 as u64;
         let size = |name: &str| std::fs::metadata(self.directory().join(name)).map_or(0, |meta| meta.len());
-        census.store_bytes = size(FILE_NAME) + size(&format!("{FILE_NAME}-wal"));
-        Ok(census)
+        statistics.store_bytes = size(FILE_NAME) + size(&format!("{FILE_NAME}-wal"));
+        Ok(statistics)
     }
 }

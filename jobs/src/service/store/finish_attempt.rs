@@ -1,5 +1,5 @@
-//! What becomes of a job when its worker has ended: read, decided and written in one transaction, so that no request
-//! and no crash can come in between.
+//! The end of an attempt: the next state of a job whose worker has ended. It is read, decided and written in one
+//! transaction, so that no request and no crash comes in between.
 
 use super::transitions::apply;
 use super::{Change, ChangeError, JobRow, Store, StoreError, rows};
@@ -7,12 +7,12 @@ use crate::spec::records::Verdict;
 use crate::spec::states::{Reason, State, Trigger};
 use rusqlite::Transaction;
 
-/// How a worker that left no verdict was lost.
+/// Why a worker that left no verdict was lost.
 #[derive(Debug, Clone, Copy)]
-pub struct Loss {
-    /// Why, unless it was condemned before.
+pub struct LossCause {
+    /// Reason, unless the service noted another one before it killed the worker.
     pub reason: Reason,
-    /// Whether it counts towards the three deaths that fail a job.
+    /// Whether the loss counts as one of the three deaths in a row that fail a job.
     pub is_death: bool,
 }
 
@@ -20,34 +20,34 @@ pub struct Loss {
 const MOST_DEATHS: u32 = 3;
 
 impl Store {
-    /// Moves a job whose worker has ended to where its verdict or its loss leads. A job that is at another attempt, or
-    /// has no worker any more, is left alone.
+    /// Moves a job whose worker has ended to the state to which its verdict or its loss leads. A job at another attempt, or
+    /// without a worker, is left alone.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn settle(&self, job: &str, epoch: u64, lost: Loss) -> Result<(), StoreError> {
-        let settled = self.write(|transaction| {
+    pub fn finish_attempt(&self, job: &str, epoch: u64, lost: LossCause) -> Result<(), StoreError> {
+        let finished = self.write(|transaction| {
             let row = rows::job(transaction, job)?.filter(|row| row.attempt == epoch);
             row.map_or(Ok(()), |row| decide(transaction, &row, lost))
         });
-        match settled {
+        match finished {
             Ok(()) => Ok(()),
             Err(ChangeError::Store(error)) => Err(error),
             Err(error) => {
-                // Inside one transaction the table alone decides, and every row above has its place in it.
-                tracing::error!(job, %error, "a settlement has no row in the table");
+                // In one transaction the table alone decides, and it has a row for every case below.
+                tracing::error!(job, %error, "the end of an attempt has no row in the transition table");
                 Ok(())
             }
         }
     }
 }
 
-fn decide(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), ChangeError> {
+fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
     let step = |trigger: Trigger, reason: Option<Reason>, message: Option<String>| {
         apply(transaction, &row.id, trigger, &Change { reason, message, epoch: Some(row.attempt) })
     };
     match row.state {
-        // Whatever the worker came to, it was canceled before.
+        // The cancellation came first, whatever the verdict is.
         State::Canceling if row.verdict.is_some() => step(Trigger::Drop, None, None).map(|_| ()),
         State::Canceling => step(Trigger::Lose, None, None).map(|_| ()),
         State::Interrupted => step(Trigger::Requeue, row.reason, None).map(|_| ()),
@@ -60,20 +60,20 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), Cha
                     why = reason.or(Some(Reason::UserPause));
                     step(Trigger::Pause, why, None)?;
                 }
-                // Who asked for a pause keeps it; what came up during a drain or a limit is the newer reason.
+                // A pause on request is kept; after a drain or a limit the reason of the verdict is the newer one.
                 let drained = why == Some(Reason::ServerRestart) && reason.is_none();
                 let kept = if why == Some(Reason::UserPause) { why } else { reason.or(why) };
                 step(if drained { Trigger::Drain } else { Trigger::Rest }, kept, None).map(|_| ())
             }
-            // A worker says "canceled" only when told to; without a cancellation it is as good as lost.
+            // A worker ends as canceled on request only; without a request it counts as lost.
             Some(Verdict::Canceled) | None => lose(transaction, row, lost),
         },
         _ => Ok(()),
     }
 }
 
-fn lose(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), ChangeError> {
-    let reason = row.condemned.unwrap_or(lost.reason);
+fn lose(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
+    let reason = row.kill_reason.unwrap_or(lost.reason);
     let step = |trigger: Trigger, reason: Reason, message: Option<String>| {
         apply(transaction, &row.id, trigger, &Change { reason: Some(reason), message, epoch: Some(row.attempt) })
     };
@@ -81,13 +81,13 @@ fn lose(transaction: &Transaction, row: &JobRow, lost: Loss) -> Result<(), Chang
         return step(Trigger::Fail, reason, None).map(|_| ());
     }
     if reason == Reason::StorageEnospc {
-        // It rests until there is room; whoever asked for a pause before keeps it.
+        // The job is paused until there is space; a pause on request is kept.
         let kept = row.reason.filter(|asked| *asked == Reason::UserPause).unwrap_or(reason);
         step(Trigger::Lose, kept, None)?;
         step(Trigger::Requeue, kept, None)?;
         return step(Trigger::Pause, kept, None).map(|_| ());
     }
-    // A worker that was ended because it did not rest in time has not died of itself.
+    // A worker that was killed because it did not pause in time has not died by itself.
     let was_pausing = row.state == State::Pausing;
     let reason = if was_pausing { row.reason.unwrap_or(reason) } else { reason };
     step(Trigger::Lose, reason, None)?;

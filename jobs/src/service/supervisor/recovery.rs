@@ -1,0 +1,58 @@
+//! Recovery when the service starts. A restart of the service never counts as a death of a worker.
+
+use super::{Supervisor, leftovers};
+use crate::service::executor::Adoption;
+use crate::service::store::finish_attempt::LossCause;
+use crate::service::store::import::ProgressPace;
+use crate::service::store::{JobRow, StoreError};
+use crate::spec::attempt_files::attempt_directory;
+use crate::spec::run_options::RunOptions;
+use crate::spec::states::Reason;
+
+impl Supervisor {
+    /// Brings every job that had a worker to a legal state, and names what the database does not know. To be done before the
+    /// service is ready.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn recover(&mut self) -> Result<(), StoreError> {
+        for job in self.store.unfinished_attempts()? {
+            if self.adopt(&job)? {
+                continue;
+            }
+            // What the worker wrote before counts, its verdict above all. Records that cannot be read are as good as none:
+            // the job goes on from its last checkpoint.
+            let imported = self.store.import(&job.id, job.attempt, &mut ProgressPace::default());
+            let cleared = imported.and_then(|_| leftovers::remove(&self.store, &job.id, job.attempt));
+            if let Err(error) = cleared {
+                tracing::error!(job = job.id, %error, "records could not be imported or leftovers not removed");
+            }
+            let lost = LossCause { reason: Reason::ServerRestart, is_death: false };
+            self.store.finish_attempt(&job.id, job.attempt, lost)?;
+            tracing::info!(job = job.id, attempt = job.attempt, "recovered");
+        }
+        for path in self.store.unknown_entries()? {
+            tracing::warn!(path = %path.display(), "not in the database; left where it is");
+        }
+        Ok(())
+    }
+
+    /// Takes the worker of an earlier service over; false where there is none.
+    fn adopt(&mut self, job: &JobRow) -> Result<bool, StoreError> {
+        let Some(handle) = &job.worker_handle else { return Ok(false) };
+        let directory = attempt_directory(&self.store.job_directory(&job.id), job.attempt);
+        match self.executor.adopt(&directory, handle, self.notify()) {
+            Adoption::Gone => Ok(false),
+            // The job is about to go back to the queue already.
+            Adoption::Running(mut worker) if !job.state.has_worker() => {
+                worker.kill();
+                Ok(false)
+            }
+            Adoption::Running(worker) => {
+                tracing::info!(job = job.id, attempt = job.attempt, handle, "worker adopted");
+                self.keep_watch(job, worker, RunOptions::from_resolved(&job.resolved)?);
+                Ok(true)
+            }
+        }
+    }
+}
