@@ -277,7 +277,12 @@ impl From<ChangeError> for ApiError {
     fn from(error: ChangeError) -> Self {
         match error {
             ChangeError::NotFound => Self::NotFound("job"),
-            ChangeError::Illegal(..) | ChangeError::Stale => Self::Conflict(error.to_string()),
+            ChangeError::Illegal(state, trigger) => {
+                Self::Conflict(format!("The job is {} and cannot {} in this state.", state.word(), trigger.word()))
+            }
+            ChangeError::Stale => {
+                Self::Conflict("Another request changed the job at the same moment. Try again.".to_owned())
+            }
             ChangeError::Store(error) => error.into(),
         }
     }
