@@ -94,7 +94,7 @@ impl LeastSquares {
         } else {
             let (largest, least) = self.diagonal[..n]
                 .iter()
-                .fold((0.0_f64, f64::INFINITY), |(most, least), d| (most.max(d.abs()), least.min(d.abs())));
+                .fold((0.0_f64, f64::INFINITY), |(largest, least), d| (largest.max(d.abs()), least.min(d.abs())));
             largest / least
         };
         self.back_substitute(rank);

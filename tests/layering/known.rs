@@ -108,7 +108,6 @@ pub const LONG_FUNCTIONS: &[(&str, &str, usize, &str)] = &[
         68,
         "the recurrences of the paper in one piece: every line uses the vectors of the others",
     ),
-    ("src/polynomials/horner.rs", "unrolled", 63, "unrolled by hand: an arm a degree"),
     ("src/scenes/droplet/rows.rs", "rows", 66, "it becomes files of cases (issue 18, item 6)"),
     ("src/scenes/droplet/rows.rs", "figures", 67, "it becomes files of cases (issue 18, item 6)"),
     ("src/scenes/droplet/setup.rs", "scene", 130, "the typed spec replaces it (issue 18, item 1)"),
