@@ -192,7 +192,7 @@ mod tests {
     const STOPPING: Stopping = Stopping { tolerance: 1e-11, max_iterations: 2000 };
 
     #[test]
-    fn both_methods_solve_what_is_not_symmetric() {
+    fn both_methods_solve_unsymmetric_systems() {
         let a = operator(300, false);
         let exact: Vec<f64> = (0..300).map(|i| f64::from(i).sin()).collect();
         let mut b = vec![0.0; 300];
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_singular_operator_is_solved_for_what_has_no_mean() {
+    fn a_singular_operator_is_solved_without_mean() {
         let a = operator(200, true);
         let exact: Vec<f64> = (0..200).map(|i| (std::f64::consts::TAU * f64::from(i) / 200.0).sin()).collect();
         let mut b = vec![0.0; 200];
@@ -226,7 +226,7 @@ mod tests {
 
     /// Second differences on a line: the rounding of a solution leaves a residual far above the tolerance.
     #[test]
-    fn what_rounding_leaves_is_no_failure() {
+    fn residuals_of_rounding_count_as_converged() {
         let n = 20_000;
         let size = (n as f64).powi(2);
         let mut a = SparseRows::default();
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_solution_is_given_up_when_asked() {
+    fn an_interrupt_ends_a_solution() {
         let a = operator(300, true);
         let factors = IncompleteFactors::from_rows(&operator(300, false)).unwrap();
         let interrupt = Interrupt::default();
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_solved_by_nothing() {
+    fn a_zero_right_hand_side_has_the_solution_zero() {
         let a = operator(10, false);
         let factors = IncompleteFactors::from_rows(&a).unwrap();
         let (b, mut x) = (vec![0.0; 10], vec![0.0; 10]);

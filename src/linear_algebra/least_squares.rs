@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn dependent_columns_are_seen() {
+    fn dependent_columns_lower_the_rank() {
         let random = CounterRandom::new(4);
         let entry = |i: usize, k: usize| match k {
             3 => random.symmetric(&[i as i64, 0]) + 2.0 * random.symmetric(&[i as i64, 1]),

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn drawing_ends_when_asked() {
+    fn an_interrupt_ends_the_drawing() {
         let torus = Torus { center: Vector::<3>::zeros(), major_radius: 1.0, minor_radius: 0.4 };
         let interrupt = Interrupt::default();
         interrupt.raise();

@@ -433,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn few_particles_give_a_lower_degree_and_say_so() {
+    fn few_particles_give_a_lower_degree_and_are_counted() {
         let points: Vec<Vector<2>> = cloud(0.3).into_iter().take(5).chain([Vector::<2>::new(-0.95, -0.8)]).collect();
         let values: Vec<f64> = points.iter().map(|x| x[0] + 2.0 * x[1]).collect();
         let mut cells = CellList::new(Domain::unbounded());
