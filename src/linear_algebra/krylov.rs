@@ -3,6 +3,20 @@
 //!
 //! The methods judge themselves by the true residual. They start again from it when the residual of their recurrence
 //! was too optimistic.
+//!
+//! ```
+//! use meniscus::linear_algebra::SparseRows;
+//! use meniscus::linear_algebra::krylov::{IncompleteFactors, Stopping, gmres};
+//!
+//! let mut a = SparseRows::default();
+//! a.push_row(&[0, 1], &[4.0, 1.0]);
+//! a.push_row(&[0, 1], &[1.0, 3.0]);
+//! let factors = IncompleteFactors::from_rows(&a).unwrap();
+//! let (b, mut x) = ([1.0, 2.0], [0.0; 2]);
+//! let stopping = Stopping { tolerance: 1e-12, max_iterations: 10 };
+//! let found = gmres::solve(&a, &factors, &b, &mut x, 10, stopping, &mut gmres::Workspace::default());
+//! assert!(found.is_within(stopping) && (x[0] - 1.0 / 11.0).abs() < 1e-12);
+//! ```
 
 pub mod bicgstab;
 pub mod gmres;
