@@ -201,7 +201,7 @@ mod tests {
     use super::{Vector, share_below_plane};
 
     #[test]
-    fn planes_cut_the_unit_cube_as_counted() {
+    fn shares_of_the_unit_cube_agree_with_counted_points() {
         for (normal, signed) in [
             (Vector::<3>::new(1.0, 2.0, -2.0) / 3.0, 0.1),
             (Vector::<3>::new(0.0, 0.6, 0.8), -0.3),

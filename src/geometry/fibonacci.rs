@@ -61,7 +61,7 @@ mod tests {
     use std::f64::consts::PI;
 
     #[test]
-    fn points_are_on_the_sphere_and_as_far_apart_as_their_share_of_it() {
+    fn points_lie_on_the_sphere_and_are_evenly_spread() {
         let points = super::sphere(500);
         let share = (4.0 * PI / 500.0_f64).sqrt();
         for (i, x) in points.iter().enumerate() {

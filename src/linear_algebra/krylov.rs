@@ -3,6 +3,20 @@
 //!
 //! The methods judge themselves by the true residual. They start again from it when the residual of their recurrence
 //! was too optimistic.
+//!
+//! ```
+//! use meniscus::linear_algebra::SparseRows;
+//! use meniscus::linear_algebra::krylov::{IncompleteFactors, Stopping, gmres};
+//!
+//! let mut a = SparseRows::default();
+//! a.push_row(&[0, 1], &[4.0, 1.0]);
+//! a.push_row(&[0, 1], &[1.0, 3.0]);
+//! let factors = IncompleteFactors::from_rows(&a).unwrap();
+//! let (b, mut x) = ([1.0, 2.0], [0.0; 2]);
+//! let stopping = Stopping { tolerance: 1e-12, max_iterations: 10 };
+//! let found = gmres::solve(&a, &factors, &b, &mut x, 10, stopping, &mut gmres::Workspace::default());
+//! assert!(found.is_within(stopping) && (x[0] - 1.0 / 11.0).abs() < 1e-12);
+//! ```
 
 pub mod bicgstab;
 pub mod gmres;
@@ -192,7 +206,7 @@ mod tests {
     const STOPPING: Stopping = Stopping { tolerance: 1e-11, max_iterations: 2000 };
 
     #[test]
-    fn both_methods_solve_what_is_not_symmetric() {
+    fn both_methods_solve_unsymmetric_systems() {
         let a = operator(300, false);
         let exact: Vec<f64> = (0..300).map(|i| f64::from(i).sin()).collect();
         let mut b = vec![0.0; 300];
@@ -210,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_singular_operator_is_solved_for_what_has_no_mean() {
+    fn a_singular_operator_is_solved_without_mean() {
         let a = operator(200, true);
         let exact: Vec<f64> = (0..200).map(|i| (std::f64::consts::TAU * f64::from(i) / 200.0).sin()).collect();
         let mut b = vec![0.0; 200];
@@ -226,7 +240,7 @@ mod tests {
 
     /// Second differences on a line: the rounding of a solution leaves a residual far above the tolerance.
     #[test]
-    fn what_rounding_leaves_is_no_failure() {
+    fn residuals_of_rounding_count_as_converged() {
         let n = 20_000;
         let size = (n as f64).powi(2);
         let mut a = SparseRows::default();
@@ -254,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_solution_is_given_up_when_asked() {
+    fn an_interrupt_ends_a_solution() {
         let a = operator(300, true);
         let factors = IncompleteFactors::from_rows(&operator(300, false)).unwrap();
         let interrupt = Interrupt::default();
@@ -270,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_solved_by_nothing() {
+    fn a_zero_right_hand_side_has_the_solution_zero() {
         let a = operator(10, false);
         let factors = IncompleteFactors::from_rows(&a).unwrap();
         let (b, mut x) = (vec![0.0; 10], vec![0.0; 10]);

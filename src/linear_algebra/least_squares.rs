@@ -94,7 +94,7 @@ impl LeastSquares {
         } else {
             let (largest, least) = self.diagonal[..n]
                 .iter()
-                .fold((0.0_f64, f64::INFINITY), |(most, least), d| (most.max(d.abs()), least.min(d.abs())));
+                .fold((0.0_f64, f64::INFINITY), |(largest, least), d| (largest.max(d.abs()), least.min(d.abs())));
             largest / least
         };
         self.back_substitute(rank);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn dependent_columns_are_seen() {
+    fn dependent_columns_lower_the_rank() {
         let random = CounterRandom::new(4);
         let entry = |i: usize, k: usize| match k {
             3 => random.symmetric(&[i as i64, 0]) + 2.0 * random.symmetric(&[i as i64, 1]),

@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_of_low_rank_shows_and_leaves_the_others_alone() {
+    fn a_rank_deficient_lane_does_not_affect_the_others() {
         let mut systems = LaneSystems::default();
         systems.reset(2);
         let lanes = |first: f64| Lanes::new([first, 2.0, 2.0, 2.0]);

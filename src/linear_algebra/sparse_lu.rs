@@ -62,7 +62,7 @@ impl SparseLu {
         for i in 0..size {
             let (columns, weights) = rows.row(i);
             triplets.extend(columns.iter().zip(weights).map(|(j, w)| Triplet::new(i, *j as usize, *w)));
-            largest = weights.iter().fold(largest, |most, w| most.max(w.abs()));
+            largest = weights.iter().fold(largest, |largest, w| largest.max(w.abs()));
         }
         // β has the magnitude of the largest entry and the sign of α.
         let beta = alpha.map(|alpha| largest.copysign(alpha));

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn sorting_gathers_what_stands_twice() {
+    fn sorting_adds_up_repeated_columns() {
         let mut operator = SparseRows::default();
         operator.push_row(&[2, 0, 2], &[1.0, 4.0, 2.0]);
         operator.push_row(&[0], &[7.0]);

@@ -77,7 +77,7 @@ impl<const D: usize> CellList<D> {
             low = Vector::<D>::zeros();
             high = Vector::<D>::zeros();
         }
-        let most = 4 * n + 64;
+        let max_cells = 4 * n + 64;
         let mut wanted = edge;
         loop {
             let mut cells = 1.0;
@@ -99,7 +99,7 @@ impl<const D: usize> CellList<D> {
                 cells *= along;
                 self.counts[d] = along.min(1e9) as usize;
             }
-            if cells <= most as f64 {
+            if cells <= max_cells as f64 {
                 break;
             }
             wanted *= 1.5;

@@ -209,12 +209,12 @@ mod tests {
         let harmonic: Vec<f64> = points.iter().map(|x| 3.0 * x[2] * x[2] - 1.0).collect();
         let exact: Vec<f64> = harmonic.iter().map(|f| -6.0 * f).collect();
         let delta = spacing(count);
-        for (degree, most) in [(3, 3e-2), (5, 2e-3)] {
+        for (degree, bound) in [(3, 3e-2), (5, 2e-3)] {
             let chart = NormalCopies::new(&points, &points, 2, delta, 2.9 * delta);
             let support = Support { degree, radius: 2.9 * delta };
             let built = construct::<3>(&chart, support, &[Functional::LaplaceBeltrami], &Interrupt::default());
             let error = relative(&applied(&built.unwrap(), 0, &harmonic), &exact);
-            assert!(error < most, "degree {degree}: {error:e}");
+            assert!(error < bound, "degree {degree}: {error:e}");
         }
     }
 

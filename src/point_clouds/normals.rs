@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lone_point_is_named() {
+    fn an_isolated_point_is_named() {
         let mut points = fibonacci::sphere(200);
         points.push(Vector::<3>::new(9.0, 0.0, 0.0));
         let failed = estimate(&points, 0.5).unwrap_err();

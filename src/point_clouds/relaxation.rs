@@ -46,7 +46,7 @@ const PUSH: f64 = 0.25;
 
 /// Relaxes points with the mean spacing δ_n = `spacing`, and projects them back onto their surface with `onto`.
 ///
-/// A round moves point i by about [`PUSH`] δ_n Σ_j (1 − r/ρ)² (x_i − x_j)/r over its neighbors within ρ = 1.8 δ_n. An
+/// A round moves point i by about 0.25 δ_n Σ_j (1 − r/ρ)² (x_i − x_j)/r over its neighbors within ρ = 1.8 δ_n. An
 /// interrupt ends the relaxation early.
 pub fn relax(
     points: &mut Vec<Vector<3>>,
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn drawing_ends_when_asked() {
+    fn an_interrupt_ends_the_drawing() {
         let torus = Torus { center: Vector::<3>::zeros(), major_radius: 1.0, minor_radius: 0.4 };
         let interrupt = Interrupt::default();
         interrupt.raise();

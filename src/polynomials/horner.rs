@@ -66,7 +66,6 @@ fn unrolled<T: Number, const D: usize, const N: usize>(
     t: &[T; D],
 ) -> Derivatives<T, D> {
     let zero = T::splat(0.0);
-    let two = T::splat(2.0);
     let (y, z) = (t[D - 2], t[D - 1]);
     let outer = if D == 3 { N } else { 0 };
     let mut place = super::multi_index::term_count::<D>(N);
@@ -107,8 +106,18 @@ fn unrolled<T: Number, const D: usize, const N: usize>(
             [v, vy, vz, vyy, vyz, vzz] = [w, wy, wz, wyy, wyz, wzz];
         }
     }
-    let mut first = [zero; D];
-    let mut second = [[zero; D]; D];
+    collect(v, [vx, vy, vz], [vxx, vxy, vxz, vyy, vyz, vzz])
+}
+
+/// Value and derivatives from their components by axis; in the plane the axes are y and z.
+///
+/// `second` holds xx/2, xy, xz, yy/2, yz and zz/2.
+#[inline(always)]
+fn collect<T: Number, const D: usize>(value: T, first: [T; 3], second: [T; 6]) -> Derivatives<T, D> {
+    let two = T::splat(2.0);
+    let ([vx, vy, vz], [vxx, vxy, vxz, vyy, vyz, vzz]) = (first, second);
+    let mut first = [value; D];
+    let mut second = [[value; D]; D];
     first[D - 2] = vy;
     first[D - 1] = vz;
     second[D - 2][D - 2] = two * vyy;
@@ -123,5 +132,5 @@ fn unrolled<T: Number, const D: usize, const N: usize>(
         second[1][0] = vxy;
         second[2][0] = vxz;
     }
-    Derivatives { value: v, first, second }
+    Derivatives { value, first, second }
 }

@@ -24,6 +24,26 @@ pub enum Solver {
 }
 
 /// Parameters of all fits of a method.
+///
+/// ```
+/// use meniscus::geometry::{Domain, Vector};
+/// use meniscus::neighbors::CellList;
+/// use meniscus::polynomials::{BasisKind, FitData, Neighborhood, PolynomialBasis};
+/// use meniscus::polynomials::{Regression, RegressionScratch, Solver};
+///
+/// // The values x² on a lattice of spacing 1 are reproduced by a fit of degree 2.
+/// let points: Vec<_> = (0..49).map(|k| Vector::<2>::new((k % 7) as f64, (k / 7) as f64)).collect();
+/// let mut cells = CellList::new(Domain::unbounded());
+/// cells.rebuild(points.iter().copied(), 2.0);
+/// let basis = PolynomialBasis::new(BasisKind::Minter, 2);
+/// let neighborhood = Neighborhood::Radius { cutoff: 2.1 };
+/// let regression = Regression::<2>::new(basis, neighborhood, 2.0, 1.5, 1.0, Solver::Orthogonal);
+/// let data = FitData { search: &cells, values: |j: usize, _| points[j][0].powi(2), quantities: 1, admit: |_, _| true };
+/// let mut coefficients = vec![0.0; regression.terms()];
+/// let fit = regression.fit(&data, 0, &points[24], &mut RegressionScratch::default(), &mut coefficients).unwrap();
+/// let p = fit.polynomial(regression.degree(), &coefficients);
+/// assert!((p.value(&Vector::<2>::new(0.5, 0.0)) - 3.5_f64.powi(2)).abs() < 1e-10);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Regression<const D: usize> {
     /// Polynomial basis of the full degree.
@@ -433,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn few_particles_give_a_lower_degree_and_say_so() {
+    fn few_particles_give_a_lower_degree_and_are_counted() {
         let points: Vec<Vector<2>> = cloud(0.3).into_iter().take(5).chain([Vector::<2>::new(-0.95, -0.8)]).collect();
         let values: Vec<f64> = points.iter().map(|x| x[0] + 2.0 * x[1]).collect();
         let mut cells = CellList::new(Domain::unbounded());

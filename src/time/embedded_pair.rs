@@ -92,7 +92,7 @@ mod tests {
     use super::EmbeddedPair;
 
     #[test]
-    fn order_five_and_an_error_that_tells() {
+    fn the_order_is_five_and_the_estimate_follows_the_error() {
         // u' = cos t · u: u = exp(sin t).
         let mut slope = |u: &[f64], t: f64, out: &mut [f64]| out[0] = t.cos() * u[0];
         let mut error = |steps: u32| {

@@ -34,7 +34,6 @@ pub const LONG_FUNCTIONS: &[(&str, &str, usize, &str)] = &[
         68,
         "the recurrences of the paper in one piece: every line uses the vectors of the others",
     ),
-    ("src/polynomials/horner.rs", "unrolled", 63, "unrolled by hand: an arm a degree"),
     ("src/scenes/surface_pde/surfaces.rs", "in_space", 61, "the typed spec replaces it (issue 18, item 1)"),
     ("src/schemes/embedding_closest_point/band.rs", "about", 71, "not cut yet (issue 18)"),
     (

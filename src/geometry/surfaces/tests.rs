@@ -112,7 +112,7 @@ fn no_point_of_the_outline_is_nearer_than_the_closest_point() {
 }
 
 #[test]
-fn outlines_run_round_the_measure_with_the_inside_on_the_left() {
+fn outlines_enclose_the_area_with_the_inside_on_the_left() {
     for (name, surface) in plane_shapes() {
         let mut area = 0.0;
         for chain in surface.outline(1e-3) {
@@ -125,7 +125,7 @@ fn outlines_run_round_the_measure_with_the_inside_on_the_left() {
 }
 
 #[test]
-fn measures_agree_with_counting() {
+fn volumes_agree_with_counted_points() {
     fn count<const D: usize>(surface: &dyn Surface<D>) -> f64 {
         let n = 400_000;
         let inside = queries::<D>(n).iter().filter(|x| surface.signed_distance(x) < 0.0).count();

@@ -8,7 +8,7 @@ fn spacing(count: usize) -> f64 {
     (4.0 * PI / count as f64).sqrt()
 }
 
-/// Flaws with supports of so many spacings, with normals given or estimated.
+/// Flaws of points with given or estimated normals, for supports of a number of spacings.
 fn flaws<const D: usize>(points: &[Vector<D>], given: Option<&[Vector<D>]>, cutoff: f64) -> Vec<Flaw> {
     let examined = Examined::new(points).unwrap();
     let radius = cutoff * examined.spacing;
@@ -24,7 +24,7 @@ fn flaws<const D: usize>(points: &[Vector<D>], given: Option<&[Vector<D>]>, cuto
     }
 }
 
-/// A square lattice of spacing 1 with 40 points a side, its points moved a little.
+/// A square lattice of spacing 1 with 40 points per side and a small jitter.
 fn sheet(height: f64, seed: u64) -> Vec<Vector<3>> {
     let random = CounterRandom::new(seed);
     let off = |i: i64, d: i64| 0.1 * random.symmetric(&[i, d]);
@@ -55,7 +55,7 @@ fn holes_are_where_they_were_cut() {
     let points: Vec<_> = fibonacci::sphere(4000).into_iter().filter(|x| x[2] < 0.95).collect();
     let found = flaws(&points, None, 2.4);
     let [Flaw::Holes(named)] = found.as_slice() else { panic!("{found:?}") };
-    // The rim has the length 2π·0.31, every point of it about 0.056 for itself.
+    // The rim has the length 2π·0.31, and each of its points takes about 0.056 of it.
     assert!((20..60).contains(&named.count), "{named:?}");
     assert!(named.first.iter().all(|i| points[*i][2] > 0.9), "{named}");
     let arc: Vec<_> = (0..100).map(|i| 0.03 * f64::from(i)).map(|a| Vector::<2>::new(a.cos(), a.sin())).collect();
@@ -77,7 +77,7 @@ fn sheets_closer_than_the_support_are_found_whichever_way_they_face() {
         assert!(found.iter().all(|flaw| flaw.name() != "inconsistent_normals"), "{found:?}");
     }
     assert!(flaws(&points, None, 2.4).iter().any(|flaw| flaw.name() == "close_sheets"));
-    // Far enough apart only their edges are left.
+    // Sheets that are far enough apart have flaws at their edges only.
     let mut points = sheet(0.0, 1);
     points.extend(sheet(4.5, 2));
     let names: Vec<_> = flaws(&points, None, 2.4).iter().map(Flaw::name).collect();
@@ -95,13 +95,13 @@ fn normals_that_contradict_the_points_are_named() {
     let found = flaws(&points, Some(&given), 3.3);
     let [Flaw::InconsistentNormals(named)] = found.as_slice() else { panic!("{found:?}") };
     assert_eq!((named.to_string().as_str(), named.count), ("points 7, 500, 1200, 1999", 4));
-    // They are mended.
+    // Inconsistent normals are replaced.
     let examined = Examined::new(&points).unwrap();
     let mut mended = unit_normals(&given).unwrap();
     examined.flaws(&mut mended, NormalSource::Given, 3.3 * examined.spacing);
     assert!(points.iter().zip(&mended).all(|(x, n)| x.dot(n) > 0.999));
     assert_eq!(examined.flaws(&mut mended, NormalSource::Given, 3.3 * examined.spacing), []);
-    // All inward is consistent.
+    // Normals that all point inward are consistent.
     let inward: Vec<_> = points.iter().map(|x| -x).collect();
     assert_eq!(flaws(&points, Some(&inward), 3.3), []);
     given[3] = Vector::<3>::zeros();
@@ -123,7 +123,7 @@ fn points_in_one_place_are_refused_by_their_numbers() {
     points[1000] += Vector::<3>::repeat(1e-6);
     let refused = Examined::new(&points).unwrap_err();
     assert!(refused.to_string().starts_with("points 17, 1000:"), "{refused}");
-    // Close, but a point of its own.
+    // A close point that is distinct.
     points[1000] += Vector::<3>::repeat(1e-2);
     assert!(Examined::new(&points).is_ok());
     let all_alike = Examined::new(&[Vector::<3>::repeat(2.0); 9000]).unwrap_err().to_string();
@@ -131,7 +131,7 @@ fn points_in_one_place_are_refused_by_their_numbers() {
 }
 
 #[test]
-fn odd_clouds_end_in_words() {
+fn unusable_clouds_are_refused_with_their_reason() {
     let one = Examined::new(&[Vector::<3>::zeros()]).unwrap_err();
     assert_eq!(one, Unusable::TooFew { count: 1, least: 13 });
     let line: Vec<_> = (0..100).map(|i| Vector::<3>::new(f64::from(i), 0.0, 0.0)).collect();

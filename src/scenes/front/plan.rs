@@ -8,7 +8,7 @@ use crate::geometry::flows::Stretch;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::flow_work::{error_units, path_units};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::shapes::Shape;
@@ -152,6 +152,10 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
 
     fn spacing(&self) -> Option<f64> {
         Some(self.choice.spacing)
+    }
+
+    fn view(&self) -> View {
+        View::Front { normal: "normal", is_plane: D == 2 }
     }
 
     fn resolved(&self) -> Value {

@@ -100,6 +100,11 @@ impl Scene for WavefrontScene {
         Some(self.choice.spacing)
     }
 
+    /// A curve in (x, y, θ) is drawn in the plane: rays keep their direction.
+    fn view(&self) -> View {
+        View::Front { normal: "normal", is_plane: true }
+    }
+
     fn resolved(&self) -> Value {
         self.plan.resolved.1.clone()
     }

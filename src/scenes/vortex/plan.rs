@@ -6,7 +6,7 @@ use crate::geometry::Flow;
 use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec};
+use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
@@ -264,6 +264,10 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn spacing(&self) -> Option<f64> {
         Some(self.spec.spacing)
+    }
+
+    fn view(&self) -> View {
+        View::DISTANCE
     }
 
     fn resolved(&self) -> Value {
