@@ -180,13 +180,13 @@ fn start<S: Sources>(given: Given, sources: &S, errors: &mut Vec<Violation>) -> 
         }
         (Some(scene), false) => own(Some(scene)),
         (None, true) => {
-            let spec = given.read(JobSpec::restart()).flatten();
-            if spec.is_none() && given.raw(JobSpec::restart()).is_null() {
+            let restart = given.raw(JobSpec::restart());
+            if restart.is_null() {
                 let allowed = json!({"checkpoint": "ckpt_…"});
                 errors.push(Violation::new("/restart", "type", "a restart is an object", Value::Null, allowed));
             }
-            let found = match spec {
-                Some(spec) => restart::scene(&spec, sources, errors)?,
+            let found = match restart.as_object() {
+                Some(restart) => restart::scene(Given::new(restart), sources, errors)?,
                 None => None,
             };
             let (source, scene) = found.unzip();

@@ -5,7 +5,7 @@ use super::method::{BYTES, FrontQuestion, is_within_grid, labels, plan_method};
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
-use crate::scene::{BuildContext, Estimate, Planned, Scene};
+use crate::scene::{BuildContext, Estimate, Planned, Scene, View};
 use crate::scenes::particle_estimate::check_extent;
 use crate::scenes::shapes::{PlainShape, Shape};
 use crate::scenes::work_estimate;

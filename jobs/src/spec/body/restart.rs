@@ -1,7 +1,7 @@
 //! `restart`: a scene taken from a checkpoint, with overrides of restart-safe fields.
 
 use super::sources::{RestartSource, Sources};
-use meniscus::spec::{Json, Object, Parameter, Violation, escape};
+use meniscus::spec::{Given, Json, Object, Parameter, Violation, escape};
 use serde_json::json;
 
 meniscus::group! {
@@ -49,17 +49,24 @@ impl Parameter for Overrides {
     }
 }
 
-/// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields.
+/// The source and the scene of a restart: the checkpoint's scene with overrides of restart-safe fields. Fields are read one by
+/// one: an error in one of them, which is listed already, does not hide those of others.
 ///
 /// # Errors
 /// When the look-up fails.
 pub(super) fn scene<S: Sources>(
-    spec: &RestartSpec,
+    given: Given,
     sources: &S,
     errors: &mut Vec<Violation>,
 ) -> Result<Option<(RestartSource, Json)>, S::Error> {
-    let source = source(spec, sources)?.map_err(|error| errors.push(error)).ok();
-    Ok(source.and_then(|source| overridden(spec, source, errors)))
+    let spec = RestartSpec {
+        checkpoint: given.read(RestartSpec::checkpoint()).flatten(),
+        upload: given.read(RestartSpec::upload()).flatten(),
+        overrides: given.read(RestartSpec::overrides()).flatten(),
+        allow_other_isa: given.read(RestartSpec::allow_other_isa()).flatten(),
+    };
+    let source = source(&spec, sources)?.map_err(|error| errors.push(error)).ok();
+    Ok(source.and_then(|source| overridden(&spec, source, errors)))
 }
 
 fn overridden(spec: &RestartSpec, source: RestartSource, errors: &mut Vec<Violation>) -> Option<(RestartSource, Json)> {
