@@ -108,7 +108,7 @@ pub fn state_of(simulation: &dyn Simulation) -> Section {
 /// Why a step could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StepError {
-    /// Somebody asked to drop the step.
+    /// The run was asked to drop the step.
     #[error("interrupted")]
     Interrupted,
     /// A value stopped being a number.

@@ -49,7 +49,7 @@ impl Diagnostic {
     }
 }
 
-/// What a simulation reports; whoever runs it adds costs and provenance.
+/// What a simulation reports. The program that runs it adds costs and provenance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// Errors against exact answers.

@@ -1,6 +1,8 @@
 //! The health of a job: what its run watches and what it noticed.
 
-use meniscus::simulation::{Check, Finding, Health, Severity};
+pub use meniscus::simulation::{Finding, Severity};
+
+use meniscus::simulation::{Check, Health};
 use serde::{Deserialize, Serialize};
 
 /// Whether the results can be trusted.

@@ -53,7 +53,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
         let measure = system.motion.surface().map_or_else(
             || {
                 let copy = system.redistanced_copy(&system.interrupt);
-                // Whoever interrupts ends the run before its first step.
+                // An interrupt ends the run before its first step.
                 copy.and_then(|(_, surface)| enclosed_area_or_volume(&surface, &system.interrupt)).unwrap_or(f64::NAN)
             },
             crate::geometry::Surface::area_or_volume,

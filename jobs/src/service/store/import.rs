@@ -4,11 +4,10 @@
 use super::{Store, StoreError, calibration, events, rows};
 use crate::spec::attempt_files::{self, attempt_directory};
 use crate::spec::forecast::measured;
-use crate::spec::health::{FindingLog, HealthStatus};
+use crate::spec::health::{Finding, FindingLog, HealthStatus, Severity};
 use crate::spec::records::{self, CheckpointRecord, FileRecord, Line, Progress, Record, Usage, Verdict};
 use crate::spec::report::{Results, RunReport};
 use crate::spec::run_options::RunOptions;
-use meniscus::simulation::{Finding, Severity};
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 use std::borrow::Cow;

@@ -3,12 +3,11 @@
 use super::StoreError;
 use crate::formats::frame_index;
 use crate::spec::forecast::ForecastRecord;
-use crate::spec::health::HealthStatus;
+use crate::spec::health::{Finding, HealthStatus};
 use crate::spec::records::{Progress, Usage, Verdict};
 use crate::spec::report::Results;
 use crate::spec::states::{Reason, State};
 use crate::system::digest;
-use meniscus::simulation::Finding;
 use rusqlite::{Connection, OptionalExtension, Row};
 use serde::Deserialize;
 use serde_json::Value;
