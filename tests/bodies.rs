@@ -13,6 +13,7 @@ use meniscus_jobs::system::build;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
+use std::convert::Infallible;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -32,23 +33,30 @@ type Place = (String, String, Option<String>);
 struct Known;
 
 impl Sources for Known {
-    fn checkpoint(&self, id: &str) -> Option<RestartSource> {
-        let first = body::parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok()?;
-        let origin = Origin::Checkpoint("ckpt_1".into());
-        (id == "ckpt_1").then(|| RestartSource { origin, scene: first.resolved.scene, isa: build::isa(), step: 240 })
+    type Error = Infallible;
+
+    fn checkpoint(&self, id: &str) -> Result<Option<RestartSource>, Infallible> {
+        let first = body::parse(&json!({"scene": {"kind": "vortex"}}), ALLOWANCE, &NoSources).ok().unwrap();
+        let source = RestartSource {
+            origin: Origin::Checkpoint("ckpt_1".into()),
+            scene: first.resolved.scene,
+            isa: build::isa(),
+            step: 240,
+        };
+        Ok((id == "ckpt_1").then_some(source))
     }
 
-    fn uploaded_checkpoint(&self, _: &str) -> Option<RestartSource> {
-        None
+    fn uploaded_checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
+        Ok(None)
     }
 
-    fn uploaded_points(&self, id: &str) -> Option<(Purpose, u64)> {
-        match id {
+    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, Infallible> {
+        Ok(match id {
             "upl_points" => Some((Purpose::Points, 5000)),
             "upl_surface" => Some((Purpose::Surface, 5000)),
             "upl_places" => Some((Purpose::Queries, 5000)),
             _ => None,
-        }
+        })
     }
 }
 
@@ -86,13 +94,13 @@ fn recorded_places(answer: &Value) -> Option<BTreeSet<Place>> {
 fn answer(body: &Value) -> Result<Value, BTreeSet<Place>> {
     if let Some(given) = body.get("study") {
         let study = study::parse(given, ALLOWANCE, 2, &Known, &Calibration::default(), |_| ());
-        let study = study.map_err(|errors| places(&errors))?;
+        let study = study.map_err(|error| places(&error.violations()))?;
         return Ok(json!({
             "axes": study.axes, "points": study.points, "max_parallel": study.max_parallel, "on_failure": study.on_failure,
             "name": study.name, "labels": study.labels,
         }));
     }
-    let job = body::parse(body, ALLOWANCE, &Known).map_err(|errors| places(&errors))?;
+    let job = body::parse(body, ALLOWANCE, &Known).map_err(|error| places(&error.violations()))?;
     let estimate = job.forecast.estimate;
     Ok(json!({
         "resolved": job.resolved.to_json(), "kind": job.kind, "uploads": job.uploads, "particles": estimate.particles,
