@@ -7,6 +7,7 @@ use crate::system::digest;
 use meniscus::simulation::Finding;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -166,6 +167,18 @@ pub enum Verdict {
         /// With numbers and places.
         message: String,
     },
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Succeeded => formatter.write_str("succeeded"),
+            Self::Paused { reason: None } => formatter.write_str("paused on request"),
+            Self::Paused { reason: Some(reason) } => write!(formatter, "paused ({})", reason.word()),
+            Self::Canceled => formatter.write_str("canceled"),
+            Self::Failed { reason, message } => write!(formatter, "failed ({}): {message}", reason.word()),
+        }
+    }
 }
 
 /// Where a worker's records go.

@@ -36,7 +36,7 @@ pub fn run_attempt(spec: &AttemptSpec, directory: &Path, control: &Control, sink
         Ok(Err(failure)) => without_places(failure.verdict(directory), spec, directory),
         Err(_) => Verdict::Failed { reason: Reason::Internal, message: "the worker panicked".to_owned() },
     };
-    log.line(&format!("{verdict:?}"));
+    log.line(&verdict.to_string());
     // Without a verdict the service treats the worker as lost, which is the truth then.
     let _ = sink.put(&Record::Verdict(verdict.clone()), true);
     verdict
@@ -135,7 +135,8 @@ fn attempt(
         }
         log.line(&format!("start at step {step}, {} particles", simulation.particle_count()));
         let ending = run(simulation.as_mut(), &mut observers).map_err(Failure::Run)?;
-        log.line(&format!("{ending:?} at step {}", simulation.clock().step));
+        let word = if ending == Ending::Finished { "finished" } else { "stopped" };
+        log.line(&format!("{word} at step {}", simulation.clock().step));
         match ending {
             Ending::Stopped if control.interrupt().is_raised() => Ok(Verdict::Canceled),
             Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),

@@ -374,9 +374,10 @@ fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
     let progress: Progress = rows::json(row, "progress")?;
     let usage: Usage = rows::json(row, "usage")?;
     let (spec, resolved): (Value, Value) = (rows::json(row, "spec")?, rows::json(row, "resolved")?);
-    let value_at = |pointer: &str| {
-        let sent = spec.pointer(pointer).filter(|value| !value.is_null());
-        sent.or_else(|| resolved.pointer(pointer)).cloned().unwrap_or(Value::Null)
+    let value_at = |axis: &str| {
+        // Axes are JSON pointers of the client's.
+        let sent = Value::pointer(&spec, axis).filter(|value| !value.is_null());
+        sent.or_else(|| Value::pointer(&resolved, axis)).cloned().unwrap_or(Value::Null)
     };
     let results: Option<Results> = rows::json(row, "results")?;
     Ok(PointRow {
