@@ -12,7 +12,7 @@ pub use view::View;
 pub use work::PhaseWork;
 
 use crate::parallel::Interrupt;
-use crate::simulation::{CpuClock, OutputPlan, Simulation};
+use crate::simulation::{CpuClock, OutputPlan, Quantity, Simulation};
 use crate::spec::{Declaration, Given, Group, Json, Object, Preset, Violation, group, suggest};
 use serde_json::json;
 
@@ -43,10 +43,23 @@ pub struct SceneKind {
     pub example: &'static str,
     /// Short scenes by which the speed of a machine is measured, as a JSON array. Together they have every phase of the kind.
     pub calibration: &'static str,
+    /// What frames, series and reports of the kind show.
+    pub quantities: fn() -> Quantities,
     /// Its parameters, `kind` and `preset` excepted.
     pub declarations: fn() -> Vec<Declaration>,
     /// From its parameters as sent, and what is already known to be wrong, to a scene.
     pub parse: fn(given: &Object, errors: Vec<Violation>) -> Planned,
+}
+
+/// The quantities that the schemes of a kind declare.
+#[derive(Debug, Clone)]
+pub struct Quantities {
+    /// Fields of frames.
+    pub fields: Vec<&'static Quantity>,
+    /// Scalars of the series.
+    pub observables: Vec<&'static Quantity>,
+    /// Norms of the errors in reports.
+    pub norms: Vec<&'static Quantity>,
 }
 
 /// Parses the parameters of a kind and plans its scene: the `parse` of a [`SceneKind`].
@@ -121,8 +134,8 @@ pub trait Scene: Send + Sync {
     /// The parameters with every default and every automatic choice that is known before a run.
     fn resolved(&self) -> Json;
 
-    /// Fields that frames can show.
-    fn field_names(&self) -> Vec<&'static str>;
+    /// Fields that frames can show, as the scheme declares them.
+    fn fields(&self) -> Vec<&'static Quantity>;
 
     /// What pictures of its frames show.
     fn view(&self) -> View;

@@ -1,5 +1,5 @@
-//! Methods: one folder each, with the same inner names. `system` holds the data, `simulation` the one
-//! `impl Simulation`; no scheme uses another's inside.
+//! Methods: one folder each, with the same inner names. `system` holds the data, `quantities` declares what frames, series and
+//! reports show, `simulation` is the one `impl Simulation`, and `format_1` reads old checkpoints. No scheme uses another's inside.
 
 pub mod advected_level_set;
 pub mod embedding_closest_point;

@@ -1,32 +1,47 @@
 //! What every simulation is, whatever its method: stepping, state, fields, observables, report, and the loop that
 //! runs it under the eyes of observers.
 
+pub mod components;
+pub mod course;
 pub mod fields;
+pub mod finding;
+pub mod format_1;
 pub mod output_plan;
 pub mod phases;
+pub mod quantity;
 pub mod report;
 pub mod run;
-pub mod state;
+pub mod section;
 
-pub use fields::{Field, FieldValues, Fields};
+pub use course::Course;
+pub use fields::{Field, FieldValues, Fields, Mark, Selection};
+pub use finding::{Check, Divergence, Finding, Health, Severity};
 pub use output_plan::OutputPlan;
 pub use phases::{CpuClock, Phases};
-pub use report::{ErrorEntry, Finding, Health, Report};
+pub use quantity::{Observables, Quantity};
+pub use report::{Diagnostic, ErrorEntry, Report};
 pub use run::{Observer, Request, RunError, run};
-pub use state::{RestoreError, State};
+pub use section::{Component, Entry, LoadError, Section};
 
 use crate::time::Clock;
 
-/// Named scalars of one moment, in a fixed order.
-pub type Observables = Vec<(&'static str, f64)>;
-
-/// A running scene. Its future depends on the scene and [`Simulation::state`] alone.
+/// A running scene. Its future depends on the scene and [`Simulation::save`] alone.
 pub trait Simulation: Send {
+    /// Steps done, their costs, and what was noticed.
+    fn course(&self) -> &Course;
+
+    /// The same, to write.
+    fn course_mut(&mut self) -> &mut Course;
+
     /// Step number and scene time.
-    fn clock(&self) -> Clock;
+    fn clock(&self) -> Clock {
+        self.course().clock()
+    }
 
     /// The clock at the end of the run.
-    fn end(&self) -> Clock;
+    fn end(&self) -> Clock {
+        self.course().end()
+    }
 
     /// Whether the end is reached.
     fn is_finished(&self) -> bool {
@@ -39,41 +54,61 @@ pub trait Simulation: Send {
     /// [`StepError`]; the simulation is then of no further use.
     fn step(&mut self) -> Result<(), StepError>;
 
-    /// A few named scalars: a row of the series.
+    /// The declared scalars of this state: a row of the series.
     fn observables(&self) -> Observables;
 
-    /// What a frame shows, computed only when asked; a pure read.
-    fn fields(&self) -> Fields;
+    /// The selected fields of a frame, which alone are computed; a pure read.
+    fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a>;
 
-    /// Everything that the future depends on, no more.
-    fn state(&self) -> State;
+    /// Saves everything that the future depends on, component by component.
+    fn save(&self, state: &mut Section);
 
-    /// Takes the place of an earlier run of the same scene.
+    /// Goes on from the state of an earlier run of the same scene.
     ///
     /// # Errors
-    /// [`RestoreError`] when the state is of another scene; nothing is changed then.
-    fn restore(&mut self, state: &State) -> Result<(), RestoreError>;
+    /// [`LoadError`] when the state is of another scene; nothing is changed then.
+    fn load(&mut self, state: &Section) -> Result<(), LoadError>;
 
-    /// Errors against the exact answer, stability, and what automatic choices came to.
+    /// The state that the arrays of a checkpoint of format 1 stand for. `arrays` holds them by name, and `clock`.
+    ///
+    /// # Errors
+    /// [`LoadError`]; without a reader for format 1, always.
+    fn translate_format_1(&self, _arrays: &Section) -> Result<Section, LoadError> {
+        Err(LoadError::Format1)
+    }
+
+    /// Errors against the exact answer, health, diagnostics, and what automatic choices came to.
     fn report(&self) -> Report;
 
     /// CPU seconds by phase so far; asked for at every checkpoint, so it computes nothing.
-    fn phases(&self) -> &Phases;
+    fn phases(&self) -> &Phases {
+        &self.course().phases
+    }
 
-    /// A short look at soundness.
+    /// The invariants of this state.
     fn health(&self) -> Health;
 
-    /// How many particles there are.
+    /// Number of particles.
     fn particle_count(&self) -> usize;
 
-    /// Noteworthy physics since the last call.
-    fn take_findings(&mut self) -> Vec<Finding>;
+    /// What was noticed since the last call.
+    fn take_findings(&mut self) -> Vec<Finding> {
+        std::mem::take(&mut self.course_mut().findings)
+    }
+}
+
+/// The state of a simulation.
+#[must_use]
+pub fn state_of(simulation: &dyn Simulation) -> Section {
+    let mut state = Section::default();
+    simulation.save(&mut state);
+    state
 }
 
 /// Why a step could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StepError {
-    /// Somebody asked to drop the step.
+    /// The run was asked to drop the step.
     #[error("interrupted")]
     Interrupted,
     /// A value stopped being a number.
@@ -135,6 +170,22 @@ pub enum StepError {
         /// In which step.
         step: u64,
         /// At what time.
+        time: f64,
+    },
+    /// An invariant that the scheme watches no longer holds.
+    #[error("{check} is {value:.4e}, its limit is {limit:.4e}, at step {step}, time {time}")]
+    CheckFailed {
+        /// Name of the check.
+        check: &'static str,
+        /// Kind of the divergence.
+        divergence: Divergence,
+        /// Value of the check.
+        value: f64,
+        /// Limit of the value.
+        limit: f64,
+        /// Step.
+        step: u64,
+        /// Scene time.
         time: f64,
     },
     /// The surface vanished: no particle has a neighbour of the other sign, or no fit reaches a zero.

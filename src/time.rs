@@ -7,5 +7,5 @@ pub mod clock;
 pub mod embedded_pair;
 pub mod integrators;
 
-pub use clock::{Clock, FixedStep};
+pub use clock::{Clock, FixedStep, Pace};
 pub use integrators::PathIntegrator;

@@ -6,7 +6,7 @@
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
-use meniscus::simulation::FieldValues;
+use meniscus::simulation::{FieldValues, Selection};
 use serde_json::json;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -101,7 +101,7 @@ fn steps_allocate_nothing_after_warm_up() {
                 simulation.step().unwrap();
             }
             if body.get("adaptivity").is_some() {
-                let fields = simulation.fields();
+                let fields = simulation.fields(Selection::All);
                 let level = fields.columns.iter().find(|column| column.name == "level").unwrap();
                 let FieldValues::Scalar(levels) = &level.values else { panic!("numbers") };
                 assert!(levels.iter().any(|level| *level != levels[0]), "nothing is refined");

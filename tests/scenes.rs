@@ -11,7 +11,7 @@ mod surfaces;
 use meniscus::parallel::Interrupt;
 use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::{CpuClock, OutputPlan, State};
+use meniscus::simulation::{CpuClock, Entry, OutputPlan, Section, Selection, state_of};
 use serde_json::{Value, json};
 use support::{build, pool, scene};
 
@@ -129,31 +129,39 @@ fn front_bodies() -> Vec<Value> {
     ]
 }
 
-fn states(body: &Value, threads: usize) -> Vec<State> {
+fn states(body: &Value, threads: usize) -> Vec<Section> {
     pool(threads).install(|| {
         let mut simulation = build(body, PLAN);
-        let mut states = vec![simulation.state()];
+        let mut states = vec![state_of(simulation.as_ref())];
         while !simulation.is_finished() {
             simulation.step().unwrap();
-            states.push(simulation.state());
+            states.push(state_of(simulation.as_ref()));
         }
-        for array in states.iter().flat_map(|state| &state.reals) {
+        for state in &states {
             // A checkpoint takes nothing else.
-            assert!(array.values.iter().all(|value| value.is_finite()), "{} of {body}", array.name);
+            assert_eq!(state.find_non_finite(), None, "{body}");
         }
         states
     })
 }
 
-/// Equality to the last bit, NaN included.
-fn assert_same(a: &State, b: &State, what: &str) {
-    assert_eq!((a.step, a.time.to_bits()), (b.step, b.time.to_bits()), "{what}");
-    assert_eq!(a.counts, b.counts, "{what}, step {}", a.step);
-    assert_eq!(a.reals.len(), b.reals.len());
-    for (x, y) in a.reals.iter().zip(&b.reals) {
-        assert_eq!(x.name, y.name);
-        let place = x.values.iter().zip(&y.values).position(|(x, y)| x.to_bits() != y.to_bits());
-        assert_eq!(place, None, "{what}: {} differs at step {}", x.name, a.step);
+/// Equality to the last bit.
+fn assert_same(a: &Section, b: &Section, what: &str) {
+    let names = |section: &Section| section.entries().map(|(name, _)| name.to_owned()).collect::<Vec<_>>();
+    assert_eq!(names(a), names(b), "{what}");
+    for ((name, x), (_, y)) in a.entries().zip(b.entries()) {
+        match (x, y) {
+            (Entry::Section(x), Entry::Section(y)) => assert_same(x, y, &format!("{name} of {what}")),
+            (Entry::Reals { values: x, .. }, Entry::Reals { values: y, .. }) => {
+                assert_eq!(x.len(), y.len(), "{name} of {what}");
+                let place = x.iter().zip(y).position(|(x, y)| x.to_bits() != y.to_bits());
+                assert_eq!(place, None, "{name} of {what} differs");
+            }
+            (Entry::Real(x), Entry::Real(y)) => {
+                assert_eq!(x.map(f64::to_bits), y.map(f64::to_bits), "{name} of {what}");
+            }
+            _ => assert_eq!(x, y, "{name} of {what}"),
+        }
     }
 }
 
@@ -170,8 +178,8 @@ fn every_example_runs_to_its_end_with_finite_results() {
             assert!(report.health.finite, "{}", kind.kind);
             assert!(report.errors.iter().all(|e| e.value.is_finite()), "{}: {:?}", kind.kind, report.errors);
             assert!(!report.errors.is_empty(), "{}", kind.kind);
-            let names: Vec<&str> = simulation.fields().columns.iter().map(|c| c.name).collect();
-            let mut promised = scene(&body["scene"]).field_names();
+            let names: Vec<&str> = simulation.fields(Selection::All).columns.iter().map(|c| c.name).collect();
+            let mut promised: Vec<&str> = scene(&body["scene"]).fields().iter().map(|field| field.name).collect();
             promised.sort_unstable();
             let mut shown = names.clone();
             shown.sort_unstable();
@@ -194,13 +202,13 @@ fn k_steps_and_a_restore_and_the_rest_equal_the_unbroken_run_for_1_2_and_3_threa
             let threads = 1 + k % 3;
             pool(threads).install(|| {
                 let mut simulation = build(&body, PLAN);
-                simulation.restore(&unbroken[k]).unwrap();
-                assert_same(&simulation.state(), &unbroken[k], "restored");
+                simulation.load(&unbroken[k]).unwrap();
+                assert_same(&state_of(simulation.as_ref()), &unbroken[k], "restored");
                 while !simulation.is_finished() {
                     simulation.step().unwrap();
                 }
                 assert_same(
-                    &simulation.state(),
+                    &state_of(simulation.as_ref()),
                     &unbroken[last],
                     &format!("restart at {k} on {threads} threads, {body}"),
                 );
@@ -216,11 +224,11 @@ fn looking_changes_nothing() {
             let mut watched = build(&body, PLAN);
             while !watched.is_finished() {
                 watched.step().unwrap();
-                let (fields, again) = (watched.fields(), watched.fields());
+                let (fields, again) = (watched.fields(Selection::All), watched.fields(Selection::All));
                 assert_eq!(fields.points, again.points);
                 let _ = (watched.observables(), watched.report(), watched.health());
             }
-            assert_same(&watched.state(), states(&body, 1).last().unwrap(), &body.to_string());
+            assert_same(&state_of(watched.as_ref()), states(&body, 1).last().unwrap(), &body.to_string());
         });
     }
 }
@@ -229,14 +237,14 @@ fn looking_changes_nothing() {
 fn a_state_of_another_scene_is_refused_and_nothing_changes() {
     let small = build(&json!({"kind": "redistance", "spacing": 0.1}), PLAN);
     let mut large = build(&json!({"kind": "redistance", "spacing": 0.05}), PLAN);
-    let before = large.state();
-    assert!(large.restore(&small.state()).unwrap_err().to_string().contains("numbers, this scene needs"));
-    assert_same(&large.state(), &before, "after a refused restore");
+    let before = state_of(large.as_ref());
+    assert!(large.load(&state_of(small.as_ref())).unwrap_err().to_string().contains("numbers, this scene needs"));
+    assert_same(&state_of(large.as_ref()), &before, "after a refused restore");
     let mut vortex = build(&json!({"kind": "vortex", "spacing": 0.1}), PLAN);
-    assert!(vortex.restore(&small.state()).is_err());
+    assert!(vortex.load(&state_of(small.as_ref())).is_err());
     let mut beyond = before.clone();
-    beyond.step = 99;
-    assert!(large.restore(&beyond).unwrap_err().to_string().contains("ends at step 1"));
+    beyond.section_mut("clock").unwrap().put_count("step", 99);
+    assert!(large.load(&beyond).unwrap_err().to_string().contains("ends at step 1"));
 }
 
 #[test]
@@ -250,6 +258,46 @@ fn an_interrupt_drops_the_step() {
     let mut simulation = scene(&json!({"kind": "redistance"})).build(context.clone()).unwrap();
     context.interrupt.raise();
     assert_eq!(simulation.step().unwrap_err(), meniscus::simulation::StepError::Interrupted);
+}
+
+/// A column of the particles of a state.
+fn reals(state: &Section, name: &str) -> Vec<f64> {
+    state.section("particles", |particles| particles.reals(name)).unwrap().to_vec()
+}
+
+/// Fields, observables and norms of every run are those that its kind declares, each with a sentence.
+#[test]
+fn what_runs_show_is_declared() {
+    for body in bodies() {
+        let kind = SCENES.iter().find(|kind| body["kind"] == kind.kind).unwrap();
+        let declared = (kind.quantities)();
+        pool(2).install(|| {
+            let mut simulation = build(&body, PLAN);
+            while !simulation.is_finished() {
+                simulation.step().unwrap();
+            }
+            let promised = scene(&body).fields();
+            let fields = simulation.fields(Selection::All);
+            let shown: Vec<&str> = fields.columns.iter().map(|column| column.name).collect();
+            for field in &promised {
+                assert!(shown.contains(&field.name), "{} of {body}", field.name);
+                assert!(declared.fields.iter().any(|known| known.name == field.name), "{} of {body}", field.name);
+            }
+            assert_eq!(shown.len(), promised.len(), "{body}");
+            let one = [shown[0].to_owned()];
+            assert_eq!(simulation.fields(Selection::Named(&one)).columns.len(), 1, "{body}");
+            for (quantity, _) in simulation.observables() {
+                assert!(declared.observables.iter().any(|known| *known == quantity), "{} of {body}", quantity.name);
+            }
+            for error in simulation.report().errors {
+                assert!(declared.norms.iter().any(|known| known.name == error.norm), "{} of {body}", error.norm);
+            }
+        });
+        let lists = declared.fields.iter().chain(&declared.observables).chain(&declared.norms);
+        for quantity in lists {
+            assert!(quantity.doc.ends_with('.') && quantity.doc.len() > 10, "{quantity:?}");
+        }
+    }
 }
 
 /// Every default that a scene declares lies in its own range, at every depth.
@@ -294,7 +342,7 @@ fn what_is_resolved_resolves_to_itself() {
                     written.step().unwrap();
                     resolved.step().unwrap();
                 }
-                assert_same(&resolved.state(), &written.state(), &format!("as resolved, {body}"));
+                assert_same(&state_of(resolved.as_ref()), &state_of(written.as_ref()), &format!("as resolved, {body}"));
             }
         });
     }
@@ -436,8 +484,8 @@ fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
         assert_eq!(scene(&own).resolved(), scene(&scene(&own).resolved()).resolved());
         let mut simulation = with(own.clone()).unwrap();
         simulation.step().unwrap();
-        let state = simulation.state();
-        let (phi, places) = (state.reals("phi").unwrap(), state.reals("position").unwrap());
+        let state = state_of(simulation.as_ref());
+        let (phi, places) = (reals(&state, "phi"), reals(&state, "position"));
         for (phi, x) in phi.iter().zip(places.chunks(2)) {
             assert!((phi - circle(x[0], x[1])).abs() < 1e-5, "{phi} at {x:?}");
         }
@@ -446,7 +494,7 @@ fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
         asked["queries"] = points.clone();
         let mut simulation = with(asked).unwrap();
         simulation.step().unwrap();
-        let phi = simulation.state().reals("phi").unwrap().to_vec();
+        let phi = reals(&state_of(simulation.as_ref()), "phi");
         for (phi, exact) in phi.iter().zip([-0.25, 0.15, -0.05]) {
             assert!((phi - exact).abs() < 1e-5, "{phi} for {exact}");
         }
@@ -465,13 +513,14 @@ fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
             "kind": "droplet", "case": "custom", "spacing": 0.025, "shape": points.clone(), "domain": domain, "end_time": 2e-3
         });
         let mut simulation = with(drop).unwrap();
-        let state = simulation.state();
-        let places = state.reals("position").unwrap();
-        for (side, x) in state.counts("phase").unwrap().iter().zip(places.chunks(2)) {
+        let state = state_of(simulation.as_ref());
+        let places = reals(&state, "position");
+        let sides = state.section("particles", |particles| particles.counts("phase")).unwrap();
+        for (side, x) in sides.iter().zip(places.chunks(2)) {
             assert_eq!(*side == 1, circle(x[0], x[1]) < 0.0, "{x:?}");
         }
         let area = |simulation: &dyn meniscus::simulation::Simulation| {
-            simulation.observables().into_iter().find(|(name, _)| *name == "area").map_or(f64::NAN, |(_, area)| area)
+            simulation.observables().into_iter().find(|(quantity, _)| quantity.name == "area").map_or(f64::NAN, |(_, area)| area)
         };
         let exact = std::f64::consts::PI / 16.0;
         assert!((area(simulation.as_ref()) / exact - 1.0).abs() < 1e-4);

@@ -4,16 +4,19 @@
 mod case;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use meniscus::simulation::ErrorEntry;
 use meniscus_jobs::formats::checkpoint;
+use meniscus_jobs::spec::attempt_files::REPORT;
 use meniscus_jobs::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
 use meniscus_jobs::spec::body::{self, Allowance, NoSources, ResolvedBody};
+use meniscus_jobs::spec::health::HealthStatus;
 use meniscus_jobs::spec::records::{CheckpointRecord, Record, RecordSink, Usage, Verdict};
+use meniscus_jobs::spec::report::{Cost, RunReport};
 use meniscus_jobs::spec::strict_json;
 use meniscus_jobs::system::process;
 use meniscus_jobs::verify::{self, CaseError};
 use meniscus_jobs::worker::attempt;
 use meniscus_jobs::worker::observers::Control;
-use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -130,14 +133,16 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
     let mut output = io::stdout().lock();
     match verdict {
         Verdict::Succeeded => {
-            let report: ReportSummary =
-                serde_json::from_slice(&std::fs::read(out.join("report.json"))?).unwrap_or_default();
-            for ErrorSummary { quantity, norm, value, time } in report.errors {
-                let value = value.unwrap_or(f64::NAN);
-                writeln!(output, "{quantity:<14} {norm:<9} {value:.3e}  at t = {time}")?;
+            let report: RunReport =
+                serde_json::from_slice(&std::fs::read(out.join(REPORT))?).map_err(io::Error::from)?;
+            for ErrorEntry { quantity, norm, value, time, .. } in &report.errors {
+                writeln!(output, "{quantity:<14} {norm:<9} {value:.3e}  at t = {time:?}")?;
             }
-            let CostSummary { wall_s, cpu_s, steps } = report.cost;
+            let Cost { wall_s, cpu_s, steps, .. } = report.cost;
             writeln!(output, "wall {wall_s:.2} s, cpu {cpu_s:.2} s, {steps} steps")?;
+            if report.health.status == Some(HealthStatus::Doubtful) {
+                writeln!(output, "the results are doubtful: see the warnings above, or health in {REPORT}")?;
+            }
             writeln!(output, "results in {}", out.display())?;
             Ok(true)
         }
@@ -154,30 +159,6 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
 fn stopped(why: &str) -> Result<bool, RunError> {
     writeln!(io::stderr(), "meniscus: {why}")?;
     Ok(false)
-}
-
-/// The part of `report.json` that is printed at the end of a run.
-#[derive(Debug, Default, Deserialize)]
-struct ReportSummary {
-    errors: Vec<ErrorSummary>,
-    cost: CostSummary,
-}
-
-/// An error against the exact solution.
-#[derive(Debug, Deserialize)]
-struct ErrorSummary {
-    quantity: String,
-    norm: String,
-    value: Option<f64>,
-    time: Value,
-}
-
-/// Times in seconds, and steps.
-#[derive(Debug, Default, Deserialize)]
-struct CostSummary {
-    wall_s: f64,
-    cpu_s: f64,
-    steps: u64,
 }
 
 /// Shows records on a terminal and keeps the newest checkpoints.
@@ -198,6 +179,17 @@ impl Screen {
     }
 }
 
+impl Screen {
+    /// Writes a line to standard error, above the bar where there is one.
+    fn say(&self, line: &str) -> io::Result<()> {
+        if self.bar.is_hidden() {
+            return writeln!(io::stderr(), "{line}");
+        }
+        self.bar.println(line);
+        Ok(())
+    }
+}
+
 impl RecordSink for Screen {
     fn put(&mut self, record: &Record, _durable: bool) -> io::Result<()> {
         match record {
@@ -213,7 +205,8 @@ impl RecordSink for Screen {
                     std::fs::remove_file(self.out.join(old.path))?;
                 }
             }
-            Record::Warning { message, .. } | Record::Finding { message, .. } => self.bar.println(message),
+            Record::Warning { message, .. } => self.say(message)?,
+            Record::Finding(finding) => self.say(&finding.to_string())?,
             Record::Started { .. } | Record::File(_) | Record::Verdict(_) => {}
         }
         Ok(())

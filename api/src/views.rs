@@ -21,11 +21,13 @@ macro_rules! list {
 }
 
 mod collections;
+mod health;
 
 pub use collections::{DryRunView, EstimateView, StudyList, StudyView, UploadList, UploadView};
+pub use health::{FindingView, HealthView, QuantityView, ReportView};
 
 use meniscus_jobs::service::store::{CheckpointRow, Event, FileRow, JobRow};
-use meniscus_jobs::spec::records::{HealthRecord, Progress, Usage};
+use meniscus_jobs::spec::records::{Progress, Usage};
 use meniscus_jobs::system::build;
 use serde::Serialize;
 use serde_json::Value;
@@ -57,8 +59,10 @@ pub struct JobView {
     pub resolved: Value,
     /// Progress of the run.
     pub progress: ProgressView,
-    /// Health of the run.
+    /// Whether its results can be trusted.
     pub health: HealthView,
+    /// What was known before it ran, and remarks of the service.
+    pub warnings: Vec<FindingView>,
     /// Number of the latest attempt, from 1; 0 before the first.
     pub attempt: u64,
     /// Resources used so far.
@@ -98,21 +102,6 @@ pub struct ProgressView {
     pub eta_s: Option<f64>,
     /// Measurements on which the estimate rests.
     pub eta_basis: Option<String>,
-}
-
-/// How sound a job looks.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct HealthView {
-    /// All numbers are finite.
-    pub finite: bool,
-    /// Longest way of a particle in a step, in spacings.
-    pub max_cfl: f64,
-    /// Relative change of the enclosed measure.
-    pub volume_drift: Option<f64>,
-    /// Rescued fits and queries.
-    pub rescued_fits: u64,
-    /// Things to know.
-    pub warnings: Vec<String>,
 }
 
 /// Resources that a job has used.
@@ -277,6 +266,12 @@ pub struct SceneKindView {
     pub presets: Vec<&'static str>,
     /// JSON pointers of the fields that a restart may change.
     pub restart_safe: Vec<String>,
+    /// Fields of frames.
+    pub fields: Vec<QuantityView>,
+    /// Scalars of the series.
+    pub observables: Vec<QuantityView>,
+    /// Norms of the errors in reports.
+    pub norms: Vec<QuantityView>,
     /// A job body that runs within seconds.
     pub example: Value,
 }
@@ -320,7 +315,6 @@ impl From<JobRow> for JobView {
         } = job.progress;
         // Speed and remaining time have a meaning only while a worker runs.
         let is_running = job.state.has_worker();
-        let HealthRecord { finite, max_cfl, volume_drift, rescued_fits } = health;
         let Usage { wall_s, cpu_s, peak_memory_bytes, disk_bytes } = job.usage;
         let end_time = if end_time > 0.0 { end_time } else { job.forecast.steps as f64 * job.forecast.time_step };
         Self {
@@ -344,7 +338,8 @@ impl From<JobRow> for JobView {
                 eta_s: eta_s.filter(|_| is_running),
                 eta_basis: eta_basis.filter(|_| is_running),
             },
-            health: HealthView { finite, max_cfl, volume_drift, rescued_fits, warnings: job.warnings },
+            health: HealthView::new(health, job.health, job.findings),
+            warnings: job.warnings.into_iter().map(FindingView::from).collect(),
             attempt: job.attempt,
             usage: UsageView { wall_s, cpu_s, peak_memory_bytes, disk_bytes },
             lineage: LineageView { study: job.study, restarted_from: job.restarted_from, retry_of: job.retry_of },

@@ -4,6 +4,7 @@ pub mod attempt;
 pub mod calibration;
 pub mod inputs;
 pub mod local_run;
+pub mod log;
 pub mod observers;
 pub mod process;
 pub mod report;

@@ -4,11 +4,11 @@ use crate::polynomials::Fit;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 macro_rules! counters {
-    ($($(#[$doc:meta])* $name:ident => $label:literal,)*) => {
+    ($($(#[doc = $doc:literal])* $name:ident => $label:literal,)*) => {
         /// Numbers of fits, queries and fallbacks since the start of a simulation.
         #[derive(Debug, Default)]
         pub struct RescueCounts {
-            $($(#[$doc])* pub $name: AtomicU64,)*
+            $($(#[doc = $doc])* pub $name: AtomicU64,)*
         }
 
         impl RescueCounts {
@@ -23,12 +23,19 @@ macro_rules! counters {
                 $(add(&self.$name, get(&other.$name));)*
             }
 
-            /// Restores the counts of [`Self::entries`], given in the same order.
-            pub fn restore(&self, counts: &[u64]) {
-                let slots = [$(&self.$name,)*];
-                for (slot, count) in slots.into_iter().zip(counts) {
-                    slot.store(*count, Ordering::Relaxed);
-                }
+            /// Labels, counts and what each counts, in a fixed order.
+            #[must_use]
+            pub fn described(&self) -> Vec<(&'static str, u64, &'static str)> {
+                vec![$(($label, self.$name.load(Ordering::Relaxed), concat!($($doc,)*)),)*]
+            }
+
+            /// Sets every count to what `count` says of its label.
+            ///
+            /// # Errors
+            /// The first error of `count`.
+            pub fn set_each<E>(&mut self, mut count: impl FnMut(&'static str) -> Result<u64, E>) -> Result<(), E> {
+                $(*self.$name.get_mut() = count($label)?;)*
+                Ok(())
             }
         }
     };
@@ -53,7 +60,7 @@ impl FitDiagnostics {
 
 counters! {
     /// Number of fits.
-    fits => "fits",
+    fits => "fits.solved",
     /// Fits whose radius or number of neighbors had to grow.
     enlarged => "fits.larger_radius",
     /// Fits of a lower degree than the method's.
@@ -67,9 +74,9 @@ counters! {
     /// patch that were not reached or were too many.
     unprojected => "samples.not_projected",
     /// Number of queries.
-    queries => "queries",
+    queries => "newton.solves",
     /// Number of Newton iterations of all queries.
-    iterations => "queries.iterations",
+    iterations => "newton.iterations",
     /// Queries that were solved on the polynomial of another sample than the nearest.
     other_sample => "queries.other_sample",
     /// Queries whose result is the nearest sample itself.
@@ -112,9 +119,10 @@ mod tests {
         let counts = RescueCounts::default();
         add(&counts.other_sample, 3);
         add(&counts.queries, 70);
-        let saved: Vec<u64> = counts.entries().into_iter().map(|e| e.1).collect();
-        let other = RescueCounts::default();
-        other.restore(&saved);
+        let saved = counts.entries();
+        let mut other = RescueCounts::default();
+        let count = |label| saved.iter().find(|(name, _)| *name == label).map(|(_, count)| *count).ok_or(label);
+        other.set_each(count).unwrap();
         assert_eq!(other.entries(), counts.entries());
     }
 }

@@ -144,7 +144,13 @@ impl Convergence {
     /// allows for the rounding of A x, below which no solver gets.
     #[must_use]
     pub fn is_within(&self, stopping: Stopping) -> bool {
-        self.residual <= 10.0 * stopping.tolerance + self.floor
+        self.residual <= self.bound(stopping)
+    }
+
+    /// The residual at most for which it counts.
+    #[must_use]
+    pub fn bound(&self, stopping: Stopping) -> f64 {
+        10.0 * stopping.tolerance + self.floor
     }
 
     /// Whether the solution is good enough, or another restart from the true residual would not improve it.

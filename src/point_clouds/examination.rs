@@ -137,6 +137,14 @@ pub enum Flaw {
 }
 
 impl Flaw {
+    /// The points that it is about.
+    #[must_use]
+    pub fn points(&self) -> &PointList {
+        match self {
+            Self::Holes(points) | Self::InconsistentNormals(points) | Self::CloseSheets { points, .. } => points,
+        }
+    }
+
     /// Short name of the flaw, used as the code of a finding.
     #[must_use]
     pub fn name(&self) -> &'static str {

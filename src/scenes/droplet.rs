@@ -5,7 +5,8 @@ mod flow;
 mod plan;
 pub mod spec;
 
-use crate::scene::{self, SceneKind};
+use crate::scene::{self, Quantities, SceneKind};
+use crate::schemes::weakly_compressible_sph::quantities as own;
 use crate::spec::Group;
 
 /// The kind.
@@ -16,5 +17,10 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("droplet/example.json"),
     declarations: spec::Droplet::declarations,
     parse: scene::parse_as::<spec::Droplet>,
+    quantities: || Quantities {
+        fields: own::all_fields(),
+        observables: own::OBSERVABLES.to_vec(),
+        norms: own::norms(),
+    },
     calibration: include_str!("droplet/calibration.json"),
 };

@@ -11,7 +11,8 @@ pub(super) use choice::FrontChoice;
 pub(super) use plan::plan_front;
 pub(super) use spec::Law;
 
-use crate::scene::{self, SceneKind};
+use crate::scene::{self, Quantities, SceneKind};
+use crate::schemes::grid_based_particle::quantities as own;
 use crate::spec::Group;
 
 /// The kind.
@@ -22,5 +23,10 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("front/example.json"),
     declarations: spec::Front::declarations,
     parse: scene::parse_as::<spec::Front>,
+    quantities: || Quantities {
+        fields: own::all_fields(),
+        observables: own::OBSERVABLES.to_vec(),
+        norms: own::norms(),
+    },
     calibration: include_str!("front/calibration.json"),
 };

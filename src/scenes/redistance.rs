@@ -3,7 +3,8 @@
 mod plan;
 pub mod spec;
 
-use crate::scene::{self, SceneKind};
+use crate::scene::{self, Quantities, SceneKind};
+use crate::schemes::static_redistancing::quantities as own;
 use crate::spec::Group;
 
 /// The kind.
@@ -14,5 +15,10 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("redistance/example.json"),
     declarations: spec::Redistance::declarations,
     parse: scene::parse_as::<spec::Redistance>,
+    quantities: || Quantities {
+        fields: own::fields(),
+        observables: own::OBSERVABLES.to_vec(),
+        norms: own::NORMS.to_vec(),
+    },
     calibration: include_str!("redistance/calibration.json"),
 };

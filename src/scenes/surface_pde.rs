@@ -6,7 +6,10 @@ mod plan;
 pub mod spec;
 mod surfaces;
 
-use crate::scene::{self, SceneKind};
+use crate::scene::{self, Quantities, SceneKind};
+use crate::schemes::embedding_closest_point::quantities as embedding;
+use crate::schemes::surface_equation::quantities as own;
+use crate::simulation::quantity::without_repetition;
 use crate::spec::Group;
 
 /// The kind.
@@ -17,5 +20,10 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("surface_pde/example.json"),
     declarations: spec::SurfacePde::declarations,
     parse: scene::parse_as::<spec::SurfacePde>,
+    quantities: || Quantities {
+        fields: own::all_fields(),
+        observables: without_repetition(&[own::OBSERVABLES, embedding::OBSERVABLES]),
+        norms: without_repetition(&[&own::norms(), embedding::NORMS]),
+    },
     calibration: include_str!("surface_pde/calibration.json"),
 };

@@ -3,7 +3,10 @@
 mod plan;
 pub mod spec;
 
-use crate::scene::{self, SceneKind};
+use crate::scene::{self, Quantities, SceneKind};
+use crate::schemes::advected_level_set::FieldChoice;
+use crate::schemes::{advected_level_set, grid_based_particle};
+use crate::simulation::quantity::without_repetition;
 use crate::spec::Group;
 
 /// The kind.
@@ -14,5 +17,16 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("vortex/example.json"),
     declarations: spec::Vortex::declarations,
     parse: scene::parse_as::<spec::Vortex>,
+    quantities: || Quantities {
+        fields: without_repetition(&[
+            &advected_level_set::quantities::fields(FieldChoice::Dual),
+            &grid_based_particle::quantities::all_fields(),
+        ]),
+        observables: without_repetition(&[
+            advected_level_set::quantities::OBSERVABLES,
+            grid_based_particle::quantities::OBSERVABLES,
+        ]),
+        norms: without_repetition(&[advected_level_set::quantities::NORMS, &grid_based_particle::quantities::norms()]),
+    },
     calibration: include_str!("vortex/calibration.json"),
 };

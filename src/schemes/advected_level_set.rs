@@ -1,5 +1,8 @@
 //! A level set carried by particles through a prescribed flow (PCP paper, section 4.2).
 
+mod errors;
+mod format_1;
+pub mod quantities;
 mod simulation;
 mod system;
 

@@ -3,6 +3,8 @@
 //! interpolated back to the points of the surface.
 
 mod band;
+mod format_1;
+pub mod quantities;
 mod simulation;
 
 pub use simulation::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};

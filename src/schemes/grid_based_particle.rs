@@ -25,6 +25,7 @@ mod exact_front;
 #[cfg(test)]
 mod fixtures;
 mod foot_points;
+mod format_1;
 mod gaps;
 mod grid;
 pub mod laws;
@@ -32,6 +33,7 @@ mod local_graph;
 mod local_shape;
 mod method;
 mod placement;
+pub mod quantities;
 mod reconstruction;
 mod reconstructor;
 mod refinement;

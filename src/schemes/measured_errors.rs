@@ -2,9 +2,21 @@
 
 use crate::closest_point::rescue::get;
 use crate::closest_point::{FitDiagnostics, RescueCounts};
-use crate::simulation::report::Newton;
-use crate::simulation::{ErrorEntry, Health, Report};
-use std::collections::BTreeMap;
+use crate::operators::SupportDiagnostics;
+use crate::simulation::quantity::quantities;
+use crate::simulation::{Diagnostic, ErrorEntry};
+
+quantities! {
+    /// Norms of errors that schemes share.
+    pub NORMS {
+        RMS = "rms", "of the quantity", "Root mean square over the points.";
+        MAX = "max", "of the quantity", "Largest absolute value over the points or the run.";
+        MEAN = "mean", "of the quantity", "Mean over the points, or over the named part of the run.";
+        RELATIVE = "relative", "", "Size of the error by that of the exact value.";
+        ABSOLUTE = "absolute", "of the quantity", "Absolute difference of one number.";
+        MAX_RELATIVE = "max_relative", "", "Largest error by the largest exact value.";
+    }
+}
 
 /// Sums of errors in the order of adding.
 #[derive(Debug, Clone, Copy, Default)]
@@ -76,36 +88,56 @@ pub fn rescued(counts: &RescueCounts) -> u64 {
     get(&counts.lowered) + get(&counts.unfitted) + get(&counts.unprojected) + get(&counts.sample_distance)
 }
 
-/// The report of a closest-point scheme from its parts.
+/// What a closest-point scheme counts of its fits and queries.
 #[must_use]
-pub fn closest_point_report(
-    fit_diagnostics: &FitDiagnostics,
-    errors: Vec<ErrorEntry>,
-    health: Health,
-    method: BTreeMap<&'static str, String>,
-) -> Report {
-    let counts = &fit_diagnostics.counts;
-    let entries = counts.entries();
-    let some = |labels: &[&str]| {
-        entries.iter().filter(|(name, count)| labels.contains(name) && *count > 0).copied().collect::<BTreeMap<_, _>>()
-    };
+pub fn closest_point_diagnostics(fits: &FitDiagnostics) -> Vec<Diagnostic> {
+    let counts = &fits.counts;
+    let mut diagnostics: Vec<Diagnostic> =
+        counts.described().into_iter().map(|(name, count, doc)| Diagnostic::count(name, count, doc.trim())).collect();
     let solves = get(&counts.queries);
-    Report {
-        errors,
-        health,
-        worst_condition: fit_diagnostics.worst_condition,
-        rescued_fits: some(&[
-            "fits.larger_radius",
-            "fits.lower_degree",
-            "fits.orthogonal",
-            "fits.none",
-            "samples.not_projected",
-        ]),
-        newton: Newton {
-            solves,
-            iterations_mean: get(&counts.iterations) as f64 / solves.max(1) as f64,
-            rescued: some(&["queries.other_sample", "queries.sample_distance"]),
-        },
-        method,
-    }
+    let mean = get(&counts.iterations) as f64 / solves.max(1) as f64;
+    diagnostics.push(Diagnostic::new("newton.iterations_mean", mean, "Newton iterations a query."));
+    let worst = "Worst condition of a scaled regression matrix; 0 before the first.";
+    diagnostics.push(Diagnostic::new("fits.worst_condition", fits.worst_condition, worst));
+    diagnostics
+}
+
+/// Names of what is counted of the fits of operators, for a prefix.
+macro_rules! fit_names {
+    ($prefix:literal) => {
+        [
+            concat!($prefix, ".larger_radius"),
+            concat!($prefix, ".low_rank"),
+            concat!($prefix, ".unresolved"),
+            concat!($prefix, ".failed"),
+            concat!($prefix, ".worst_condition"),
+        ]
+    };
+}
+
+/// Fits of the flow.
+pub const FLOW_FITS: [&str; 5] = fit_names!("flow");
+/// Fits of surface operators.
+pub const SUPPORTS: [&str; 5] = fit_names!("supports");
+
+/// What is counted of the fits of operators.
+#[must_use]
+pub fn support_diagnostics(names: [&'static str; 5], supports: &SupportDiagnostics) -> Vec<Diagnostic> {
+    let SupportDiagnostics { enlarged, low_rank, unresolved, failed, min_pivot, .. } = *supports;
+    let [larger_radius, of_low_rank, not_resolved, not_met, worst_condition] = names;
+    vec![
+        Diagnostic::count(larger_radius, enlarged, "Supports that had to grow."),
+        Diagnostic::count(
+            of_low_rank,
+            low_rank,
+            "Points whose moment conditions needed the rank-revealing decomposition.",
+        ),
+        Diagnostic::count(
+            not_resolved,
+            unresolved,
+            "Points whose supports reach beyond a turn of 60 degrees of the normal.",
+        ),
+        Diagnostic::count(not_met, failed, "Points whose moment conditions cannot be met."),
+        Diagnostic::new(worst_condition, 1.0 / min_pivot, "Largest diagonal entry by its pivot, of all points."),
+    ]
 }

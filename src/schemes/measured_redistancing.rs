@@ -9,7 +9,7 @@ use crate::simulation::Phases;
 /// Rebuilds the surface from the level of points.
 ///
 /// # Errors
-/// [`Interrupted`] when somebody asked to stop.
+/// [`Interrupted`] when the run is asked to stop.
 pub fn rebuild<const D: usize>(
     surface: &mut LevelSurface<D>,
     positions: &[Vector<D>],
@@ -25,7 +25,7 @@ pub fn rebuild<const D: usize>(
 /// Asks the surface about every point with a point of the surface within `reach`.
 ///
 /// # Errors
-/// [`Interrupted`] when somebody asked to stop.
+/// [`Interrupted`] when the run is asked to stop.
 pub fn query<const D: usize>(
     surface: &LevelSurface<D>,
     points: &[Vector<D>],

@@ -1,6 +1,8 @@
 //! Redistancing of resting particles about a known surface (PCP paper, section 4.1), on the particles themselves or, as a baseline,
 //! on a grid that their values are interpolated to.
 
+mod format_1;
+pub mod quantities;
 mod remeshing;
 mod simulation;
 mod system;

@@ -1,22 +1,72 @@
 //! What a frame shows: points in space with named values.
 
+use super::quantity::{Quantity, quantities};
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::Vector;
 use crate::particles::{Particles, ScalarKey, VectorKey};
 
-/// Points and their values at one moment. 2D points have z = 0.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Fields {
+quantities! {
+    /// Fields that every scheme shows whose particles know a surface.
+    pub SURFACE_FIELDS {
+        PHI = "phi", "length", "Signed distance from the surface, positive outside; NaN outside the narrow band.";
+        CLOSEST_POINT = "closest_point", "length", "Closest point of the surface; NaN outside the narrow band.";
+        NORMAL = "normal", "", "Unit normal of the surface, outward; NaN where it is not known.";
+        CURVATURE = "curvature", "1/length", "Divergence of the unit normal at the closest point; NaN where it is not known.";
+    }
+}
+
+quantities! {
+    /// Fields that every scheme has.
+    pub COMMON_FIELDS {
+        PARTICLE_ID = "particle_id", "", "Number of the particle, from 0.";
+    }
+}
+
+/// Which fields are wanted.
+#[derive(Debug, Clone, Copy)]
+pub enum Selection<'a> {
+    /// Every field.
+    All,
+    /// Those of these names.
+    Named(&'a [String]),
+}
+
+impl Selection<'_> {
+    /// Whether a field is wanted.
+    #[must_use]
+    pub fn has(&self, quantity: &Quantity) -> bool {
+        match self {
+            Self::All => true,
+            Self::Named(names) => names.iter().any(|name| name == quantity.name),
+        }
+    }
+}
+
+/// Points and the values of the selected fields at one moment. 2D points have z = 0.
+#[derive(Debug, Clone)]
+pub struct Fields<'a> {
     /// Positions.
     pub points: Vec<[f64; 3]>,
     /// Point data.
     pub columns: Vec<Field>,
+    /// Points that findings are about.
+    pub marks: Vec<Mark>,
+    selection: Selection<'a>,
+}
+
+/// Points that a finding is about.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mark {
+    /// Code of the finding.
+    pub code: &'static str,
+    /// Indices of the points.
+    pub points: Vec<usize>,
 }
 
 /// One named field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// Name as in the scene's list of fields.
+    /// Name, as declared.
     pub name: &'static str,
     /// One value a point.
     pub values: FieldValues,
@@ -35,30 +85,41 @@ pub enum FieldValues {
 
 /// A vector with its missing components set to zero.
 #[must_use]
-pub fn in_space<const D: usize>(x: &Vector<D>) -> [f64; 3] {
+pub fn embed<const D: usize>(x: &Vector<D>) -> [f64; 3] {
     std::array::from_fn(|d| if d < D { x[d] } else { 0.0 })
 }
 
-impl Fields {
+impl<'a> Fields<'a> {
     /// Points without fields.
     #[must_use]
-    pub fn at<const D: usize>(points: &[Vector<D>]) -> Self {
-        Self { points: points.iter().map(in_space).collect(), columns: Vec::new() }
+    pub fn new<const D: usize>(points: &[Vector<D>], selection: Selection<'a>) -> Self {
+        Self { points: points.iter().map(embed).collect(), columns: Vec::new(), marks: Vec::new(), selection }
     }
 
-    /// Adds numbers.
-    pub fn scalar(&mut self, name: &'static str, values: Vec<f64>) {
-        self.columns.push(Field { name, values: FieldValues::Scalar(values) });
+    /// Adds numbers, if they are wanted.
+    pub fn scalar(&mut self, quantity: &'static Quantity, values: impl FnOnce() -> Vec<f64>) {
+        self.add(quantity, || FieldValues::Scalar(values()));
     }
 
-    /// Adds vectors.
-    pub fn vector<const D: usize>(&mut self, name: &'static str, values: impl Iterator<Item = Vector<D>>) {
-        self.columns.push(Field { name, values: FieldValues::Vector(values.map(|v| in_space(&v)).collect()) });
+    /// Adds vectors, if they are wanted.
+    pub fn vector<const D: usize, I: Iterator<Item = Vector<D>>>(
+        &mut self,
+        quantity: &'static Quantity,
+        values: impl FnOnce() -> I,
+    ) {
+        self.add(quantity, || FieldValues::Vector(values().map(|v| embed(&v)).collect()));
     }
 
-    /// Adds particle numbers.
-    pub fn id(&mut self, name: &'static str, values: Vec<u64>) {
-        self.columns.push(Field { name, values: FieldValues::Id(values) });
+    /// Adds the numbers of the particles, if they are wanted.
+    pub fn particle_id(&mut self) {
+        let count = self.points.len() as u64;
+        self.add(&PARTICLE_ID, || FieldValues::Id((0..count).collect()));
+    }
+
+    fn add(&mut self, quantity: &'static Quantity, values: impl FnOnce() -> FieldValues) {
+        if self.selection.has(quantity) {
+            self.columns.push(Field { name: quantity.name, values: values() });
+        }
     }
 
     /// Adds what particles know of the surface, NaN outside the narrow band and where nothing is known: everything but
@@ -84,9 +145,9 @@ impl Fields {
             let values = particles.vector(key).iter().zip(known);
             values.map(|(v, k)| if *k == 1 { *v } else { v.map(|_| f64::NAN) }).collect()
         };
-        self.scalar("phi", number(columns.phi, band));
-        self.vector("closest_point", arrow(columns.closest_point, footed).into_iter());
-        self.vector("normal", arrow(columns.normal, &bent).into_iter());
-        self.scalar("curvature", number(columns.curvature, &bent));
+        self.scalar(&PHI, || number(columns.phi, band));
+        self.vector(&CLOSEST_POINT, || arrow(columns.closest_point, footed).into_iter());
+        self.vector(&NORMAL, || arrow(columns.normal, &bent).into_iter());
+        self.scalar(&CURVATURE, || number(columns.curvature, &bent));
     }
 }

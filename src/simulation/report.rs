@@ -1,71 +1,76 @@
-//! What a simulation says of itself: errors, stability, choices, findings.
+//! What a simulation reports, whatever its method: errors, health, diagnostics, and what automatic choices came to.
 
-use serde::{Deserialize, Serialize};
+use super::finding::Health;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// One error against a reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ErrorEntry {
-    /// What is compared: `phi`, `closest_point`, `normal`, `curvature`, `area`, `interface`, …
+    /// Compared quantity: `phi`, `closest_point`, `normal`, `curvature`, `area`, `interface`, …
     pub quantity: String,
-    /// `rms`, `max`, `mean`, `relative` or `absolute`.
+    /// Norm of the error, one of those that the scene's kind declares.
     pub norm: String,
     /// The error.
+    #[serde(deserialize_with = "null_is_nan")]
     pub value: f64,
     /// Scene time.
     pub time: f64,
-    /// What it is compared with.
+    /// Reference of the comparison.
     pub reference: String,
 }
 
-/// How sound a run looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Health {
-    /// Whether all numbers are finite.
-    pub finite: bool,
-    /// Largest displacement of a particle in a step, in spacings.
-    pub max_cfl: f64,
-    /// Relative change of the enclosed measure, where it is known.
-    pub volume_drift: Option<f64>,
-    /// Fits and queries that needed a rescue.
-    pub rescued_fits: u64,
+/// A number that a method counts or measures about its own work.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Diagnostic {
+    /// Path-like name, such as `fits.larger_radius`.
+    pub name: Cow<'static, str>,
+    /// The number.
+    #[serde(deserialize_with = "null_is_nan")]
+    pub value: f64,
+    /// Unit; empty where there is none.
+    pub unit: Cow<'static, str>,
+    /// What it is, in a sentence.
+    pub doc: Cow<'static, str>,
 }
 
-/// What a simulation reports of its method; costs of the process are added by whoever runs it.
+impl Diagnostic {
+    /// A number without a unit.
+    #[must_use]
+    pub const fn new(name: &'static str, value: f64, doc: &'static str) -> Self {
+        Self { name: Cow::Borrowed(name), value, unit: Cow::Borrowed(""), doc: Cow::Borrowed(doc) }
+    }
+
+    /// A count.
+    #[must_use]
+    pub const fn count(name: &'static str, count: u64, doc: &'static str) -> Self {
+        Self::new(name, count as f64, doc)
+    }
+}
+
+/// What a simulation reports. The program that runs it adds costs and provenance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// Errors against exact answers.
     pub errors: Vec<ErrorEntry>,
-    /// Soundness at the end.
+    /// Invariants at the end.
     pub health: Health,
-    /// Worst condition of a scaled regression matrix.
-    pub worst_condition: f64,
-    /// Rescues of fits: how, and how often.
-    pub rescued_fits: BTreeMap<&'static str, u64>,
-    /// Closest-point queries.
-    pub newton: Newton,
-    /// What automatic choices came to, and why.
+    /// Fallbacks of fits, iterations of solvers, strays and whatever else the method counts.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Outcomes of automatic choices, and their reasons.
     pub method: BTreeMap<&'static str, String>,
 }
 
-/// Statistics of the constrained Newton solves.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Newton {
-    /// Queries.
-    pub solves: u64,
-    /// Iterations per query.
-    pub iterations_mean: f64,
-    /// Rescues: how, and how often.
-    pub rescued: BTreeMap<&'static str, u64>,
+impl Report {
+    /// The value of a diagnostic.
+    #[must_use]
+    pub fn diagnostic(&self, name: &str) -> Option<f64> {
+        self.diagnostics.iter().find(|diagnostic| diagnostic.name == name).map(|diagnostic| diagnostic.value)
+    }
 }
 
-/// A noteworthy event of the physics.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
-    /// Short name, such as `rescued_much`.
-    pub name: &'static str,
-    /// A sentence with numbers.
-    pub message: String,
-    /// Scene time.
-    pub time: f64,
+/// JSON has no NaN and writes null.
+fn null_is_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -28,6 +28,39 @@ pub struct FixedStep {
     pub steps: u64,
 }
 
+/// Steps of one length from an origin: the start of a run, or the restart that changed the length of its steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Δt.
+    pub time_step: f64,
+    /// Clock at which steps of this length began.
+    pub origin: Clock,
+    /// Number of the last step.
+    pub last: u64,
+}
+
+impl Pace {
+    /// Steps of a length from an origin to the first that reaches the end.
+    #[must_use]
+    pub fn new(time_step: f64, end_time: f64, origin: Clock) -> Self {
+        let steps = ((end_time - origin.time) / time_step - TIME_SLACK).ceil().max(0.0) as u64;
+        Self { time_step, origin, last: origin.step + steps }
+    }
+
+    /// The clock after `step` steps.
+    #[must_use]
+    pub fn clock(&self, step: u64) -> Clock {
+        let since = step.saturating_sub(self.origin.step) as f64;
+        Clock { step, time: self.origin.time + since * self.time_step }
+    }
+}
+
+impl From<FixedStep> for Pace {
+    fn from(fixed: FixedStep) -> Self {
+        Self { time_step: fixed.time_step, origin: Clock { step: 0, time: 0.0 }, last: fixed.steps }
+    }
+}
+
 /// Fraction of a step by which a time may be missed through rounding and still counts as reached.
 pub const TIME_SLACK: f64 = 1e-9;
 

@@ -4,7 +4,7 @@ use super::PLAN;
 use super::support::{build, error, pool, run, scene};
 use meniscus::parallel::Interrupt;
 use meniscus::scene::{BuildContext, CloudSizes, Clouds};
-use meniscus::simulation::CpuClock;
+use meniscus::simulation::{CpuClock, Selection};
 use serde_json::{Value, json};
 
 /// Every problem, form, surface, sampling, solver and integrator of `surface_pde` once.
@@ -92,7 +92,7 @@ fn a_flat_bump_is_sown_too() {
     let model = json!({"type": "reaction_diffusion", "model": "gray_scott", "end_time": 1});
     let bump = json!({"type": "bump", "height": 0});
     let simulation = build(&json!({"kind": "surface_pde", "surface": bump, "count": 1500, "problem": model}), PLAN);
-    let fields = simulation.fields();
+    let fields = simulation.fields(Selection::All);
     let second = fields.columns.iter().find(|column| column.name == "second_value").unwrap();
     assert!(format!("{:?}", second.values).contains("0.2"), "nothing is sown");
 }
@@ -149,7 +149,7 @@ fn memory_is_estimated_as_measured() {
 #[test]
 fn supports_that_see_a_bend_are_counted() {
     let coarse =
-        |count: u64| run(&json!({"kind": "surface_pde", "count": count})).rescued_fits.get("supports.coarse").copied();
+        |count: u64| run(&json!({"kind": "surface_pde", "count": count})).diagnostic("supports.coarse").unwrap();
     // |κ| r_c is 2 · 2.4 √(4π/N).
-    assert_eq!((coarse(400), coarse(4000)), (Some(400), None));
+    assert_eq!((coarse(400), coarse(4000)), (400.0, 0.0));
 }

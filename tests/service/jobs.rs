@@ -26,6 +26,19 @@ fn a_job_runs_to_its_end_and_shows_everything() {
     assert!(report["errors"].as_array().unwrap().iter().any(|e| e["quantity"] == "phi" && e["norm"] == "rms"));
     assert!(report["cost"]["phases"]["redistancing/query"].as_f64().unwrap() > 0.0);
     assert!(report["method"]["method"].as_str().unwrap().starts_with("pcp"));
+    assert_eq!((&report["health"]["status"], &report["health"]["findings"]), (&json!("sound"), &json!([])));
+    assert_eq!(report["health"]["checks"][0]["name"], "area_drift");
+    assert!(report.get("stability").is_none());
+    let diagnostics = report["diagnostics"].as_array().unwrap();
+    let solves = diagnostics.iter().find(|one| one["name"] == "newton.solves").unwrap();
+    assert!(solves["value"].as_f64().unwrap() > 0.0 && solves["doc"].as_str().unwrap().ends_with('.'), "{solves}");
+    let health = &job["health"];
+    assert_eq!((&health["status"], &health["finite"], &job["warnings"]), (&json!("sound"), &json!(true), &json!([])));
+    // What frames, series and reports show is declared.
+    let kind = service.get("/v1/scenes/vortex").json();
+    let declares = |list: &str, name: &str| kind[list].as_array().unwrap().iter().any(|one| one["name"] == name);
+    assert!(declares("fields", "psi") && declares("observables", "volume_drift") && declares("norms", "rms"));
+    assert_eq!(kind["fields"][0]["unit"], "length");
     let csv = service.series(&id);
     let rows: Vec<&str> = csv.lines().collect();
     assert!(rows[0].starts_with("time,time_step,area"));

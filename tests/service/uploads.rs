@@ -298,6 +298,28 @@ fn what_is_wrong_with_an_uploaded_surface_is_an_event_or_ends_the_job_with_the_p
         events["items"].as_array().unwrap().iter().filter(|event| event["type"] == "finding").collect();
     assert_eq!(findings.len(), 1, "{events}");
     assert!(findings[0].to_string().contains("more: neighbours on one side alone"), "{findings:?}");
+    let finding = &findings[0]["data"];
+    assert!(finding["code"] == "holes" && finding["severity"] == "warning" && finding["step"] == 0, "{finding}");
+    let points = finding["points"].as_array().unwrap();
+    assert!(!points.is_empty() && finding["count"].as_u64().unwrap() > points.len() as u64, "{finding}");
+    // The same finding is in the job, the report, the log, and marked in the frames.
+    let status = service.get(&format!("/v1/jobs/{holed}")).json();
+    assert_eq!((&status["health"]["status"], &status["health"]["findings"][0]), (&json!("doubtful"), finding));
+    let report = service.get(&format!("/v1/jobs/{holed}/report")).json();
+    assert_eq!((&report["health"]["status"], &report["health"]["findings"][0]), (&json!("doubtful"), finding));
+    assert!(service.get(&format!("/v1/jobs/{holed}/log")).text().contains("warning (holes)"));
+    let doubtful = service.get("/v1/jobs?health=doubtful").json();
+    assert_eq!(doubtful["items"].as_array().unwrap().len(), 1, "{doubtful}");
+    assert_eq!(service.get("/v1/jobs?health=sound").json()["items"], json!([]));
+    assert_eq!(service.get("/v1/jobs?health=fine").status, 422);
+    let frame = service.get(&format!("/v1/jobs/{holed}/files/frames/000001.vtkhdf")).bytes;
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("frame.vtkhdf"), frame).unwrap();
+    let frame = hdf5::File::open(directory.path().join("frame.vtkhdf")).unwrap();
+    let bit = frame.dataset("VTKHDF/FieldData/finding.holes").unwrap().read_raw::<i64>().unwrap()[0];
+    let bits = frame.dataset("VTKHDF/PointData/finding").unwrap().read_raw::<i64>().unwrap();
+    let marked: Vec<usize> = (0..bits.len()).filter(|point| bits[*point] & bit != 0).collect();
+    assert_eq!(json!(marked), finding["points"]);
     let twins = job(format!("{whole}{}\n", lines[3]).as_bytes());
     let failed = service.wait_for(&twins, &["failed"]);
     assert_eq!(failed["reason"], "input.damaged");

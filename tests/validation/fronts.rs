@@ -5,7 +5,7 @@ use crate::ring::extinction_of_ring;
 use crate::support::{build, error, run};
 use meniscus::scene::parse;
 use meniscus::scenes::SCENES;
-use meniscus::simulation::{FieldValues, OutputPlan, Simulation, StepError};
+use meniscus::simulation::{FieldValues, OutputPlan, Selection, Simulation, StepError};
 use serde_json::{Value, json};
 
 fn front(more: &Value) -> Value {
@@ -118,7 +118,7 @@ fn bodies_round_break_and_die_by_their_curvature() {
     let body = |end_time: f64| {
         at_end(&front(&json!({"shape": dumbbell, "law": "mean_curvature", "end_time": end_time, "spacing": 0.02})))
     };
-    let places: Vec<f64> = body(0.003).fields().points.iter().map(|x| x[0]).collect();
+    let places: Vec<f64> = body(0.003).fields(Selection::All).points.iter().map(|x| x[0]).collect();
     assert!(places.iter().all(|x| (x - 0.5).abs() > 0.05), "the neck is gone");
     assert!(places.iter().any(|x| *x < 0.3) && places.iter().any(|x| *x > 0.7), "both balls are there");
     assert_eq!(body(0.0065).particle_count(), 0);
@@ -262,14 +262,14 @@ fn a_parameter_is_carried_along_and_redistributed() {
         let (before, after) = (front(&more), at_end(&front(&more)));
         let start = build(&before, OutputPlan { every_time: None, series_every_steps: 1000 });
         let column = |simulation: &dyn Simulation, name: &str| {
-            let fields = simulation.fields();
+            let fields = simulation.fields(Selection::All);
             let column = fields.columns.iter().find(|column| column.name == name).unwrap();
             let FieldValues::Scalar(values) = &column.values else { panic!("a number") };
             values.clone()
         };
         let angles = |simulation: &dyn Simulation, back: f64| -> Vec<f64> {
             let parts = column(simulation, "segment");
-            let points = simulation.fields().points;
+            let points = simulation.fields(Selection::All).points;
             let center = |part: &f64| centers[*part as usize];
             let angle = |x: &[f64; 3], part: &f64| (x[1] - center(part)).atan2(x[0] - center(part)) - back;
             points.iter().zip(&parts).map(|(x, part)| angle(x, part) / std::f64::consts::TAU).collect()
@@ -314,7 +314,7 @@ fn what_cannot_be_followed_is_said() {
     // So thin that its tips are far below the grid.
     let thin = json!({"type": "ellipse", "center": [0.5, 0.5], "semi_axes": [0.4, 0.02]});
     let mut open = at_end(&front(&json!({"shape": thin, "law": "mean_curvature", "end_time": 0.002})));
-    assert!(open.take_findings().iter().any(|finding| finding.name == "front_open"));
+    assert!(open.take_findings().iter().any(|finding| finding.code == "front_open"));
     let fast = front(&json!({"law": {"type": "normal", "speed": 1e308}, "time_step": 10, "end_time": 20}));
     let mut lost = build(&fast, OutputPlan { every_time: None, series_every_steps: 1000 });
     assert!(matches!(lost.step(), Err(StepError::NonFinite { .. })));
@@ -387,10 +387,8 @@ fn normals_take_part_in_flows() {
     };
     let (with, without) = (off(json!({})), off(json!({"normal_weight": 0})));
     assert!(with < 0.5 * without, "{with:e} {without:e}");
-    let refused = parse(
-        &front(&json!({"law": "mean_curvature", "normal_weight": 0.1, "degree": 4, "neighbors": 3})),
-        SCENES,
-    );
+    let refused =
+        parse(&front(&json!({"law": "mean_curvature", "normal_weight": 0.1, "degree": 4, "neighbors": 3})), SCENES);
     let places: Vec<String> = refused.err().unwrap().into_iter().map(|violation| violation.pointer).collect();
     assert_eq!(places, ["/normal_weight", "/neighbors"]);
 }
@@ -408,7 +406,7 @@ fn balls_shrink_by_their_curvature_until_they_vanish() {
         let mut simulation = at_end(&body);
         assert_eq!(simulation.particle_count(), 0, "{body}");
         let findings = simulation.take_findings();
-        assert!(findings.iter().any(|finding| finding.name == "front_vanished"), "{findings:?}");
+        assert!(findings.iter().any(|finding| finding.code == "front_vanished"), "{findings:?}");
         let report = simulation.report();
         let off = error(&report, "extinction", "absolute", None);
         assert!(off < 2.0 * spacing * spacing, "{body}: {off:e}");
@@ -430,14 +428,18 @@ fn hard_cases_neither_panic_nor_leave_stray_particles() {
     let far = json!({"type": "flow", "flow": {"type": "translation", "velocity": [1e9, 0]}});
     let gone = at_end(&front(&json!({"law": far, "end_time": 0.1, "time_step": 0.05})));
     let report = gone.report();
-    assert!(gone.particle_count() == 0 && report.rescued_fits["particles.outside"] > 0, "{:?}", report.rescued_fits);
+    assert!(
+        gone.particle_count() == 0 && report.diagnostic("particles.outside").unwrap() > 0.0,
+        "{:?}",
+        report.diagnostics
+    );
 }
 
 /// Every foot-point is within γ of its own grid point, and no grid point has two.
 #[test]
 fn foot_points_and_grid_points_are_one_to_one() {
     let simulation = at_end(&front(&json!({"end_time": 0.1})));
-    let fields = simulation.fields();
+    let fields = simulation.fields(Selection::All);
     let column = fields.columns.iter().find(|column| column.name == "grid_point").unwrap();
     let FieldValues::Vector(nodes) = &column.values else { panic!("a vector") };
     let mut seen = std::collections::BTreeSet::new();

@@ -1,9 +1,9 @@
 //! `meniscus run` with a verification case: its runs one after another, then its values beside its targets.
 
 use super::{RunError, exit_code, resolve, start};
+use meniscus_jobs::spec::report::RunReport;
 use meniscus_jobs::verify::case::job_body;
 use meniscus_jobs::verify::{Case, Outcome};
-use serde_json::Value;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
@@ -44,7 +44,7 @@ pub(super) fn run(file: &Path, text: &[u8], out: &Path, threads: Option<usize>) 
     Ok(exit_code(all_met))
 }
 
-fn read_report(directory: &Path) -> Result<Value, String> {
+fn read_report(directory: &Path) -> Result<RunReport, String> {
     let bytes = fs::read(directory.join("report.json")).map_err(|error| error.to_string())?;
     serde_json::from_slice(&bytes).map_err(|error| error.to_string())
 }

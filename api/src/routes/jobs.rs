@@ -17,6 +17,7 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use meniscus_jobs::service::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store, StoreError};
+use meniscus_jobs::spec::health::HealthStatus;
 use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
 use meniscus_jobs::system::clock;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Unexpected, Visitor};
@@ -84,6 +85,9 @@ pub struct JobQuery {
     #[serde(default)]
     #[param(value_type = Option<String>)]
     state: Vec<JobState>,
+    /// `sound` or `doubtful`.
+    #[param(value_type = Option<String>)]
+    health: Option<HealthStatus>,
     /// Kind of the scene.
     kind: Option<String>,
     /// Id of a study.
@@ -166,6 +170,7 @@ impl From<JobQuery> for JobFilter {
     fn from(query: JobQuery) -> Self {
         Self {
             states: query.state,
+            health: query.health,
             kind: query.kind,
             study: query.study,
             name: query.name,

@@ -8,6 +8,7 @@ use crate::query::QueryParameters;
 use crate::resource;
 use crate::routes::files;
 use crate::state::AppState;
+use crate::views::ReportView;
 use axum::Json;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -80,13 +81,13 @@ pub async fn series(
     bytes_response(&text, &facts, &headers)
 }
 
-/// Errors, cost and diagnostics of a finished job.
+/// Errors, cost, health and diagnostics of a finished job.
 #[utoipa::path(get, path = "/v1/jobs/{id}/report", tag = "results", params(("id" = String, Path)),
-    responses((status = 200, content_type = "application/json"), (status = 404, body = Problem)))]
+    responses((status = 200, body = ReportView), (status = 404, body = Problem)))]
 pub async fn report(
     State(state): State<AppState>,
     Path(id): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    files::answer(&state, &id, "report.json", &headers).await
+    files::answer(&state, &id, attempt_files::REPORT, &headers).await
 }

@@ -2,18 +2,24 @@
 
 use crate::error::{ApiError, Problem};
 use crate::path::Path;
-use crate::views::{SceneKindList, SceneKindView};
+use crate::views::{QuantityView, SceneKindList, SceneKindView};
 use axum::Json;
-use meniscus::scene::SceneKind;
+use meniscus::scene::{Quantities, SceneKind};
 use meniscus::scenes::{SCENES, find};
+use meniscus::simulation::Quantity;
 
 fn view(kind: &SceneKind) -> SceneKindView {
+    let Quantities { fields, observables, norms } = (kind.quantities)();
+    let declared = |list: Vec<&'static Quantity>| list.into_iter().map(QuantityView::from).collect();
     SceneKindView {
         kind: kind.kind,
         title: kind.title,
         schema: kind.json_schema(),
         presets: kind.preset_names(),
         restart_safe: kind.restart_safe(),
+        fields: declared(fields),
+        observables: declared(observables),
+        norms: declared(norms),
         // The example is part of the program; a test runs it.
         example: serde_json::from_str(kind.example).unwrap_or_default(),
     }

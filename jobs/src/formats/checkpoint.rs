@@ -1,11 +1,15 @@
 //! Checkpoints: the state of a simulation and the counters of its output, in an HDF5 file that proves itself.
 //!
-//! `/state/NAME` holds the arrays, `/meta` a JSON text with the body, build, instruction set, format version,
-//! counters and a SHA-256 of every data set, `/meta_sha256` the digest of that text. A reader refuses what does not
-//! match.
+//! Under `/state` every section of the state is a group, and every entry of a section a data set in it ([`layout`]).
+//! `/meta` holds a JSON text with the body, build, instruction set, format version, counters and a SHA-256 of every
+//! data set, `/meta_sha256` the digest of that text. A reader refuses what does not match. Files of format 1, which
+//! held flat arrays, are read by [`format_1`].
 
-use crate::formats::hdf5_file::{count_bytes, real_bytes, write};
-use crate::formats::structure::{self, Refusal};
+pub mod format_1;
+pub mod layout;
+
+use crate::formats::hdf5_file::write;
+use crate::formats::structure::{self, Refusal, Structure};
 use crate::spec::body::resolved_scene;
 use crate::spec::records::FileRecord;
 use crate::system::artifacts;
@@ -13,17 +17,17 @@ use crate::system::breakpoints::pass;
 use crate::system::build;
 use crate::system::digest;
 use crate::system::process::free_space;
+use layout::{EntryKind, EntryMeta};
 use meniscus::scene;
 use meniscus::scenes::SCENES;
-use meniscus::simulation::State;
-use meniscus::simulation::state::{CountArray, RealArray};
+use meniscus::simulation::{Finding, LoadError, Section, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Version of the layout.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// What a checkpoint says of itself.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -44,8 +48,26 @@ pub struct Meta {
     pub time: f64,
     /// What was written up to here.
     pub counters: Counters,
-    /// The arrays, in order.
-    pub arrays: Vec<ArrayMeta>,
+    /// Entries of the state, in the order of their paths.
+    #[serde(default)]
+    pub entries: Vec<EntryMeta>,
+    /// Arrays of the state in format 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub arrays: Vec<format_1::ArrayMeta>,
+}
+
+impl Meta {
+    /// Paths of the arrays of the state, with the numbers an item; 0 marks whole numbers.
+    #[must_use]
+    pub fn list(&self) -> Vec<(&str, usize)> {
+        let old = self.arrays.iter().map(|array| (array.name.as_str(), array.components));
+        let new = self.entries.iter().filter_map(|entry| match entry.kind {
+            EntryKind::Reals { components } => Some((entry.path.as_str(), components)),
+            EntryKind::Counts => Some((entry.path.as_str(), 0)),
+            EntryKind::Real | EntryKind::Count | EntryKind::Section => None,
+        });
+        old.chain(new).collect()
+    }
 }
 
 /// Output written before a checkpoint; an attempt that goes on from it continues there.
@@ -61,17 +83,9 @@ pub struct Counters {
     pub series_bytes: u64,
     /// CPU seconds by phase so far.
     pub phases: BTreeMap<String, f64>,
-}
-
-/// One array of the state.
-#[derive(Debug, Clone, Serialize, Deserialize, PartialEq)]
-pub struct ArrayMeta {
-    /// Name.
-    pub name: String,
-    /// Numbers per entry; 0 marks whole numbers.
-    pub components: usize,
-    /// Digest of its bytes.
-    pub sha256: String,
+    /// Findings so far.
+    #[serde(default)]
+    pub findings: Vec<Finding>,
 }
 
 /// Why a checkpoint could not be written or was refused.
@@ -80,9 +94,9 @@ pub enum CheckpointError {
     /// The state holds a value that is no number.
     #[error("{array} is not finite at entry {entry}")]
     NonFinite {
-        /// Which array.
+        /// Path of the array.
         array: String,
-        /// Which entry.
+        /// Index of the item.
         entry: usize,
     },
     /// Less space than the file needs.
@@ -100,7 +114,7 @@ pub enum CheckpointError {
         what: String,
     },
     /// Written by another version of the layout.
-    #[error("the format is {got}, this program reads {FORMAT}")]
+    #[error("the format is {got}, this program reads formats 1 to {FORMAT}")]
     Format {
         /// Its version.
         got: u32,
@@ -124,17 +138,15 @@ pub enum CheckpointError {
 ///
 /// # Errors
 /// [`CheckpointError`]; no file of the final name exists then.
-pub fn write_verified(path: &Path, mut meta: Meta, state: &State) -> Result<(String, u64), CheckpointError> {
+pub fn write_verified(path: &Path, mut meta: Meta, state: &Section) -> Result<(String, u64), CheckpointError> {
     check_finite(state)?;
-    let payload: usize = state.reals.iter().map(|a| a.values.len()).sum::<usize>()
-        + state.counts.iter().map(|a| a.values.len()).sum::<usize>();
-    let needed = payload as u64 * 8 + (1 << 20);
+    let needed = state.numbers() as u64 * 8 + (1 << 20);
     if let Some(free) = free_space(path.parent().unwrap_or(Path::new(".")))
         && free < needed
     {
         return Err(CheckpointError::NoSpace { needed, free });
     }
-    meta.arrays = arrays_of(state);
+    meta.entries = layout::entries_of(state);
     let beside = artifacts::unfinished(path);
     pass("checkpoint/begin");
     let written = write_file(&beside, &meta, state)
@@ -159,52 +171,68 @@ pub fn write_verified(path: &Path, mut meta: Meta, state: &State) -> Result<(Str
 }
 
 /// Reads and verifies a checkpoint; the digest of the whole file too, where it is known. Without libhdf5, which can hang
-/// or divide by zero over a damaged file.
+/// or divide by zero over a damaged file. The state of a file of format 1 needs [`state_for`] before it is loaded.
 ///
 /// # Errors
 /// [`CheckpointError`].
-pub fn read(path: &Path, sha256: Option<&str>) -> Result<(Meta, State), CheckpointError> {
+pub fn read(path: &Path, sha256: Option<&str>) -> Result<(Meta, Section), CheckpointError> {
     if let Some(expected) = sha256
         && digest::of_file(path)?.0 != expected
     {
         return Err(CheckpointError::Damaged { what: "the file".to_owned() });
     }
     let file = std::fs::File::open(path)?;
-    let structure = structure::read(&file)?;
-    let bytes_of = |place: &str, element_bytes: u64| {
-        let data_set = structure
-            .data_sets
-            .get(place)
-            .filter(|found| found.element_bytes == element_bytes)
-            .ok_or_else(|| CheckpointError::Damaged { what: place.to_owned() })?;
-        structure::contents(&file, place, data_set).map_err(CheckpointError::from)
-    };
-    let text = bytes_of("/meta", 1)?;
-    let expected = bytes_of("/meta_sha256", 1)?;
+    let contents = Contents { structure: structure::read(&file)?, file };
+    let text = contents.bytes("/meta", 1)?;
+    let expected = contents.bytes("/meta_sha256", 1)?;
     if digest::of_bytes(&text).as_bytes() != expected {
         return Err(CheckpointError::Damaged { what: "meta".to_owned() });
     }
     let meta: Meta = serde_json::from_slice(&text)?;
-    if meta.format != FORMAT {
-        return Err(CheckpointError::Format { got: meta.format });
-    }
-    let mut state = State { step: meta.step, time: meta.time, ..State::default() };
-    for array in &meta.arrays {
-        let bytes = bytes_of(&format!("/state/{}", array.name), 8)?;
-        if digest::of_bytes(&bytes) != array.sha256 {
-            return Err(CheckpointError::Damaged { what: array.name.clone() });
-        }
-        let words = bytes.as_chunks::<8>().0.iter();
-        let name = array.name.clone();
-        if array.components == 0 {
-            state.counts.push(CountArray { name, values: words.map(|word| u64::from_le_bytes(*word)).collect() });
-        } else {
-            let values = words.map(|word| f64::from_le_bytes(*word)).collect();
-            state.reals.push(RealArray { name, components: array.components, values });
-        }
-    }
+    let state = match meta.format {
+        1 => format_1::read(&contents, &meta)?,
+        FORMAT => layout::read(&contents, &meta.entries)?,
+        got => return Err(CheckpointError::Format { got }),
+    };
     check_finite(&state)?;
     Ok((meta, state))
+}
+
+/// The state that a checkpoint holds for a simulation: as it was read, or translated from format 1.
+///
+/// # Errors
+/// [`LoadError`] where the arrays of format 1 are not those of the simulation.
+pub fn state_for(simulation: &dyn Simulation, meta: &Meta, state: Section) -> Result<Section, LoadError> {
+    if meta.format == 1 { simulation.translate_format_1(&state) } else { Ok(state) }
+}
+
+/// An open file and its structure.
+pub(crate) struct Contents {
+    file: std::fs::File,
+    structure: Structure,
+}
+
+impl Contents {
+    /// The bytes of a data set whose elements have a size.
+    fn bytes(&self, place: &str, element_bytes: u64) -> Result<Vec<u8>, CheckpointError> {
+        let found = self.structure.data_sets.get(place).filter(|found| found.element_bytes == element_bytes);
+        let data_set = found.ok_or_else(|| CheckpointError::Damaged { what: place.to_owned() })?;
+        Ok(structure::contents(&self.file, place, data_set)?)
+    }
+
+    /// The bytes of a data set of the state, which must have a digest.
+    fn verified(&self, path: &str, sha256: &str) -> Result<Vec<u8>, CheckpointError> {
+        let bytes = self.bytes(&format!("/state/{path}"), 8)?;
+        if digest::of_bytes(&bytes) != sha256 {
+            return Err(CheckpointError::Damaged { what: path.to_owned() });
+        }
+        Ok(bytes)
+    }
+
+    /// Whether there is a group of the state.
+    fn has_group(&self, path: &str) -> bool {
+        self.structure.groups.contains(&format!("/state/{path}"))
+    }
 }
 
 /// Whether a checkpoint's body and another describe runs of the same physics: equal but for restart-safe fields.
@@ -237,46 +265,21 @@ pub fn meta(job: &str, body: &Value, step: u64, time: f64, counters: Counters) -
         step,
         time,
         counters,
+        entries: Vec::new(),
         arrays: Vec::new(),
     }
 }
 
-fn check_finite(state: &State) -> Result<(), CheckpointError> {
-    for array in &state.reals {
-        if let Some(entry) = array.values.iter().position(|v| !v.is_finite()) {
-            return Err(CheckpointError::NonFinite {
-                array: array.name.clone(),
-                entry: entry / array.components.max(1),
-            });
-        }
+fn check_finite(state: &Section) -> Result<(), CheckpointError> {
+    match state.find_non_finite() {
+        Some((array, entry)) => Err(CheckpointError::NonFinite { array, entry }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
-fn arrays_of(state: &State) -> Vec<ArrayMeta> {
-    let reals = state.reals.iter().map(|a| ArrayMeta {
-        name: a.name.clone(),
-        components: a.components,
-        sha256: digest::of_bytes(&real_bytes(&a.values)),
-    });
-    let counts = state.counts.iter().map(|a| ArrayMeta {
-        name: a.name.clone(),
-        components: 0,
-        sha256: digest::of_bytes(&count_bytes(&a.values)),
-    });
-    reals.chain(counts).collect()
-}
-
-fn write_file(path: &Path, meta: &Meta, state: &State) -> Result<(), CheckpointError> {
+fn write_file(path: &Path, meta: &Meta, state: &Section) -> Result<(), CheckpointError> {
     let file = hdf5::File::create(path)?;
-    let group = file.create_group("state")?;
-    for array in &state.reals {
-        write(&group, &array.name, array.components, &array.values)?;
-        pass("checkpoint/array");
-    }
-    for array in &state.counts {
-        write(&group, &array.name, 1, &array.values)?;
-    }
+    layout::write_section(&file.create_group("state")?, state)?;
     let text = serde_json::to_vec(meta)?;
     write(&file, "meta", 1, &text)?;
     write(&file, "meta_sha256", 1, digest::of_bytes(&text).as_bytes())?;
@@ -286,71 +289,4 @@ fn write_file(path: &Path, meta: &Meta, state: &State) -> Result<(), CheckpointE
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{CheckpointError, Counters, is_same_scene, meta, read, write_verified};
-    use meniscus::simulation::State;
-    use serde_json::json;
-
-    fn state() -> State {
-        let mut state = State { step: 7, time: 0.7, ..State::default() };
-        state.push_reals("phi", &[1.0, -2.5, f64::MIN_POSITIVE / 3.0]);
-        state.push_counts("rescues", vec![3, u64::MAX]);
-        state.push_reals("errors", &[]);
-        state
-    }
-
-    #[test]
-    fn what_is_read_is_what_was_written() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("7.h5");
-        let (sha256, size) =
-            write_verified(&path, meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap();
-        assert_eq!(std::fs::metadata(&path).unwrap().len(), size);
-        let (meta, restored) = read(&path, Some(&sha256)).unwrap();
-        assert_eq!(restored, state());
-        assert_eq!(meta.job, "job");
-        // Two writes give the same bytes: no times inside.
-        let again = directory.path().join("again.h5");
-        assert_eq!(
-            write_verified(&again, super::meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap().0,
-            sha256
-        );
-    }
-
-    #[test]
-    fn every_flipped_bit_of_the_content_is_refused_or_harmless() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("7.h5");
-        let (sha256, _) =
-            write_verified(&path, meta("job", &json!({}), 7, 0.7, Counters::default()), &state()).unwrap();
-        let bytes = std::fs::read(&path).unwrap();
-        for k in (0..bytes.len()).step_by(37) {
-            let mut broken = bytes.clone();
-            broken[k] ^= 1 << (k % 8);
-            std::fs::write(&path, &broken).unwrap();
-            assert!(read(&path, Some(&sha256)).is_err());
-            // Without the file's digest, whatever still reads must be the same state.
-            if let Ok((_, restored)) = read(&path, None) {
-                assert_eq!(restored, state(), "byte {k}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_state_that_is_not_finite_never_becomes_a_file() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("7.h5");
-        let mut broken = state();
-        broken.push_reals("psi", &[0.0, f64::NAN]);
-        let error = write_verified(&path, meta("job", &json!({}), 7, 0.7, Counters::default()), &broken).unwrap_err();
-        assert!(matches!(error, CheckpointError::NonFinite { ref array, entry: 1 } if array == "psi"));
-        assert!(std::fs::read_dir(directory.path()).unwrap().next().is_none());
-    }
-
-    #[test]
-    fn scenes_are_the_same_but_for_what_a_restart_may_change() {
-        let body = |end: f64, h: f64| json!({"scene": {"kind": "vortex", "end_time": end, "spacing": h}});
-        assert!(is_same_scene(&body(8.0, 0.1), &body(9.0, 0.1)));
-        assert!(!is_same_scene(&body(8.0, 0.1), &body(8.0, 0.2)));
-    }
-}
+mod tests;

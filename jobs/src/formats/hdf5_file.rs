@@ -25,6 +25,15 @@ pub fn write<T: H5Type>(group: &Group, name: &str, components: usize, values: &[
     Ok(dataset)
 }
 
+/// Writes a number as a data set of one element, in one piece, or none as a data set without elements.
+///
+/// # Errors
+/// Whatever libhdf5 reports.
+pub fn write_number<T: H5Type>(group: &Group, name: &str, value: Option<T>) -> hdf5::Result<()> {
+    let dataset = group.new_dataset::<T>().shape(usize::from(value.is_some())).create(name)?;
+    value.map_or(Ok(()), |value| dataset.write_raw(&[value]))
+}
+
 /// The bytes of numbers as they stand in the file, for digests (this program runs on little-endian machines only).
 #[must_use]
 pub fn real_bytes(values: &[f64]) -> Vec<u8> {

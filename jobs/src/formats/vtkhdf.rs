@@ -9,11 +9,12 @@ use meniscus::scene::Cloud;
 use meniscus::simulation::{FieldValues, Fields};
 use std::path::Path;
 
-/// Writes the chosen fields of one moment; the file is closed when this returns.
+/// Writes the fields of one state; the file is closed when this returns. Where findings are about points, the field `finding`
+/// has a bit for each of them, and `FieldData/finding.CODE` says which.
 ///
 /// # Errors
 /// Errors of libhdf5.
-pub fn write_frame(path: &Path, fields: &Fields, chosen: &[String], time: f64, step: u64) -> hdf5::Result<()> {
+pub fn write_frame(path: &Path, fields: &Fields, time: f64, step: u64) -> hdf5::Result<()> {
     let file = File::create(path)?;
     let root = file.create_group("VTKHDF")?;
     root.new_attr::<i64>().shape(2).create("Version")?.write_raw(&[2_i64, 0])?;
@@ -28,7 +29,7 @@ pub fn write_frame(path: &Path, fields: &Fields, chosen: &[String], time: f64, s
         topology(&root, name, &[0], &[])?;
     }
     let data = root.create_group("PointData")?;
-    for field in fields.columns.iter().filter(|field| chosen.iter().any(|name| name == field.name)) {
+    for field in &fields.columns {
         match &field.values {
             FieldValues::Scalar(values) => write(&data, field.name, 1, values)?,
             FieldValues::Vector(values) => write(&data, field.name, 3, values.as_flattened())?,
@@ -38,8 +39,19 @@ pub fn write_frame(path: &Path, fields: &Fields, chosen: &[String], time: f64, s
     let moment = root.create_group("FieldData")?;
     write(&moment, "Time", 1, &[time])?;
     write(&moment, "Step", 1, &[step as i64])?;
+    if !fields.marks.is_empty() {
+        let mut bits = vec![0_i64; count];
+        for (k, mark) in fields.marks.iter().enumerate().take(MOST_MARKS) {
+            mark.points.iter().filter(|point| **point < count).for_each(|point| bits[*point] |= 1 << k);
+            write(&moment, &format!("finding.{}", mark.code), 1, &[1_i64 << k])?;
+        }
+        write(&data, "finding", 1, &bits)?;
+    }
     file.close()
 }
+
+/// Findings that can be told apart in a frame.
+const MOST_MARKS: usize = 62;
 
 fn topology(root: &Group, name: &str, offsets: &[i64], connectivity: &[i64]) -> hdf5::Result<()> {
     let group = root.create_group(name)?;

@@ -157,7 +157,7 @@ fn of_checkpoint(file: &File, path: &Path) -> Result<Contents, String> {
         }
     }
     sandbox::shut_the_door(file).map_err(|error| error.to_string())?;
-    let (meta, state) = checkpoint::read(path, None).map_err(|error| error.to_string())?;
+    let (meta, _) = checkpoint::read(path, None).map_err(|error| error.to_string())?;
     let none_of_this_build = |error| format!("its body is none of this build: {error}");
     let scene = resolved_scene(&meta.body).map_err(none_of_this_build)?;
     let scene = scene::parse(&scene, SCENES).map_err(|found| {
@@ -168,13 +168,13 @@ fn of_checkpoint(file: &File, path: &Path) -> Result<Contents, String> {
     if !scene.clouds().is_empty() {
         return Err("its scene takes points from elsewhere, which are not part of the checkpoint".to_owned());
     }
-    let arrays = meta.arrays.iter();
-    let arrays = arrays.map(|array| ArrayContents { name: array.name.clone(), components: array.components });
+    let arrays = meta.list().into_iter();
+    let arrays = arrays.map(|(name, components)| ArrayContents { name: name.to_owned(), components }).collect();
     Ok(Contents::Checkpoint(CheckpointContents {
-        arrays: arrays.collect(),
+        arrays,
         body: meta.body,
-        step: state.step,
-        time: state.time,
+        step: meta.step,
+        time: meta.time,
         isa: meta.isa,
         build: meta.build,
         job: meta.job,

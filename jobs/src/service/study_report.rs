@@ -35,8 +35,8 @@ fn measure(study: &StudyRow, points: &[PointRow]) -> Measured {
         let label = if others.is_empty() { "all points".to_owned() } else { others.join(", ") };
         let spacing = point.spacing.unwrap_or(f64::NAN);
         for (name, value) in point.errors.iter().flatten() {
-            if let Some(error) = value.as_f64() {
-                let run = Run { spacing, cpu_s: point.spent[0], index: point.index, error };
+            if value.is_finite() {
+                let run = Run { spacing, cpu_s: point.spent[0], index: point.index, error: *value };
                 measured.entry(name.clone()).or_default().entry(label.clone()).or_default().push(run);
             }
         }

@@ -1,9 +1,10 @@
 //! The live table of a study: a row a point, columns `index`, one an axis, `job`, `state`, `reason`, `cpu_s`, `wall_s`,
-//! `particles`, `steps`, then `error.QUANTITY.NORM` (at the latest time it was taken).
+//! `particles`, `steps`, `health`, then `error.QUANTITY.NORM` (at the latest time it was taken).
 
 use crate::service::store::PointRow;
-use serde_json::{Map, Value, json};
-use std::collections::BTreeSet;
+use crate::spec::health::HealthStatus;
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// A table.
@@ -19,10 +20,10 @@ pub struct Table {
 #[must_use]
 pub fn compose(axes: &[String], points: &[PointRow]) -> Table {
     let kinds: BTreeSet<&String> =
-        points.iter().filter_map(|point| point.errors.as_ref()).flat_map(Map::keys).collect();
+        points.iter().filter_map(|point| point.errors.as_ref()).flat_map(BTreeMap::keys).collect();
     let mut columns = vec!["index".to_owned()];
     columns.extend(axes.iter().cloned());
-    columns.extend(["job", "state", "reason", "cpu_s", "wall_s", "particles", "steps"].map(str::to_owned));
+    columns.extend(["job", "state", "reason", "cpu_s", "wall_s", "particles", "steps", "health"].map(str::to_owned));
     columns.extend(kinds.iter().map(|kind| format!("error.{kind}")));
     let rows = points.iter().map(|point| {
         let mut row = vec![json!(point.index)];
@@ -35,11 +36,9 @@ pub fn compose(axes: &[String], points: &[PointRow]) -> Table {
             json!(point.spent[1]),
             json!(point.particles),
             json!(point.steps),
+            json!(point.health.map(HealthStatus::word)),
         ]);
-        row.extend(kinds.iter().map(|kind| {
-            let error = point.errors.as_ref().and_then(|errors| errors.get(*kind));
-            error.cloned().unwrap_or(Value::Null)
-        }));
+        row.extend(kinds.iter().map(|kind| json!(point.errors.as_ref().and_then(|errors| errors.get(*kind)))));
         row
     });
     Table { rows: rows.collect(), columns }

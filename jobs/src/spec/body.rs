@@ -221,7 +221,8 @@ fn planned_scene<S: Sources>(
 
 /// The fields of frames: those given, else all of the scene.
 fn field_names(given: Given, scene: Option<&dyn Scene>, errors: &mut Vec<Violation>) -> Vec<String> {
-    let known = scene.map(Scene::field_names).unwrap_or_default();
+    let known: Vec<&str> =
+        scene.map(|scene| scene.fields().iter().map(|field| field.name).collect()).unwrap_or_default();
     let Some(list) = given.read_inside(JobSpec::output(), OutputSpec::fields()).flatten() else {
         return known.iter().map(|name| (*name).to_owned()).collect();
     };

@@ -1,11 +1,11 @@
 //! What a run will take, before it is made: particles, steps, memory, disk, and time by what was measured before.
 
 use crate::spec::calibration::{Calibration, Measured, PhaseMeasured, TimeForecast, wall_phase};
+use crate::spec::report::Cost;
 use crate::spec::run_options::RunOptions;
 use meniscus::scene::{Estimate, PhaseWork};
 use meniscus::scenes::work_estimate;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Memory of a worker before it holds any particle.
@@ -97,19 +97,18 @@ pub struct ForecastRecord {
 
 /// What a finished run tells of the machine: its work as forecast, and the phases of its report.
 #[must_use]
-pub fn measured(forecast: &ForecastRecord, cost: &Value, threads: u64) -> Vec<PhaseMeasured> {
+pub fn measured(forecast: &ForecastRecord, cost: &Cost, threads: u64) -> Vec<PhaseMeasured> {
     let family = &forecast.family;
-    let booked = cost["phases"].as_object();
-    let seconds = |phase: &str| booked.and_then(|b| b.get(phase)).and_then(Value::as_f64).unwrap_or(0.0);
-    let cpu_s = cost["cpu_s"].as_f64().unwrap_or(0.0);
-    let rest = cpu_s - booked.into_iter().flatten().filter_map(|(_, v)| v.as_f64()).sum::<f64>();
+    let seconds = |phase: &str| cost.phases.get(phase).copied().unwrap_or(0.0);
+    let cpu_s = cost.cpu_s;
+    let rest = cpu_s - cost.phases.values().sum::<f64>();
     let phase = |(phase, work): (&String, &f64)| {
         let seconds = if phase == work_estimate::REST { rest.max(0.0) } else { seconds(phase) };
         PhaseMeasured { family: family.clone(), phase: phase.clone(), measured: Measured { work: *work, seconds } }
     };
     let mut found: Vec<PhaseMeasured> = forecast.work.iter().filter(|(_, units)| **units > 0.0).map(phase).collect();
-    if let Some(wall_s) = cost["wall_s"].as_f64().filter(|_| cpu_s > 0.0) {
-        let measured = Measured { work: cpu_s, seconds: wall_s };
+    if cpu_s > 0.0 {
+        let measured = Measured { work: cpu_s, seconds: cost.wall_s };
         found.push(PhaseMeasured { family: family.clone(), phase: wall_phase(threads), measured });
     }
     found

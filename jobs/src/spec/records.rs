@@ -1,10 +1,13 @@
 //! Records: what a worker tells the service, one JSON line each, appended to `records.jsonl` of its attempt and
 //! stamped with the attempt's epoch. A line counts only when it is whole and its epoch is the job's.
 
+use super::health::HealthRecord;
 use crate::spec::attempt_files;
 use crate::system::digest;
+use meniscus::simulation::Finding;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -48,15 +51,8 @@ pub enum Record {
         /// A sentence.
         message: String,
     },
-    /// Physics to know.
-    Finding {
-        /// A short word.
-        name: String,
-        /// A sentence.
-        message: String,
-        /// Scene time.
-        time: f64,
-    },
+    /// Something that the run noticed.
+    Finding(Finding),
     /// The last word of the worker.
     Verdict(Verdict),
 }
@@ -82,29 +78,10 @@ pub struct Progress {
     pub eta_s: Option<f64>,
     /// What the estimate rests on.
     pub eta_basis: Option<String>,
-    /// Soundness.
+    /// Health, its findings left out.
     pub health: HealthRecord,
     /// Cost of the job so far, over all attempts.
     pub usage: Usage,
-}
-
-/// Soundness of a run.
-#[derive(Debug, Clone, Serialize, Deserialize, PartialEq)]
-pub struct HealthRecord {
-    /// All numbers are finite.
-    pub finite: bool,
-    /// Longest way of a particle in a step, in spacings.
-    pub max_cfl: f64,
-    /// Relative change of the enclosed measure.
-    pub volume_drift: Option<f64>,
-    /// Rescued fits and queries.
-    pub rescued_fits: u64,
-}
-
-impl Default for HealthRecord {
-    fn default() -> Self {
-        Self { finite: true, max_cfl: 0.0, volume_drift: None, rescued_fits: 0 }
-    }
 }
 
 /// Cost of a job.
@@ -190,6 +167,18 @@ pub enum Verdict {
         /// With numbers and places.
         message: String,
     },
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Succeeded => formatter.write_str("succeeded"),
+            Self::Paused { reason: None } => formatter.write_str("paused on request"),
+            Self::Paused { reason: Some(reason) } => write!(formatter, "paused ({})", reason.word()),
+            Self::Canceled => formatter.write_str("canceled"),
+            Self::Failed { reason, message } => write!(formatter, "failed ({}): {message}", reason.word()),
+        }
+    }
 }
 
 /// Where a worker's records go.

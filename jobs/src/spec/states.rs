@@ -1,5 +1,6 @@
 //! The states of a job and the one table of transitions between them.
 
+use meniscus::simulation::{Divergence, StepError};
 use serde::{Deserialize, Serialize};
 
 macro_rules! words {
@@ -115,16 +116,32 @@ words! {
         DivergedInterface => "diverged.interface",
         /// A system of equations was not solved, or a tolerance not kept.
         DivergedUnsolved => "diverged.unsolved",
+        /// Energy was made.
+        DivergedEnergy => "diverged.energy",
+        /// Momentum was made.
+        DivergedMomentum => "diverged.momentum",
+        /// Particles crowded.
+        DivergedCrowded => "diverged.crowded",
+        /// Area or volume of a phase was lost.
+        DivergedPhaseLost => "diverged.phase_lost",
+        /// Something is finer than the particles resolve.
+        DivergedUnresolved => "diverged.unresolved",
+        /// Particles left the region that the method knows.
+        DivergedEscaped => "diverged.escaped",
         /// The worker died.
         WorkerCrash => "worker.crash",
         /// The worker gave no sign of life.
         WorkerStalled => "worker.stalled",
+        /// A cluster took the node back.
+        WorkerEvicted => "worker.evicted",
         /// The service restarted.
         ServerRestart => "server.restart",
         /// No checkpoint to go on from could be read.
         CheckpointNoneValid => "checkpoint.none_valid",
         /// The checkpoint belongs to another scene.
         CheckpointIncompatible => "checkpoint.incompatible",
+        /// A job that this one waits for did not succeed.
+        DependencyFailed => "dependency.failed",
         /// An input file is damaged.
         InputDamaged => "input.damaged",
         /// A bug in the program.
@@ -177,6 +194,35 @@ impl State {
     }
 }
 
+impl From<Divergence> for Reason {
+    fn from(divergence: Divergence) -> Self {
+        match divergence {
+            Divergence::Energy => Self::DivergedEnergy,
+            Divergence::Momentum => Self::DivergedMomentum,
+            Divergence::Crowded => Self::DivergedCrowded,
+            Divergence::PhaseLost => Self::DivergedPhaseLost,
+            Divergence::Unresolved => Self::DivergedUnresolved,
+            Divergence::Unsolved => Self::DivergedUnsolved,
+            Divergence::Escaped => Self::DivergedEscaped,
+        }
+    }
+}
+
+impl From<&StepError> for Reason {
+    /// The reason of a run that a step ended; an interrupted step is canceled and has none.
+    fn from(error: &StepError) -> Self {
+        match error {
+            StepError::CheckFailed { divergence, .. } => (*divergence).into(),
+            StepError::InterfaceLost { .. } => Self::DivergedInterface,
+            StepError::TooFast { .. } => Self::DivergedCfl,
+            StepError::TimeStepFloor { .. } => Self::DivergedDtFloor,
+            StepError::Unsolved { .. } => Self::DivergedUnsolved,
+            StepError::NonFinite { .. } => Self::DivergedNonfinite,
+            StepError::Interrupted => Self::UserCancel,
+        }
+    }
+}
+
 impl Reason {
     /// What a user can do about it.
     #[must_use]
@@ -210,6 +256,26 @@ impl Reason {
                 "equations were not solved as the scene asks; the message says what was left: points that lie more evenly, another solver, \
                  more iterations or a looser tolerance may do"
             }
+            Self::DivergedEnergy => {
+                "the run made energy out of nothing; the message has the numbers: a smaller time step or spacing may do"
+            }
+            Self::DivergedMomentum => {
+                "the run made momentum out of nothing; the message has the numbers: a smaller time step or spacing may do"
+            }
+            Self::DivergedCrowded => {
+                "particles crowded; the message has the numbers: shifting, a higher speed of sound or a finer spacing may do"
+            }
+            Self::DivergedPhaseLost => {
+                "area or volume of a phase was lost; the message has the numbers: a smaller spacing may do"
+            }
+            Self::DivergedUnresolved => {
+                "something became finer than the particles resolve; the message has the numbers: use a smaller spacing"
+            }
+            Self::DivergedEscaped => {
+                "particles left the region that the method knows; the message names it: a larger domain or a smaller time step may do"
+            }
+            Self::WorkerEvicted => "the cluster took the node back; the job goes on from its last checkpoint",
+            Self::DependencyFailed => "a job of `after` did not succeed; submit the body again once it has",
             Self::WorkerCrash => "the worker died; its log may say why",
             Self::WorkerStalled => "the worker gave no sign of life and was ended",
             Self::ServerRestart => "the service stopped while the job ran; it goes on from the last checkpoint",
@@ -223,7 +289,16 @@ impl Reason {
 
 #[cfg(test)]
 mod tests {
-    use super::{State, TRANSITIONS, Trigger};
+    use super::{Reason, State, TRANSITIONS, Trigger};
+    use meniscus::simulation::{Divergence, StepError};
+
+    #[test]
+    fn a_check_that_no_longer_holds_has_its_reason_and_numbers() {
+        let (check, divergence, step, time) = ("kinetic_energy", Divergence::Energy, 7, 0.5);
+        let error = StepError::CheckFailed { check, divergence, value: 2.0, limit: 1.5, step, time };
+        assert_eq!(Reason::from(&error).word(), "diverged.energy");
+        assert_eq!(error.to_string(), "kinetic_energy is 2.0000e0, its limit is 1.5000e0, at step 7, time 0.5");
+    }
 
     #[test]
     fn terminal_states_are_never_left_and_every_state_is_reached() {

@@ -2,6 +2,7 @@
 
 use super::case::{Bound, Case, Target, job_body};
 use super::measure;
+use crate::spec::report::RunReport;
 use serde_json::Value;
 use std::fmt::{Display, Formatter};
 
@@ -32,7 +33,7 @@ impl Outcome {
         name: &str,
         case: &Case,
         target: &Target,
-        mut report: impl FnMut(&str, &Value) -> Result<Value, String>,
+        mut report: impl FnMut(&str, &Value) -> Result<RunReport, String>,
     ) -> Self {
         let (mut bodies, mut reports, mut failure) = (Vec::new(), Vec::new(), None);
         for (run, written) in case.runs_of(target) {
@@ -44,7 +45,7 @@ impl Outcome {
             bodies.push(body);
         }
         let scenes: Vec<&Value> = bodies.iter().map(|body| &body["scene"]).collect();
-        let found: Vec<&Value> = reports.iter().collect();
+        let found: Vec<&RunReport> = reports.iter().collect();
         let value = if failure.is_none() { measure::evaluate(&target.measure, &scenes, &found) } else { f64::NAN };
         Self {
             case: name.to_owned(),
@@ -52,7 +53,7 @@ impl Outcome {
             paper: target.paper.clone(),
             bound: target.bound,
             value,
-            cpu_s: reports.iter().filter_map(|report| report["cost"]["cpu_s"].as_f64()).sum(),
+            cpu_s: reports.iter().map(|report| report.cost.cpu_s).sum(),
             is_met: target.bound.is_met(value),
             failure,
         }

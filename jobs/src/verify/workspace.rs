@@ -1,5 +1,7 @@
 //! Where the runs of a verification are kept. Runs of this build that are already there are not repeated.
 
+use crate::spec::attempt_files;
+use crate::spec::report::RunReport;
 use crate::system::build;
 use crate::system::digest;
 use crate::worker::local_run::{self, Keep};
@@ -21,7 +23,7 @@ impl Workspace {
     }
 
     /// The report of a job body: of its earlier run with this build, or of one made now.
-    pub(super) fn report(&self, body: &Value) -> Result<Value, String> {
+    pub(super) fn report(&self, body: &Value) -> Result<RunReport, String> {
         let directory = self.run(body, Keep::Report)?;
         read_report(&directory).ok_or_else(|| "the run left no report".to_owned())
     }
@@ -37,6 +39,6 @@ impl Workspace {
     }
 }
 
-fn read_report(directory: &Path) -> Option<Value> {
-    serde_json::from_slice(&fs::read(directory.join("report.json")).ok()?).ok()
+fn read_report(directory: &Path) -> Option<RunReport> {
+    serde_json::from_slice(&fs::read(directory.join(attempt_files::REPORT)).ok()?).ok()
 }

@@ -5,12 +5,14 @@ use crate::formats::{frame_view, picture};
 use crate::spec::attempt_files;
 use crate::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
 use crate::spec::body::ResolvedBody;
+use crate::spec::health::FindingLog;
 use crate::spec::records::{FileRecord, Record, RecordSink, Verdict};
 use crate::spec::run_options::RunOptions;
 use crate::spec::states::Reason;
 use crate::system::process;
 use crate::system::{artifacts, digest};
 use crate::worker::inputs;
+use crate::worker::log::Log;
 use crate::worker::observers::checkpoints::Checkpoints;
 use crate::worker::observers::frames::Frames;
 use crate::worker::observers::progress::ProgressMeter;
@@ -20,23 +22,21 @@ use crate::worker::report;
 use meniscus::scene::{self, BuildContext, Scene};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
-use meniscus::simulation::{CpuClock, RunError, Simulation, State, StepError, run};
+use meniscus::simulation::{CpuClock, LoadError, RunError, Section, Simulation, StepError, run};
 use serde::Deserialize;
-use std::fs::OpenOptions;
-use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Runs one attempt to its verdict, which is also its last record. Panics become a verdict.
 pub fn run_attempt(spec: &AttemptSpec, directory: &Path, control: &Control, sink: &mut dyn RecordSink) -> Verdict {
-    let log = Log { path: directory.join(attempt_files::LOG) };
+    let log = Log::new(directory);
     let outcome = catch_unwind(AssertUnwindSafe(|| attempt(spec, directory, control, sink, &log)));
     let verdict = match outcome {
         Ok(Ok(verdict)) => verdict,
         Ok(Err(failure)) => without_places(failure.verdict(directory), spec, directory),
         Err(_) => Verdict::Failed { reason: Reason::Internal, message: "the worker panicked".to_owned() },
     };
-    log.line(&format!("{verdict:?}"));
+    log.line(&verdict.to_string());
     // Without a verdict the service treats the worker as lost, which is the truth then.
     let _ = sink.put(&Record::Verdict(verdict.clone()), true);
     verdict
@@ -77,16 +77,7 @@ impl Failure {
         match self {
             Self::Canceled | Self::Run(RunError::Step(StepError::Interrupted)) => Verdict::Canceled,
             Self::Known(reason, message) => Verdict::Failed { reason, message },
-            Self::Run(RunError::Step(error)) => {
-                let reason = match error {
-                    StepError::InterfaceLost { .. } => Reason::DivergedInterface,
-                    StepError::TooFast { .. } => Reason::DivergedCfl,
-                    StepError::TimeStepFloor { .. } => Reason::DivergedDtFloor,
-                    StepError::Unsolved { .. } => Reason::DivergedUnsolved,
-                    _ => Reason::DivergedNonfinite,
-                };
-                Verdict::Failed { reason, message: error.to_string() }
-            }
+            Self::Run(RunError::Step(error)) => Verdict::Failed { reason: (&error).into(), message: error.to_string() },
             Self::Run(RunError::Observer(error)) | Self::Other(error) => storage_verdict(error.as_ref(), directory),
         }
     }
@@ -126,7 +117,7 @@ fn attempt(
         let mut simulation = build(spec, scene.as_ref(), &options, control)?;
         let start = restore(spec, simulation.as_mut(), sink, log)?;
         progress.continue_phases(start.counters.phases.clone());
-        let mut observers = prepare(spec, directory, &options, control, sink, &start, progress)?;
+        let mut observers = prepare(spec, directory, &options, control, sink, &start, (progress, log))?;
         let step = simulation.clock().step;
         observers.sink.put(
             &Record::Started {
@@ -137,9 +128,15 @@ fn attempt(
             },
             true,
         )?;
+        if !start.is_own {
+            for finding in &start.counters.findings {
+                observers.sink.put(&Record::Finding(finding.clone()), false)?;
+            }
+        }
         log.line(&format!("start at step {step}, {} particles", simulation.particle_count()));
         let ending = run(simulation.as_mut(), &mut observers).map_err(Failure::Run)?;
-        log.line(&format!("{ending:?} at step {}", simulation.clock().step));
+        let word = if ending == Ending::Finished { "finished" } else { "stopped" };
+        log.line(&format!("{word} at step {}", simulation.clock().step));
         match ending {
             Ending::Stopped if control.interrupt().is_raised() => Ok(Verdict::Canceled),
             Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),
@@ -195,16 +192,18 @@ fn restore(
 ) -> Result<Start, Failure> {
     for candidate in &spec.checkpoints {
         match open_start(spec, candidate) {
-            Ok((meta, state)) => match simulation.restore(&state) {
+            Ok((meta, state)) => match load(simulation, &meta, state) {
                 Ok(()) => {
                     log.line(&format!("restored {} at step {}", candidate.id, meta.step));
                     let mut counters = meta.counters;
                     if !candidate.is_own {
                         // Frame numbers go on; files, series and costs are those of another job.
                         let before = counters.frames_before + counters.frames.len() as u64;
-                        counters = Counters { frames_before: before, ..Counters::default() };
+                        // What was noticed there holds for what is built on it.
+                        let findings = counters.findings;
+                        counters = Counters { frames_before: before, findings, ..Counters::default() };
                     }
-                    return Ok(Start { counters, is_own: candidate.is_own, step: state.step });
+                    return Ok(Start { counters, is_own: candidate.is_own, step: meta.step });
                 }
                 Err(error) => refuse(spec, candidate, &error.to_string(), sink, log)?,
             },
@@ -222,12 +221,17 @@ fn restore(
     Err(Failure::Known(Reason::CheckpointNoneValid, format!("{} checkpoints were tried", spec.checkpoints.len())))
 }
 
+fn load(simulation: &mut dyn Simulation, meta: &Meta, state: Section) -> Result<(), LoadError> {
+    let state = checkpoint::state_for(simulation, meta, state)?;
+    simulation.load(&state)
+}
+
 enum Refusal {
     Damaged(String),
     Incompatible(String),
 }
 
-fn open_start(spec: &AttemptSpec, candidate: &StartCheckpoint) -> Result<(Meta, State), Refusal> {
+fn open_start(spec: &AttemptSpec, candidate: &StartCheckpoint) -> Result<(Meta, Section), Refusal> {
     let (meta, state) = checkpoint::read(&candidate.path, candidate.sha256.as_deref())
         .map_err(|error| Refusal::Damaged(error.to_string()))?;
     if !checkpoint::is_same_scene(&meta.body, &spec.body) {
@@ -265,7 +269,7 @@ fn prepare<'a>(
     control: &'a Control,
     sink: &'a mut dyn RecordSink,
     start: &Start,
-    progress: ProgressMeter,
+    (progress, log): (ProgressMeter, &'a Log),
 ) -> Result<Observers<'a>, Failure> {
     let plan = options.plan();
     let counters = &start.counters;
@@ -293,6 +297,8 @@ fn prepare<'a>(
             options.checkpoint.every_steps,
         ),
         progress,
+        findings: FindingLog::new(counters.findings.clone()),
+        log,
         control,
         sink,
         directory: directory.to_owned(),
@@ -333,10 +339,8 @@ fn finish(
     }
     let phases = observers.progress.phases(simulation);
     let usage = observers.progress.usage();
-    let steps = simulation.clock().step;
-    let particles = simulation.particle_count() as u64;
     let (threads, scene_sha256) = (ended.threads, &ended.scene_sha256);
-    let report = report::compose(&simulation.report(), &usage, &phases, steps, particles, threads, scene_sha256);
+    let report = report::compose(simulation, &observers.findings, &usage, phases, threads, scene_sha256);
     artifacts::write(&directory.join(attempt_files::REPORT), &serde_json::to_vec_pretty(&report)?)?;
     let report = FileRecord::from_file(directory, attempt_files::REPORT, "application/json")?;
     files.push(report.clone());
@@ -382,21 +386,4 @@ fn draw_picture(
             FileRecord::from_file(directory, attempt_files::PICTURE, "image/svg+xml").map_err(|e| e.to_string())
         });
     drawn.map_err(|error| log.line(&hide(&format!("no picture: {error}"), spec, directory))).ok()
-}
-
-/// The attempt's log: whole lines with a time, each written at once.
-struct Log {
-    path: PathBuf,
-}
-
-impl Log {
-    fn line(&self, text: &str) {
-        let line = format!("{} {text}\n", crate::system::clock::now());
-        // A log that cannot be written must not end a run.
-        let _ = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&self.path)
-            .and_then(|mut f| f.write_all(line.as_bytes()));
-    }
 }

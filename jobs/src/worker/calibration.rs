@@ -3,6 +3,7 @@
 use crate::spec::attempt_files;
 use crate::spec::calibration::PhaseMeasured;
 use crate::spec::forecast::measured;
+use crate::spec::report::RunReport;
 use crate::worker::local_run;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -37,8 +38,8 @@ fn measure_run(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<Phas
     let body = local_run::run(&body, directory, threads, local_run::Keep::Report)
         .map_err(|cause| format!("{scene}: {cause}"))?;
     let report = std::fs::read(directory.join(attempt_files::REPORT)).map_err(|error| error.to_string())?;
-    let report: Value = serde_json::from_slice(&report).map_err(|error| error.to_string())?;
-    Ok(measured(&body.forecast.record(), &report["cost"], threads))
+    let report: RunReport = serde_json::from_slice(&report).map_err(|error| error.to_string())?;
+    Ok(measured(&body.forecast.record(), &report.cost, threads))
 }
 
 /// Of every phase of every run the round in the middle; all rounds list the same.

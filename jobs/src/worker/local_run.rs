@@ -59,7 +59,7 @@ pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<J
             Ok(body)
         }
         Verdict::Failed { message, .. } => Err(message),
-        other => Err(format!("ended as {other:?}")),
+        other => Err(format!("the run {other}")),
     }
 }
 

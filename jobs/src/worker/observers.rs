@@ -12,9 +12,11 @@ pub mod series;
 pub use control::Control;
 
 use crate::formats::checkpoint::Counters;
+use crate::spec::health::FindingLog;
 use crate::spec::records::{Record, RecordSink};
 use crate::system::breakpoints::pass;
 use crate::system::process::free_space;
+use crate::worker::log::Log;
 use checkpoints::Checkpoints;
 use frames::Frames;
 use meniscus::simulation::run::ObserverError;
@@ -33,6 +35,10 @@ pub struct Observers<'a> {
     pub checkpoints: Checkpoints,
     /// Progress and cost.
     pub progress: ProgressMeter,
+    /// What was noticed so far.
+    pub findings: FindingLog,
+    /// The attempt's log.
+    pub log: &'a Log,
     /// Requests from outside.
     pub control: &'a Control,
     /// Where records go.
@@ -57,6 +63,7 @@ impl Observers<'_> {
             series_epoch: self.series.epoch(),
             series_bytes: self.series.bytes(),
             phases: self.progress.phases(simulation),
+            findings: self.findings.findings().to_vec(),
         }
     }
 }
@@ -88,7 +95,7 @@ impl Observer for Observers<'_> {
             self.sink.put(&Record::Checkpoint(record), true)?;
             pass("checkpoint/recorded");
         }
-        if let Some(progress) = self.progress.observe(simulation, finished || stopping) {
+        if let Some(progress) = self.progress.observe(simulation, &self.findings, finished || stopping) {
             self.sink.put(&Record::Progress(progress), false)?;
         }
         let stop = stopping || self.control.interrupt().is_raised();
@@ -96,8 +103,8 @@ impl Observer for Observers<'_> {
     }
 
     fn notice(&mut self, finding: &Finding) -> Result<(), ObserverError> {
-        let record =
-            Record::Finding { name: finding.name.to_owned(), message: finding.message.clone(), time: finding.time };
-        Ok(self.sink.put(&record, false)?)
+        self.findings.push(finding.clone());
+        self.log.line(&finding.to_string());
+        Ok(self.sink.put(&Record::Finding(finding.clone()), false)?)
     }
 }

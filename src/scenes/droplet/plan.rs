@@ -17,12 +17,13 @@ use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
+use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, longest_step};
 use crate::schemes::weakly_compressible_sph::{
     BodyForce, DensityMethod, Discretization, Drop, Fluid, Geometry, Integrator, SphParts, SphSystem, TensionForce,
     WeaklyCompressibleSph, measurement_interval,
 };
-use crate::simulation::{OutputPlan, Simulation};
+use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Coordinates, Parameter, Violation};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
@@ -383,20 +384,8 @@ impl<const D: usize> Scene for DropletScene<D> {
         if has_distance { View::DISTANCE } else { View::Nothing }
     }
 
-    fn field_names(&self) -> Vec<&'static str> {
-        let mut names = Vec::new();
-        if self.parts.has_tension() {
-            match self.parts.geometry {
-                Geometry::Pcp { .. } => names.extend(["phi", "closest_point", "normal", "curvature"]),
-                Geometry::ColorField => names.extend(["normal", "curvature"]),
-            }
-        }
-        names.extend(["velocity", "density", "pressure", "phase"]);
-        if !self.parts.has_one_mass() {
-            names.push("mass");
-        }
-        names.push("particle_id");
-        names
+    fn fields(&self) -> Vec<&'static Quantity> {
+        weakly_compressible_sph::quantities::fields(&self.parts)
     }
 
     fn clouds(&self) -> Vec<CloudReference> {

@@ -13,9 +13,10 @@ use crate::scenes::flow_work::{error_units, path_units};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
+use crate::schemes::grid_based_particle;
 use crate::schemes::grid_based_particle::laws::FrontAtStart;
 use crate::schemes::grid_based_particle::{FrontConfig, FrontLaw, FrontSystem, Grid, GridBasedParticles};
-use crate::simulation::{OutputPlan, Simulation};
+use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::Violation;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -162,15 +163,8 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         self.plan.resolved.1.clone()
     }
 
-    fn field_names(&self) -> Vec<&'static str> {
-        let mut names = vec!["normal", "curvature", "velocity", "grid_point", "level", "segment", "particle_id"];
-        if D == 3 {
-            names.push("gauss_curvature");
-        }
-        if self.plan.chosen.segments.parameter.is_some() {
-            names.push("parameter");
-        }
-        names
+    fn fields(&self) -> Vec<&'static Quantity> {
+        grid_based_particle::quantities::fields(D, false, &self.plan.chosen.segments)
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {

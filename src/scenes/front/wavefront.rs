@@ -9,11 +9,12 @@ use crate::scene::{BuildContext, Estimate, Planned, Scene, View};
 use crate::scenes::particle_estimate::check_extent;
 use crate::scenes::shapes::{PlainShape, Shape};
 use crate::scenes::work_estimate;
+use crate::schemes::grid_based_particle;
 use crate::schemes::grid_based_particle::laws::GeometricalOptics;
 use crate::schemes::grid_based_particle::{
     EllipticalWavefront, FrontConfig, FrontLaw, FrontSystem, Grid, GridBasedParticles,
 };
-use crate::simulation::{OutputPlan, Simulation};
+use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Choice, Coordinates, Violation};
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -109,12 +110,8 @@ impl Scene for WavefrontScene {
         self.plan.resolved.1.clone()
     }
 
-    fn field_names(&self) -> Vec<&'static str> {
-        let mut names = vec!["normal", "curvature", "velocity", "grid_point", "level", "segment", "particle_id"];
-        if self.plan.chosen.segments.parameter.is_some() {
-            names.push("parameter");
-        }
-        names
+    fn fields(&self) -> Vec<&'static Quantity> {
+        grid_based_particle::quantities::fields(3, true, &self.plan.chosen.segments)
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {

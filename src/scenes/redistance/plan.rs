@@ -11,10 +11,11 @@ use crate::scenes::particle_estimate::{band_particles, check_extent, memory_byte
 use crate::scenes::pcp_spec::PcpContext;
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
+use crate::schemes::static_redistancing;
 use crate::schemes::static_redistancing::{
     InitialLevel, RemeshingKernel, StaticParts, StaticRedistancing, StaticSystem, grid_method,
 };
-use crate::simulation::{OutputPlan, Simulation};
+use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Choice, Parameter, Violation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -205,8 +206,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         View::DISTANCE
     }
 
-    fn field_names(&self) -> Vec<&'static str> {
-        vec!["phi", "closest_point", "normal", "curvature", "particle_id"]
+    fn fields(&self) -> Vec<&'static Quantity> {
+        static_redistancing::quantities::fields()
     }
 
     fn clouds(&self) -> Vec<CloudReference> {

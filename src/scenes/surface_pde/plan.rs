@@ -19,8 +19,10 @@ use crate::scene::work::PhaseWork;
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::work_estimate;
 use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
+use crate::schemes::surface_equation::quantities::{CURVATURE, NORMAL, VALUE};
 use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method, SurfaceCloud, SurfaceEquation};
-use crate::simulation::{OutputPlan, Simulation};
+use crate::simulation::fields::COMMON_FIELDS;
+use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Choice, Parameter, Violation};
 use crate::time::FixedStep;
 use serde_json::{Value, json};
@@ -433,18 +435,19 @@ impl Scene for SurfaceScene {
     }
 
     fn view(&self) -> View {
-        let has_values = self.problem.field_names(&self.shape).contains(&"value");
+        let has_values = self.problem.fields(&self.shape).iter().any(|field| **field == VALUE);
         let field = View::SurfaceField { field: "value", normal: "normal", is_plane: self.shape.is_curve() };
         if has_values { field } else { View::Nothing }
     }
 
-    fn field_names(&self) -> Vec<&'static str> {
-        let mut names = self.problem.field_names(&self.shape);
-        names.extend(["normal", "particle_id"]);
+    fn fields(&self) -> Vec<&'static Quantity> {
+        let mut fields = self.problem.fields(&self.shape);
+        fields.push(&NORMAL);
+        fields.extend(COMMON_FIELDS);
         if self.points.is_none() {
-            names.push("curvature");
+            fields.push(&CURVATURE);
         }
-        names
+        fields
     }
 
     fn clouds(&self) -> Vec<CloudReference> {

@@ -10,7 +10,7 @@ use crate::point_clouds::normals;
 use crate::scene::BuildContext;
 use crate::scene::cloud::{self, Clouds};
 use crate::schemes::surface_equation::{SurfaceCloud, SurfaceEquation};
-use crate::simulation::{Finding, Simulation};
+use crate::simulation::{Finding, Mark, Simulation};
 use crate::spec::Violation;
 use serde_json::Value;
 
@@ -44,7 +44,10 @@ pub(super) fn build<const D: usize, const M: usize>(
         }
     };
     let flaws = examined.flaws(&mut normals, source, method.support.radius);
-    let finding = |flaw: Flaw| Finding { name: flaw.name(), message: flaw.to_string(), time: 0.0 };
+    let finding = |flaw: &Flaw| {
+        let found = Finding::warning(flaw.name(), flaw.to_string(), (0, 0.0)).about(&flaw.points().first);
+        found.with_count(flaw.points().count as u64)
+    };
     let origin = format!(
         "{} of them, {:.4e} apart, {} normals{}",
         points.len(),
@@ -52,11 +55,12 @@ pub(super) fn build<const D: usize, const M: usize>(
         if source == NormalSource::Given { "their own" } else { "estimated" },
         flaws.iter().map(|flaw| format!("; {flaw}")).collect::<String>()
     );
-    let findings = flaws.into_iter().map(finding).collect();
+    let findings = flaws.iter().map(finding).collect();
+    let marks = flaws.iter().map(|flaw| Mark { code: flaw.name(), points: flaw.points().first.clone() }).collect();
     let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
     let problem = problem.build(&shape, &cloud, scene.given.seed, scene.fixed.time_step)?;
     let equation = SurfaceEquation::<D, M>::new(cloud, method, problem, scene.fixed, interrupt, cpu_clock);
-    Ok(Box::new(equation.on_points(origin, findings)))
+    Ok(Box::new(equation.on_points(origin, findings, marks)))
 }
 
 /// Unit normals that came with the points, where they are wanted.

@@ -10,10 +10,14 @@ use crate::geometry::random::CounterRandom;
 use crate::linear_algebra::krylov::Stopping;
 use crate::operators::charts::tangent::Metric;
 use crate::scene::work::PhaseWork;
+use crate::schemes::surface_equation::quantities::{
+    FIELD, GAUSS_CURVATURE, MEAN_CURVATURE, REFERENCE, SECOND_VALUE, VALUE,
+};
 use crate::schemes::surface_equation::{
     Condition, Curvature, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, ExactField, Model, Pointwise,
     Poisson, Problem, Reaction, Solver, SurfaceCloud,
 };
+use crate::simulation::Quantity;
 use crate::spec::{Choice, Coordinates, Parameter, Violation};
 use serde_json::{Value, json};
 
@@ -301,20 +305,21 @@ impl ProblemChoice {
         }
     }
 
-    pub fn field_names(&self, shape: &Shape) -> Vec<&'static str> {
+    /// Fields that frames show of it.
+    pub fn fields(&self, shape: &Shape) -> Vec<&'static Quantity> {
         match self {
             Self::LaplaceBeltrami { .. } | Self::Poisson { .. } if matches!(shape, Shape::Points(_)) => {
-                vec!["value", "field"]
+                vec![&VALUE, &FIELD]
             }
-            Self::LaplaceBeltrami { .. } | Self::Poisson { .. } => vec!["value", "field", "reference"],
-            Self::Curvature { .. } => vec!["mean_curvature", "gauss_curvature"],
+            Self::LaplaceBeltrami { .. } | Self::Poisson { .. } => vec![&VALUE, &FIELD, &REFERENCE],
+            Self::Curvature { .. } => vec![&MEAN_CURVATURE, &GAUSS_CURVATURE],
             Self::Evolution { start: Start::Field(field), .. } => match field {
-                ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. } => vec!["value", "reference"],
-                _ => vec!["value"],
+                ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. } => vec![&VALUE, &REFERENCE],
+                _ => vec![&VALUE],
             },
             Self::Evolution { start: Start::Reaction { manufactured, .. }, .. } => match manufactured {
-                Some(_) => vec!["value", "second_value", "reference"],
-                None => vec!["value", "second_value"],
+                Some(_) => vec![&VALUE, &SECOND_VALUE, &REFERENCE],
+                None => vec![&VALUE, &SECOND_VALUE],
             },
         }
     }

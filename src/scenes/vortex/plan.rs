@@ -13,12 +13,13 @@ use crate::scenes::particle_estimate::{band_particles, check_extent, memory_byte
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
+use crate::schemes::advected_level_set;
 use crate::schemes::advected_level_set::{
     AdvectedLevelSet, AdvectedParts, AdvectedSystem, FieldChoice, RedistanceWhen, Start,
 };
 use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::front_stretch::front_stretch;
-use crate::simulation::{OutputPlan, Simulation};
+use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Parameter, Violation};
 use crate::time::{FixedStep, PathIntegrator};
 use serde_json::{Value, json};
@@ -274,12 +275,8 @@ impl<const D: usize> Scene for VortexScene<D> {
         scene::resolved(super::KIND.kind, &self.spec)
     }
 
-    fn field_names(&self) -> Vec<&'static str> {
-        let mut names = vec!["phi", "closest_point", "normal", "curvature", "velocity", "particle_id"];
-        if self.field == FieldChoice::Dual {
-            names.push("psi");
-        }
-        names
+    fn fields(&self) -> Vec<&'static Quantity> {
+        advected_level_set::quantities::fields(self.field)
     }
 
     fn clouds(&self) -> Vec<CloudReference> {

@@ -1,16 +1,17 @@
 //! Δ_S of a known field by the embedding, again and again for its time. The first step makes the band.
 
 use super::band::{Band, Places, inner_half_width};
+use super::format_1;
+use super::quantities::{CURVATURE, ERROR_MAX, ERROR_RELATIVE, FIELD, NORMAL, REFERENCE, TIME, VALUE};
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
 use crate::schemes::measured_errors::against_exact;
-use crate::simulation::report::Newton;
-use crate::simulation::state::check_length;
+use crate::simulation::course::check_finite;
 use crate::simulation::{
-    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State,
-    StepError,
+    Course, CpuClock, Diagnostic, ErrorEntry, Fields, Health, LoadError, Observables, Phases, Report, Section,
+    Selection, Simulation, StepError,
 };
-use crate::time::{Clock, FixedStep};
+use crate::time::FixedStep;
 use std::collections::BTreeMap;
 
 /// Choices.
@@ -68,10 +69,8 @@ pub struct EmbeddingClosestPoint {
     parts: EmbeddingParts,
     value: Vec<f64>,
     made: Option<Made>,
-    fixed: FixedStep,
-    step: u64,
     interrupt: Interrupt,
-    phases: Phases,
+    course: Course,
 }
 
 /// What the first step makes.
@@ -97,12 +96,12 @@ impl EmbeddingClosestPoint {
     ) -> Self {
         let value = vec![0.0; data.points.len()];
         let fixed = FixedStep { time_step: 1.0, steps: parts.repeats };
-        let phases = Phases::new(cpu_clock);
-        Self { surface, field, data, parts, value, made: None, fixed, step: 0, interrupt, phases }
+        let course = Course::new(fixed.into(), Phases::new(cpu_clock), BTreeMap::new());
+        Self { surface, field, data, parts, value, made: None, interrupt, course }
     }
 
     fn errors(&self) -> Vec<ErrorEntry> {
-        if self.step == 0 {
+        if self.course.step == 0 {
             return Vec::new();
         }
         let time = self.clock().time;
@@ -111,17 +110,18 @@ impl EmbeddingClosestPoint {
 }
 
 impl Simulation for EmbeddingClosestPoint {
-    fn clock(&self) -> Clock {
-        self.fixed.clock(self.step)
+    fn course(&self) -> &Course {
+        &self.course
     }
 
-    fn end(&self) -> Clock {
-        self.fixed.clock(self.fixed.steps)
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
     }
 
     /// 1. The band, where there is none yet. 2. Extension, differences, evaluation.
     fn step(&mut self) -> Result<(), StepError> {
-        let Self { surface, field, data, parts, made, phases, interrupt, .. } = self;
+        let Self { surface, field, data, parts, made, course, interrupt, .. } = self;
+        let (to, phases) = (course.next(), &mut course.phases);
         let made = match made {
             Some(made) => made,
             None => {
@@ -145,50 +145,46 @@ impl Simulation for EmbeddingClosestPoint {
             band.evaluate(places, laplacian, value);
         });
         interrupt.check()?;
-        if let Some(particle) = value.iter().position(|value| !value.is_finite()) {
-            let Clock { step, time } = self.fixed.clock(self.step + 1);
-            return Err(StepError::NonFinite { field: "value", particle, step, time });
-        }
-        self.step += 1;
+        check_finite("value", value, to)?;
+        self.course.step += 1;
         Ok(())
     }
 
     fn observables(&self) -> Observables {
         let errors = self.errors();
         let of = |norm: &str| errors.iter().find(|e| e.norm == norm).map_or(f64::NAN, |e| e.value);
-        vec![("time", self.clock().time), ("error_relative", of("relative")), ("error_max", of("max"))]
+        vec![(&TIME, self.clock().time), (&ERROR_RELATIVE, of("relative")), (&ERROR_MAX, of("max"))]
     }
 
-    fn fields(&self) -> Fields {
+    fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
         let SurfaceData { points, normals, curvatures, field, reference } = &self.data;
-        let mut fields = Fields::at(points);
+        let mut fields = Fields::new(points, selection);
         // Nothing is computed before the first step.
-        let value = if self.step == 0 { vec![f64::NAN; self.value.len()] } else { self.value.clone() };
-        fields.scalar("value", value);
-        fields.scalar("field", field.clone());
-        fields.scalar("reference", reference.clone());
-        fields.vector("normal", normals.iter().copied());
-        fields.scalar("curvature", curvatures.clone());
-        fields.id("particle_id", (0..points.len() as u64).collect());
+        let is_begun = self.course.step > 0;
+        fields.scalar(&VALUE, || if is_begun { self.value.clone() } else { vec![f64::NAN; self.value.len()] });
+        fields.scalar(&FIELD, || field.clone());
+        fields.scalar(&REFERENCE, || reference.clone());
+        fields.vector(&NORMAL, || normals.iter().copied());
+        fields.scalar(&CURVATURE, || curvatures.clone());
+        fields.particle_id();
         fields
     }
 
-    fn state(&self) -> State {
-        let Clock { step, time } = self.clock();
-        let mut state = State { step, time, ..State::default() };
-        state.push_reals("value", &self.value);
-        state
+    fn save(&self, state: &mut Section) {
+        self.course.save(state);
+        state.put_reals("value", &self.value);
     }
 
-    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
-        if state.step > self.fixed.steps {
-            return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
-        }
-        let value = state.reals("value")?;
-        check_length("value", value.len(), self.value.len())?;
+    fn load(&mut self, state: &Section) -> Result<(), LoadError> {
+        let clock = self.course.check(state)?;
+        let value = state.reals_of("value", self.value.len())?;
         self.value.copy_from_slice(value);
-        self.step = state.step;
+        self.course.step = clock.step;
         Ok(())
+    }
+
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        format_1::translate(arrays)
     }
 
     fn report(&self) -> Report {
@@ -198,27 +194,17 @@ impl Simulation for EmbeddingClosestPoint {
         Report {
             errors: self.errors(),
             health: self.health(),
-            worst_condition: 1.0,
-            rescued_fits: BTreeMap::new(),
-            newton: Newton::default(),
+            diagnostics: vec![Diagnostic::count("band.nodes", nodes as u64, "Nodes of the grid near the surface.")],
             method: BTreeMap::from([("operator", operator)]),
         }
     }
 
-    fn phases(&self) -> &Phases {
-        &self.phases
-    }
-
     fn health(&self) -> Health {
         let finite = self.value.iter().all(|value| value.is_finite());
-        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits: 0 }
+        Health { finite, max_cfl: 0.0, volume_drift: None, checks: Vec::new() }
     }
 
     fn particle_count(&self) -> usize {
         self.data.points.len()
-    }
-
-    fn take_findings(&mut self) -> Vec<Finding> {
-        Vec::new()
     }
 }

@@ -11,7 +11,8 @@ use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::Interrupted;
 use crate::schemes::measured_errors::{ErrorNorms, entry};
-use crate::simulation::ErrorEntry;
+use crate::simulation::section::known;
+use crate::simulation::{Component, ErrorEntry, LoadError, Section};
 
 /// Errors of one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +23,7 @@ pub(super) struct FrontErrors {
 }
 
 /// Quantities and norms. The L2 norm of the distance is that of GBPM eq. 18, over the angle.
-const ENTRIES: [(&str, &str); 10] = [
+pub(super) const ENTRIES: [(&str, &str); 10] = [
     ("front", "mean"),
     ("front", "rms"),
     ("front", "max"),
@@ -35,20 +36,24 @@ const ENTRIES: [(&str, &str); 10] = [
     ("front", "count"),
 ];
 
+impl Component for FrontErrors {
+    fn save(&self, section: &mut Section) {
+        section.put_real("time", self.time);
+        for ((quantity, norm), value) in ENTRIES.iter().zip(self.values) {
+            section.put_optional(&format!("{quantity}.{norm}"), known(value));
+        }
+    }
+
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        let mut values = [f64::NAN; ENTRIES.len()];
+        for ((quantity, norm), value) in ENTRIES.iter().zip(&mut values) {
+            *value = section.optional(&format!("{quantity}.{norm}"))?.unwrap_or(f64::NAN);
+        }
+        Ok(Self { time: section.real("time")?, values })
+    }
+}
+
 impl FrontErrors {
-    pub const NUMBERS: usize = 1 + 2 * ENTRIES.len();
-
-    /// For a state, which holds finite numbers alone: whether each value is known, and the value.
-    pub fn to_numbers(self) -> Vec<f64> {
-        let pair = |value: f64| if value.is_finite() { [1.0, value] } else { [0.0; 2] };
-        std::iter::once(self.time).chain(self.values.into_iter().flat_map(pair)).collect()
-    }
-
-    pub fn from_numbers(n: &[f64]) -> Self {
-        let value = |k: usize| if n[2 * k + 1] > 0.5 { n[2 * k + 2] } else { f64::NAN };
-        Self { time: n[0], values: std::array::from_fn(value) }
-    }
-
     pub fn entries(&self) -> Vec<ErrorEntry> {
         let known = ENTRIES.iter().zip(self.values).filter(|(_, value)| value.is_finite());
         known.map(|((quantity, norm), value)| entry(quantity, norm, value, self.time, "exact motion")).collect()

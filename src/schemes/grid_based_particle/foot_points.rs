@@ -2,8 +2,8 @@
 
 use super::grid::{Grid, Node};
 use crate::geometry::Vector;
-use crate::simulation::state::check_length;
-use crate::simulation::{RestoreError, State};
+use crate::simulation::section::check_length;
+use crate::simulation::{Component, LoadError, Section};
 
 /// One foot point: the point of the front closest to a grid point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,41 +111,34 @@ impl<const D: usize> FootPoints<D> {
         thin(&mut self.parts, keep);
         thin(&mut self.parameters, keep);
     }
+}
 
-    /// Adds all columns to a state.
-    pub fn save(&self, state: &mut State) {
-        state.push_vectors("position", &self.positions);
-        state.push_vectors("normal", &self.normals);
-        state.push_reals("curvature", &self.curvatures);
-        state.push_reals("gauss_curvature", &self.gauss_curvatures);
-        state.push_reals("parameter", &self.parameters);
-        state.push_counts("grid_point", self.nodes.clone());
-        state.push_counts("part", self.parts.iter().map(|part| u64::from(*part)).collect());
+impl<const D: usize> Component for FootPoints<D> {
+    fn save(&self, section: &mut Section) {
+        section.put_vectors("position", &self.positions);
+        section.put_vectors("normal", &self.normals);
+        section.put_reals("curvature", &self.curvatures);
+        section.put_reals("gauss_curvature", &self.gauss_curvatures);
+        section.put_reals("parameter", &self.parameters);
+        section.put_counts("grid_point", self.nodes.iter().copied());
+        section.put_counts("part", self.parts.iter().map(|part| u64::from(*part)));
     }
 
-    /// The columns of a state.
-    ///
-    /// # Errors
-    /// [`RestoreError`] where one is missing or they differ in length.
-    pub fn load(state: &State) -> Result<Self, RestoreError> {
-        let vectors = |name: &str| -> Result<Vec<Vector<D>>, RestoreError> {
-            Ok(state.reals(name)?.chunks_exact(D).map(Vector::<D>::from_column_slice).collect())
-        };
-        let nodes = state.counts("grid_point")?.to_vec();
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        let nodes = section.counts("grid_point")?.to_vec();
         let n = nodes.len();
-        let scalars = ["curvature", "gauss_curvature", "parameter"].map(|name| (name, 1));
-        for (name, components) in [("position", D), ("normal", D)].into_iter().chain(scalars) {
-            check_length(name, state.reals(name)?.len(), n * components)?;
-        }
-        check_length("part", state.counts("part")?.len(), n)?;
+        let scalars = |name: &str| Ok::<_, LoadError>(section.reals_of(name, n)?.to_vec());
+        let (positions, normals) = (section.vectors("position")?, section.vectors("normal")?);
+        check_length("position", positions.len(), n)?;
+        check_length("normal", normals.len(), n)?;
         Ok(Self {
             nodes,
-            positions: vectors("position")?,
-            normals: vectors("normal")?,
-            curvatures: state.reals("curvature")?.to_vec(),
-            gauss_curvatures: state.reals("gauss_curvature")?.to_vec(),
-            parameters: state.reals("parameter")?.to_vec(),
-            parts: state.counts("part")?.iter().map(|part| *part as u32).collect(),
+            positions,
+            normals,
+            curvatures: scalars("curvature")?,
+            gauss_curvatures: scalars("gauss_curvature")?,
+            parameters: scalars("parameter")?,
+            parts: section.counts_of("part", n)?.iter().map(|part| *part as u32).collect(),
         })
     }
 }

@@ -1,5 +1,7 @@
 //! Counts of what resampling removed and kept.
 
+use crate::simulation::{Component, Diagnostic, LoadError, Section};
+
 /// Counts of grid points without a foot point and of particles that were removed or kept, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Removals {
@@ -33,10 +35,39 @@ impl Removals {
         ]
     }
 
-    /// From the numbers of [`Self::entries`].
+    /// The counts with their meaning, for a report.
     #[must_use]
-    pub fn from_numbers(n: [u64; 6]) -> Self {
-        let [starved, extrapolated, unresolved, swept, kept, outside] = n;
-        Self { starved, extrapolated, unresolved, swept, kept, outside }
+    pub fn diagnostics(&self) -> Vec<Diagnostic> {
+        let docs = [
+            "Grid points without enough particles of one segment near them.",
+            "Grid points whose foot point would lie beyond all particles, or past a corner.",
+            "Grid points where the front turns too sharply for the spacing.",
+            "Particles that another segment has passed.",
+            "Moved particles that stayed because no new foot point replaced them.",
+            "Particles beyond the end of the grid.",
+        ];
+        self.entries().into_iter().zip(docs).map(|((name, count), doc)| Diagnostic::count(name, count, doc)).collect()
+    }
+}
+
+impl Component for Removals {
+    fn save(&self, section: &mut Section) {
+        section.put_count("starved", self.starved);
+        section.put_count("extrapolated", self.extrapolated);
+        section.put_count("unresolved", self.unresolved);
+        section.put_count("swept", self.swept);
+        section.put_count("kept", self.kept);
+        section.put_count("outside", self.outside);
+    }
+
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        Ok(Self {
+            starved: section.count("starved")?,
+            extrapolated: section.count("extrapolated")?,
+            unresolved: section.count("unresolved")?,
+            swept: section.count("swept")?,
+            kept: section.count("kept")?,
+            outside: section.count("outside")?,
+        })
     }
 }

@@ -4,16 +4,18 @@ use super::config::FrontConfig;
 use super::exact::{FrontErrors, front_errors};
 use super::exact_front::{ExactFrontMotion, Moment};
 use super::foot_points::FootPoints;
+use super::format_1;
 use super::grid::Grid;
+use super::quantities;
 use super::removals::Removals;
 use super::system::FrontSystem;
 use crate::geometry::Vector;
 use crate::geometry::surfaces::Ball;
 use crate::schemes::measured_errors::entry;
-use crate::simulation::report::Newton;
-use crate::simulation::state::check_length;
+use crate::simulation::course::is_finite;
 use crate::simulation::{
-    CpuClock, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State, StepError,
+    Check, Course, CpuClock, Fields, Finding, Health, LoadError, Mark, Observables, Phases, Report, Section, Selection,
+    Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
@@ -26,15 +28,13 @@ pub struct GridBasedParticles<const D: usize, const M: usize> {
     ball: Option<Ball<D>>,
     /// Length or area of the front at the start, up to a constant factor.
     start_area: f64,
-    fixed: FixedStep,
-    step: u64,
     max_cfl: f64,
-    /// When the last particle went.
+    /// Time at which the last particle was removed.
     vanished: Option<f64>,
     errors: Vec<FrontErrors>,
-    findings: Vec<Finding>,
-    phases: Phases,
-    method: BTreeMap<&'static str, String>,
+    /// Particles at open ends, found in the last step.
+    ends: Vec<usize>,
+    course: Course,
 }
 
 impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
@@ -53,44 +53,47 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
             system,
             exact,
             ball,
-            fixed,
-            step: 0,
             max_cfl: 0.0,
             vanished: None,
             errors: Vec::new(),
-            findings: Vec::new(),
-            phases: Phases::new(cpu_clock),
-            method,
+            ends: Vec::new(),
+            course: Course::new(fixed.into(), Phases::new(cpu_clock), method),
         }
     }
 
     /// Whether errors are due after a step: at the end, and where a flow turns.
     fn is_error_due(&self, step: u64) -> bool {
         let turn = self.system.config.law.return_time();
-        step == self.fixed.steps || turn.is_some_and(|turn| self.fixed.reaches(step, 0.5 * turn))
+        step == self.course.pace.last || turn.is_some_and(|turn| self.course.fixed().reaches(step, 0.5 * turn))
+    }
+
+    /// The growth of the front since the start and its bound, where its law has one.
+    fn growth(&self) -> Option<(f64, f64)> {
+        let most = self.system.config.law.most_growth()?;
+        Some((self.system.area_or_length() / self.start_area, most))
     }
 
     /// Fails where the front has grown more than its law allows.
     fn check_growth(&self, Clock { step, time }: Clock) -> Result<(), StepError> {
-        let Some(most) = self.system.config.law.most_growth() else { return Ok(()) };
-        let growth = self.system.area_or_length() / self.start_area;
+        let Some((growth, most)) = self.growth() else { return Ok(()) };
         if growth <= most {
             return Ok(());
         }
         let reason = format!(
             "the front is {growth:.1} times as large as at the start, though by its mean curvature it only shrinks: the time \
              step ({}) is too long, the particles of a reconstruction are too few, or the spacing is too coarse",
-            self.fixed.time_step
+            self.course.pace.time_step
         );
         Err(StepError::Unsolved { reason, step, time })
     }
 
     /// Reports open ends of a front that must stay closed.
-    fn look_for_ends(&mut self, time: f64) {
+    fn look_for_ends(&mut self, Clock { step, time }: Clock) {
         if !self.system.config.law.keeps_fronts_closed() {
             return;
         }
-        let ends = self.system.open_ends();
+        self.ends = self.system.open_ends();
+        let ends = &self.ends;
         if let Some(first) = ends.first() {
             let place: Vec<String> = self.system.feet.positions[*first].iter().map(|c| format!("{c:.4}")).collect();
             let message = format!(
@@ -99,7 +102,8 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
                 self.system.particle_count(),
                 place.join(", ")
             );
-            self.findings.push(Finding { name: "front_open", message, time });
+            let finding = Finding::warning("front_open", message, (step, time)).about(ends);
+            self.course.findings.push(finding.with_advice("a smaller spacing resolves the front"));
         }
     }
 
@@ -109,37 +113,38 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
 }
 
 impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
-    fn clock(&self) -> Clock {
-        self.fixed.clock(self.step)
+    fn course(&self) -> &Course {
+        &self.course
     }
 
-    fn end(&self) -> Clock {
-        self.fixed.clock(self.fixed.steps)
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
     }
 
     /// 1. Motion, topology and resampling, as long as there is a front. 2. Errors, where they are due.
     fn step(&mut self) -> Result<(), StepError> {
-        let (from, to) = (self.clock(), self.fixed.clock(self.step + 1));
+        let (from, to) = (self.clock(), self.course.next());
+        self.ends.clear();
         if !self.system.feet.is_empty() {
-            let way = self.system.advance(from, to, self.fixed.time_step, &mut self.phases)?;
+            let way = self.system.advance(from, to, self.course.pace.time_step, &mut self.course.phases)?;
             self.max_cfl = self.max_cfl.max(way);
             self.check_growth(to)?;
             if self.system.feet.is_empty() {
                 self.vanished = Some(to.time);
                 let counts = self.system.removals.entries().map(|(name, count)| format!("{name} {count}")).join(", ");
                 let message = format!("no foot-point is left at time {}; so far: {counts}", to.time);
-                self.findings.push(Finding { name: "front_vanished", message, time: to.time });
+                self.course.findings.push(Finding::info("front_vanished", message, (to.step, to.time)));
             }
         }
         if self.is_error_due(to.step) {
-            let Self { exact, ball, system, phases, .. } = self;
+            let Self { exact, ball, system, course, .. } = self;
             let FrontConfig { grid, interrupt, .. } = &system.config;
             let moment = Moment { feet: &system.feet, grid, time: to.time, interrupt };
-            let found = phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
+            let found = course.phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
             self.errors.extend(found);
-            self.look_for_ends(to.time);
+            self.look_for_ends(to);
         }
-        self.step = to.step;
+        self.course.step = to.step;
         Ok(())
     }
 
@@ -152,78 +157,72 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
             mean(&radii)
         });
         vec![
-            ("time", self.clock().time),
-            ("time_step", self.fixed.time_step),
-            ("foot_points", feet.len() as f64),
-            ("curvature_mean", mean(&feet.curvatures)),
-            ("radius_mean", radius),
-            ("cfl", self.max_cfl),
-            ("unresolved", (removals.starved + removals.extrapolated + removals.unresolved) as f64),
-            ("swept", removals.swept as f64),
-            ("kept", removals.kept as f64),
+            (&quantities::TIME, self.clock().time),
+            (&quantities::TIME_STEP, self.course.pace.time_step),
+            (&quantities::FOOT_POINTS, feet.len() as f64),
+            (&quantities::CURVATURE_MEAN, mean(&feet.curvatures)),
+            (&quantities::RADIUS_MEAN, radius),
+            (&quantities::CFL, self.max_cfl),
+            (&quantities::UNRESOLVED, (removals.starved + removals.extrapolated + removals.unresolved) as f64),
+            (&quantities::SWEPT, removals.swept as f64),
+            (&quantities::KEPT, removals.kept as f64),
         ]
     }
 
-    fn fields(&self) -> Fields {
+    fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
         let feet = &self.system.feet;
         let grid = self.system.config.grid;
-        let mut fields = Fields::at(&feet.positions);
+        let mut fields = Fields::new(&feet.positions, selection);
         // Of a wave front the direction of travel.
         let is_curve_in_space = D - M == 2;
         let travel = |i: usize| self.velocity(i).try_normalize(0.0).unwrap_or(feet.normals[i]);
         let normal = |i: usize| if is_curve_in_space { travel(i) } else { feet.normals[i] };
-        fields.vector("normal", (0..feet.len()).map(normal));
-        fields.scalar("curvature", feet.curvatures.clone());
+        fields.vector(&quantities::NORMAL, || (0..feet.len()).map(normal));
+        fields.scalar(&quantities::CURVATURE, || feet.curvatures.clone());
         if D == 3 && !is_curve_in_space {
             // Shapes tell their mean curvature alone.
-            let known = |value: &f64| if self.step > 0 { *value } else { f64::NAN };
-            fields.scalar("gauss_curvature", feet.gauss_curvatures.iter().map(known).collect());
+            let known = |value: &f64| if self.course.step > 0 { *value } else { f64::NAN };
+            fields.scalar(&quantities::GAUSS_CURVATURE, || feet.gauss_curvatures.iter().map(known).collect());
         }
-        fields.vector("velocity", (0..feet.len()).map(|i| self.velocity(i)));
-        fields.vector("grid_point", feet.nodes.iter().map(|node| grid.place::<D>(*node)));
-        fields.scalar("level", feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
+        fields.vector(&quantities::VELOCITY, || (0..feet.len()).map(|i| self.velocity(i)));
+        fields.vector(&quantities::GRID_POINT, || feet.nodes.iter().map(|node| grid.place::<D>(*node)));
+        fields.scalar(&quantities::LEVEL, || feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
         if self.system.config.segments.parameter.is_some() {
-            fields.scalar("parameter", feet.parameters.clone());
+            fields.scalar(&quantities::PARAMETER, || feet.parameters.clone());
         }
-        fields.scalar("segment", feet.parts.iter().map(|part| f64::from(*part)).collect());
-        fields.id("particle_id", (0..feet.len() as u64).collect());
+        fields.scalar(&quantities::SEGMENT, || feet.parts.iter().map(|part| f64::from(*part)).collect());
+        fields.particle_id();
+        if !self.ends.is_empty() {
+            fields.marks.push(Mark { code: "front_open", points: self.ends.clone() });
+        }
         fields
     }
 
-    fn state(&self) -> State {
-        let Clock { step, time } = self.clock();
-        let mut state = State { step, time, ..State::default() };
-        self.system.feet.save(&mut state);
-        state.push_counts("removals", self.system.removals.entries().map(|(_, count)| count).to_vec());
-        state.push_counts("has_vanished", vec![u64::from(self.vanished.is_some())]);
-        state.push_reals("monitors", &[self.max_cfl, self.vanished.unwrap_or(0.0)]);
-        let errors: Vec<f64> = self.errors.iter().flat_map(|e| e.to_numbers()).collect();
-        state.push_reals("errors", &errors);
-        state
+    fn save(&self, state: &mut Section) {
+        self.course.save(state);
+        state.put_component("foot_points", &self.system.feet);
+        state.put_component("removals", &self.system.removals);
+        state.put_real("max_cfl", self.max_cfl);
+        state.put_optional("vanished_at", self.vanished);
+        state.put_list("errors", &self.errors);
     }
 
-    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
-        if state.step > self.fixed.steps {
-            return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
-        }
-        let feet = FootPoints::load(state)?;
-        let (removals, monitors) = (state.counts("removals")?, state.reals("monitors")?);
-        let (errors, has_vanished) = (state.reals("errors")?, state.counts("has_vanished")?);
-        let removals: [u64; 6] = removals.try_into().map_err(|_| RestoreError::Length {
-            name: "removals".into(),
-            got: removals.len(),
-            expected: 6,
-        })?;
-        check_length("monitors", monitors.len(), 2)?;
-        check_length("has_vanished", has_vanished.len(), 1)?;
-        check_length("errors", errors.len(), errors.len() / FrontErrors::NUMBERS * FrontErrors::NUMBERS)?;
-        self.system.feet = feet;
-        self.system.removals = Removals::from_numbers(removals);
-        self.max_cfl = monitors[0];
-        self.vanished = (has_vanished[0] > 0).then_some(monitors[1]);
-        self.errors = errors.chunks_exact(FrontErrors::NUMBERS).map(FrontErrors::from_numbers).collect();
-        self.step = state.step;
+    fn load(&mut self, state: &Section) -> Result<(), LoadError> {
+        let clock = self.course.check(state)?;
+        let feet: FootPoints<D> = state.component("foot_points")?;
+        let removals: Removals = state.component("removals")?;
+        let (max_cfl, vanished) = (state.real("max_cfl")?, state.optional("vanished_at")?);
+        let errors = state.list("errors")?;
+        // From here on nothing fails.
+        (self.system.feet, self.system.removals) = (feet, removals);
+        (self.max_cfl, self.vanished, self.errors) = (max_cfl, vanished, errors);
+        self.ends.clear();
+        self.course.step = clock.step;
         Ok(())
+    }
+
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        format_1::translate(arrays)
     }
 
     fn report(&self) -> Report {
@@ -237,33 +236,23 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         Report {
             errors,
             health: self.health(),
-            worst_condition: 1.0,
-            rescued_fits: self.system.removals.entries().into_iter().filter(|(_, count)| *count > 0).collect(),
-            newton: Newton::default(),
-            method: self.method.clone(),
+            diagnostics: self.system.removals.diagnostics(),
+            method: self.course.method.clone(),
         }
     }
 
-    fn phases(&self) -> &Phases {
-        &self.phases
-    }
-
     fn health(&self) -> Health {
-        let removals = &self.system.removals;
+        let growth = self.growth().map(|(growth, most)| Check::at_most("front_growth", Some(growth), most, ""));
         Health {
-            finite: self.system.feet.positions.iter().all(|x| x.iter().all(|c| c.is_finite())),
+            finite: self.system.feet.positions.iter().all(is_finite),
             max_cfl: self.max_cfl,
             volume_drift: None,
-            rescued_fits: removals.kept,
+            checks: growth.into_iter().collect(),
         }
     }
 
     fn particle_count(&self) -> usize {
         self.system.feet.len()
-    }
-
-    fn take_findings(&mut self) -> Vec<Finding> {
-        std::mem::take(&mut self.findings)
     }
 }
 

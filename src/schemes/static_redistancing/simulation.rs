@@ -1,11 +1,16 @@
 //! One step a redistancing: the distances of one are the input of the next.
 
+use super::format_1;
+use super::quantities::{PHI_ERROR_MAX, PHI_ERROR_RMS, RESCUED_FITS, TIME};
 use super::system::{Source, StaticSystem};
-use crate::schemes::measured_errors::{ErrorNorms, closest_point_report, rescued};
+use crate::closest_point::FitDiagnostics;
+use crate::schemes::measured_errors::{ErrorNorms, closest_point_diagnostics, rescued};
 use crate::schemes::measured_redistancing::{query, rebuild};
+use crate::simulation::components::{load_particles, save_particles};
+use crate::simulation::course::first_broken;
 use crate::simulation::{
-    CpuClock, ErrorEntry, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State,
-    StepError,
+    Course, CpuClock, ErrorEntry, Fields, Health, LoadError, Observables, Phases, Report, Section, Selection,
+    Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
@@ -13,10 +18,7 @@ use std::collections::BTreeMap;
 /// A static redistancing as a simulation; scene time counts redistancings.
 pub struct StaticRedistancing<const D: usize> {
     system: StaticSystem<D>,
-    fixed: FixedStep,
-    step: u64,
-    phases: Phases,
-    method: BTreeMap<&'static str, String>,
+    course: Course,
 }
 
 impl<const D: usize> StaticRedistancing<D> {
@@ -24,16 +26,7 @@ impl<const D: usize> StaticRedistancing<D> {
     #[must_use]
     pub fn new(system: StaticSystem<D>, cpu_clock: CpuClock, method: BTreeMap<&'static str, String>) -> Self {
         let fixed = FixedStep { time_step: 1.0, steps: system.repeats };
-        Self { system, fixed, step: 0, phases: Phases::new(cpu_clock), method }
-    }
-
-    /// The numbers of a step must be numbers.
-    fn check_finite(&self) -> Result<(), StepError> {
-        let Clock { step, time } = self.fixed.clock(self.step + 1);
-        match self.system.columns.find_broken(&self.system.particles) {
-            Some((field, particle)) => Err(StepError::NonFinite { field, particle, step, time }),
-            None => Ok(()),
-        }
+        Self { system, course: Course::new(fixed.into(), Phases::new(cpu_clock), method) }
     }
 
     /// Errors against the exact surface over the band; none where it is not known.
@@ -51,7 +44,7 @@ impl<const D: usize> StaticRedistancing<D> {
             let exact = surface.nearest(&x);
             norms[0].add(particles.scalar(system.columns.phi)[i] - exact.distance);
             // Where two points of the surface are nearly as close, another choice is no error.
-            if self.step == 0 || surface.near_medial_axis(&x, system.spacing) {
+            if self.course.step == 0 || surface.near_medial_axis(&x, system.spacing) {
                 continue;
             }
             norms[1].add((particles.vector(system.columns.closest_point)[i] - exact.point).norm());
@@ -63,13 +56,13 @@ impl<const D: usize> StaticRedistancing<D> {
             }
         }
         if let Source::Grid(remeshing) = &system.source
-            && self.step > 0
+            && self.course.step > 0
         {
             // The first interpolation is of the exact level; later ones are of distances that were computed.
             let mut norms = ErrorNorms::default();
             for (x, value) in remeshing.nodes().iter().zip(remeshing.values()) {
                 let distance = surface.signed_distance(x);
-                let exact = if self.step == 1 { system.initial.value(x, distance) } else { distance };
+                let exact = if self.course.step == 1 { system.initial.value(x, distance) } else { distance };
                 if distance.abs() <= system.half_band {
                     norms.add(value - exact);
                 }
@@ -85,12 +78,12 @@ impl<const D: usize> StaticRedistancing<D> {
 }
 
 impl<const D: usize> Simulation for StaticRedistancing<D> {
-    fn clock(&self) -> Clock {
-        self.fixed.clock(self.step)
+    fn course(&self) -> &Course {
+        &self.course
     }
 
-    fn end(&self) -> Clock {
-        self.fixed.clock(self.fixed.steps)
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
     }
 
     /// 1. Detection, regression and projection from the present level, or from what a grid gets of it.
@@ -100,7 +93,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let system = &mut self.system;
         let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
         let (surface, answers) = (&mut system.redistancing, &mut system.answers);
-        let (interrupt, phases) = (&system.interrupt, &mut self.phases);
+        let (interrupt, phases) = (&system.interrupt, &mut self.course.phases);
         let (points, level, normals) = match &mut system.source {
             Source::Grid(remeshing) => {
                 phases.measure("remeshing", || remeshing.interpolate(positions, level, interrupt))?;
@@ -108,13 +101,13 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
             }
             Source::Others { positions, level } => (positions.as_slice(), level.as_slice(), None),
             Source::Particles => {
-                (positions, level, (self.step > 0).then(|| system.particles.vector(system.columns.normal)))
+                (positions, level, (self.course.step > 0).then(|| system.particles.vector(system.columns.normal)))
             }
         };
         rebuild(surface, points, level, normals, interrupt, phases)?;
         query(surface, positions, f64::INFINITY, answers, interrupt, phases)?;
         if surface.is_lost() {
-            let Clock { step, time } = self.fixed.clock(self.step + 1);
+            let Clock { step, time } = self.course.next();
             return Err(StepError::InterfaceLost { step, time });
         }
         // Particles beyond the band serve the fits and are redistanced like the others; the band's flags stay.
@@ -127,15 +120,15 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
                 system.particles.flag_mut(system.columns.in_band)[i] = 1;
             }
         }
-        self.phases.measure("redistancing/store", || {
+        self.course.phases.measure("redistancing/store", || {
             for (i, answer) in system.answers.iter() {
                 system.columns.write(&mut system.particles, system.level, i, answer);
                 let phi = system.particles.scalar(system.columns.phi)[i];
                 system.particles.scalar_mut(system.level)[i] = phi;
             }
         });
-        self.check_finite()?;
-        self.step += 1;
+        first_broken(system.columns.find_broken(&system.particles), self.course.next())?;
+        self.course.step += 1;
         Ok(())
     }
 
@@ -145,74 +138,67 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         let of_phi =
             |norm: &str| errors.iter().find(|e| e.quantity == "phi" && e.norm == norm).map_or(f64::NAN, |e| e.value);
         vec![
-            ("time", self.clock().time),
-            ("phi_error_rms", of_phi("rms")),
-            ("phi_error_max", of_phi("max")),
-            ("rescued_fits", rescued(counts) as f64),
+            (&TIME, self.clock().time),
+            (&PHI_ERROR_RMS, of_phi("rms")),
+            (&PHI_ERROR_MAX, of_phi("max")),
+            (&RESCUED_FITS, rescued(counts) as f64),
         ]
     }
 
-    fn fields(&self) -> Fields {
+    fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
         let particles = &self.system.particles;
-        let mut fields = Fields::at(particles.positions());
-        fields.surface(particles, &self.system.columns, self.step > 0);
-        fields.id("particle_id", (0..particles.len() as u64).collect());
+        let mut fields = Fields::new(particles.positions(), selection);
+        fields.surface(particles, &self.system.columns, self.course.step > 0);
+        fields.particle_id();
         fields
     }
 
-    fn state(&self) -> State {
-        let Clock { step, time } = self.clock();
-        let mut state = State { step, time, ..State::default() };
-        state.push_particles(&self.system.particles);
-        let fit_diagnostics = self.system.redistancing.fit_diagnostics();
-        state.push_counts("rescues", fit_diagnostics.counts.entries().iter().map(|e| e.1).collect());
-        state.push_reals("worst_condition", &[fit_diagnostics.worst_condition]);
+    fn save(&self, state: &mut Section) {
+        self.course.save(state);
+        state.put_section("particles", |section| save_particles(&self.system.particles, section));
+        state.put_component("redistancing", self.system.redistancing.fit_diagnostics());
         if let Source::Grid(remeshing) = &self.system.source {
-            state.push_reals("remeshed_level", remeshing.values());
+            state.put_reals("remeshed_level", remeshing.values());
         }
-        state
     }
 
-    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
-        if state.step > self.fixed.steps {
-            return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
-        }
-        let fit_diagnostics = self.system.redistancing.fit_diagnostics_mut();
-        let (rescues, condition) = (state.counts("rescues")?, state.reals("worst_condition")?);
-        crate::simulation::state::check_length("rescues", rescues.len(), fit_diagnostics.counts.entries().len())?;
-        crate::simulation::state::check_length("worst_condition", condition.len(), 1)?;
-        if let Source::Grid(remeshing) = &mut self.system.source {
-            let values = state.reals("remeshed_level")?;
-            crate::simulation::state::check_length("remeshed_level", values.len(), remeshing.values().len())?;
+    fn load(&mut self, state: &Section) -> Result<(), LoadError> {
+        let clock = self.course.check(state)?;
+        let soundness: FitDiagnostics = state.component("redistancing")?;
+        let remeshed = match &self.system.source {
+            Source::Grid(remeshing) => Some(state.reals_of("remeshed_level", remeshing.values().len())?),
+            _ => None,
+        };
+        state.section("particles", |section| load_particles(&mut self.system.particles, section))?;
+        // From here on nothing fails.
+        if let (Source::Grid(remeshing), Some(values)) = (&mut self.system.source, remeshed) {
             remeshing.restore(values);
         }
-        state.pull_particles(&mut self.system.particles)?;
-        fit_diagnostics.counts.restore(rescues);
-        fit_diagnostics.worst_condition = condition[0];
-        self.step = state.step;
+        *self.system.redistancing.fit_diagnostics_mut() = soundness;
+        self.course.step = clock.step;
         Ok(())
     }
 
-    fn report(&self) -> Report {
-        let errors = self.errors();
-        closest_point_report(self.system.redistancing.fit_diagnostics(), errors, self.health(), self.method.clone())
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        let has_grid = matches!(self.system.source, Source::Grid(_));
+        format_1::translate(arrays, &self.system.particles, has_grid)
     }
 
-    fn phases(&self) -> &Phases {
-        &self.phases
+    fn report(&self) -> Report {
+        Report {
+            errors: self.errors(),
+            health: self.health(),
+            diagnostics: closest_point_diagnostics(self.system.redistancing.fit_diagnostics()),
+            method: self.course.method.clone(),
+        }
     }
 
     fn health(&self) -> Health {
         let finite = self.system.particles.scalar(self.system.columns.phi).iter().all(|v| v.is_finite());
-        let rescued_fits = rescued(&self.system.redistancing.fit_diagnostics().counts);
-        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits }
+        Health { finite, max_cfl: 0.0, volume_drift: None, checks: Vec::new() }
     }
 
     fn particle_count(&self) -> usize {
         self.system.particles.len()
-    }
-
-    fn take_findings(&mut self) -> Vec<Finding> {
-        Vec::new()
     }
 }

@@ -2,12 +2,13 @@
 //! the fitted heights where normals are not exact.
 
 use super::cloud::SurfaceCloud;
+use super::format_1;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
+use super::quantities::{CURVATURE_MEAN, GAUSS_CURVATURE, GAUSS_INTEGRAL, MEAN_CURVATURE};
 use crate::operators::{derivative_tensor, divergence, sum_of_minors};
 use crate::schemes::measured_errors::against_exact;
-use crate::simulation::state::check_length;
-use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
+use crate::simulation::{ErrorEntry, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
 
@@ -55,9 +56,13 @@ impl<const D: usize> Problem<D> for Curvature {
         Ok(())
     }
 
-    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
-        let shown = |values: &[f64]| if clock.step == 0 { vec![f64::NAN; values.len()] } else { values.to_vec() };
-        vec![("mean_curvature", shown(&self.mean)), ("gauss_curvature", shown(&self.gauss))]
+    fn columns(&self) -> Vec<&'static Quantity> {
+        vec![&MEAN_CURVATURE, &GAUSS_CURVATURE]
+    }
+
+    fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {
+        let values = if *quantity == GAUSS_CURVATURE { &self.gauss } else { &self.mean };
+        if clock.step == 0 { vec![f64::NAN; values.len()] } else { values.clone() }
     }
 
     fn watched(&self) -> Watched<'_> {
@@ -87,21 +92,24 @@ impl<const D: usize> Problem<D> for Curvature {
         // Gauss and Bonnet: ∫ K is 2π times the Euler characteristic.
         let whole = if clock.step == 0 || cloud.areas.is_none() { f64::NAN } else { cloud.integral(&self.gauss) };
         let mean = self.mean.iter().sum::<f64>() / self.mean.len().max(1) as f64;
-        vec![("curvature_mean", mean), ("gauss_integral", whole)]
+        vec![(&CURVATURE_MEAN, mean), (&GAUSS_INTEGRAL, whole)]
     }
 
-    fn save(&self, state: &mut State) {
-        state.push_reals("mean_curvature", &self.mean);
-        state.push_reals("gauss_curvature", &self.gauss);
+    fn save(&self, section: &mut Section) {
+        section.put_reals("mean_curvature", &self.mean);
+        section.put_reals("gauss_curvature", &self.gauss);
     }
 
-    fn load(&mut self, state: &State) -> Result<(), RestoreError> {
-        let (mean, gauss) = (state.reals("mean_curvature")?, state.reals("gauss_curvature")?);
-        check_length("mean_curvature", mean.len(), self.mean.len())?;
-        check_length("gauss_curvature", gauss.len(), self.gauss.len())?;
+    fn load(&mut self, section: &Section) -> Result<(), LoadError> {
+        let mean = section.reals_of("mean_curvature", self.mean.len())?;
+        let gauss = section.reals_of("gauss_curvature", self.gauss.len())?;
         self.mean.copy_from_slice(mean);
         self.gauss.copy_from_slice(gauss);
         Ok(())
+    }
+
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        format_1::curvature(arrays)
     }
 
     fn describe(&self, method: &mut BTreeMap<&'static str, String>) {

@@ -3,16 +3,17 @@
 //! all the same is a mode of the operator, and ends the run.
 
 use super::cloud::SurfaceCloud;
+use super::format_1;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
+use super::quantities::{INTEGRAL, LARGEST, LEAST, PROBES, RATE, REFERENCE, SECOND_VALUE, VALUE};
 use super::reactions::Reaction;
 use super::solver::{Factors, Solver, Workspace};
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::Interruptible;
 use crate::parallel::Interrupt;
 use crate::schemes::measured_errors::{against_exact, entry};
-use crate::simulation::state::check_length;
-use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
+use crate::simulation::{Check, Diagnostic, ErrorEntry, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use crate::time::embedded_pair::EmbeddedPair;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
@@ -228,6 +229,17 @@ impl Evolution {
         }
     }
 
+    /// Whether [`Self::reference`] knows one.
+    fn has_reference(&self) -> bool {
+        match self.parts.exact {
+            ExactCourse::Unknown => false,
+            ExactCourse::Decay(_) => true,
+            ExactCourse::Manufactured => {
+                self.parts.reaction.as_ref().is_some_and(|reaction| reaction.manufactured.is_some())
+            }
+        }
+    }
+
     /// Unknown fields.
     fn fields(&self) -> usize {
         if self.parts.reaction.is_some() { 2 } else { 1 }
@@ -295,17 +307,28 @@ impl<const D: usize> Problem<D> for Evolution {
         Ok(())
     }
 
-    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
-        let rows = self.values.len() / self.fields();
-        let mut columns = vec![("value", self.values[..rows].to_vec())];
+    fn columns(&self) -> Vec<&'static Quantity> {
+        let mut columns = vec![&VALUE];
         if self.fields() == 2 {
-            columns.push(("second_value", self.values[rows..].to_vec()));
+            columns.push(&SECOND_VALUE);
         }
-        if let Some(mut reference) = self.reference(clock.time) {
-            reference.truncate(rows);
-            columns.push(("reference", reference));
+        if self.has_reference() {
+            columns.push(&REFERENCE);
         }
         columns
+    }
+
+    fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {
+        let rows = self.values.len() / self.fields();
+        if *quantity == REFERENCE {
+            let mut reference = self.reference(clock.time).unwrap_or_default();
+            reference.truncate(rows);
+            reference
+        } else if *quantity == SECOND_VALUE {
+            self.values[rows..].to_vec()
+        } else {
+            self.values[..rows].to_vec()
+        }
     }
 
     fn watched(&self) -> Watched<'_> {
@@ -318,8 +341,8 @@ impl<const D: usize> Problem<D> for Evolution {
         if let Some(reference) = self.reference(clock.time) {
             errors = against_exact("value", &self.values, &reference, clock.time, "exact solution at the points");
         }
-        for (name, peak) in ["probe_0", "probe_1", "probe_2"].into_iter().zip(&self.peaks) {
-            errors.push(entry(name, "peak", *peak, clock.time, "none: the largest value so far"));
+        for (probe, peak) in PROBES.into_iter().zip(&self.peaks) {
+            errors.push(entry(probe.name, "peak", *peak, clock.time, "none: the largest value so far"));
         }
         let sizes: Vec<f64> = self.parts.initial.iter().map(|value| value.abs()).collect();
         // A field whose parts cancel has no mass to be lost.
@@ -343,47 +366,69 @@ impl<const D: usize> Problem<D> for Evolution {
     fn observables(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Observables {
         let rows = self.values.len() / self.fields();
         let first = &self.values[..rows];
-        let mut row = vec![
-            ("integral", cloud.integral(first)),
-            ("least", first.iter().copied().fold(f64::INFINITY, f64::min)),
-            ("largest", first.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+        let mut row: Observables = vec![
+            (&INTEGRAL, cloud.integral(first)),
+            (&LEAST, first.iter().copied().fold(f64::INFINITY, f64::min)),
+            (&LARGEST, first.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
         ];
         if self.parts.reaction.is_some() {
             // Before the first step it is not known.
-            row.push(("rate", if clock.step == 0 { f64::NAN } else { self.rate }));
+            row.push((&RATE, if clock.step == 0 { f64::NAN } else { self.rate }));
         }
-        let probes = ["probe_0", "probe_1", "probe_2"].into_iter().zip(&cloud.probes);
-        row.extend(probes.map(|(name, probe)| (name, self.values[*probe])));
+        let probes = PROBES.into_iter().zip(&cloud.probes);
+        row.extend(probes.map(|(quantity, probe)| (quantity, self.values[*probe])));
         row
     }
 
-    fn save(&self, state: &mut State) {
-        state.push_reals("value", &self.values);
-        state.push_reals("previous", &self.previous);
-        state.push_reals("inner_step", &[self.inner_step]);
-        state.push_reals("peaks", &self.peaks);
-        state.push_reals("rate", &[self.rate]);
-        state.push_counts("work", vec![self.attempts, self.iterations]);
+    fn save(&self, section: &mut Section) {
+        section.put_reals("value", &self.values);
+        section.put_reals("previous", &self.previous);
+        section.put_real("inner_step", self.inner_step);
+        section.put_reals("peaks", &self.peaks);
+        section.put_real("rate", self.rate);
+        section.put_count("attempts", self.attempts);
+        section.put_count("iterations", self.iterations);
     }
 
-    fn load(&mut self, state: &State) -> Result<(), RestoreError> {
-        let (value, previous) = (state.reals("value")?, state.reals("previous")?);
-        let (inner, peaks, work) = (state.reals("inner_step")?, state.reals("peaks")?, state.counts("work")?);
-        check_length("value", value.len(), self.values.len())?;
-        check_length("previous", previous.len(), self.previous.len())?;
-        check_length("inner_step", inner.len(), 1)?;
-        check_length("peaks", peaks.len(), self.peaks.len())?;
-        check_length("work", work.len(), 2)?;
-        let rate = state.reals("rate")?;
-        check_length("rate", rate.len(), 1)?;
+    fn load(&mut self, section: &Section) -> Result<(), LoadError> {
+        let value = section.reals_of("value", self.values.len())?;
+        let previous = section.reals_of("previous", self.previous.len())?;
+        let peaks = section.reals_of("peaks", self.peaks.len())?;
+        let (inner_step, rate) = (section.real("inner_step")?, section.real("rate")?);
+        let (attempts, iterations) = (section.count("attempts")?, section.count("iterations")?);
         self.values.copy_from_slice(value);
         self.previous.copy_from_slice(previous);
         self.peaks.copy_from_slice(peaks);
-        (self.inner_step, self.rate) = (inner[0], rate[0]);
-        (self.attempts, self.iterations) = (work[0], work[1]);
+        (self.inner_step, self.rate) = (inner_step, rate);
+        (self.attempts, self.iterations) = (attempts, iterations);
         self.pair.discard_slope();
         self.implicit = None;
         Ok(())
+    }
+
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        format_1::evolution(arrays)
+    }
+
+    fn checks(&self, _steps: u64) -> Vec<Check> {
+        if self.parts.reaction.is_some() {
+            return Vec::new();
+        }
+        let growth = largest_of(&self.values) / largest_of(&self.parts.initial);
+        vec![Check::at_most("field_growth", Some(growth), MOST_GROWTH, "")]
+    }
+
+    fn diagnostics(&self) -> Vec<Diagnostic> {
+        match self.parts.integrator {
+            EvolutionIntegrator::Bdf2(_) => {
+                vec![Diagnostic::count("solver.iterations", self.iterations, "Iterations of the solver in all steps.")]
+            }
+            _ => vec![Diagnostic::count(
+                "integrator.attempts",
+                self.attempts,
+                "Steps of the embedded pair that were tried.",
+            )],
+        }
     }
 
     fn describe(&self, method: &mut BTreeMap<&'static str, String>) {

@@ -1,11 +1,12 @@
 //! Δ_S applied to a known field, again and again for its time: the error against the exact one, where that is known.
 
 use super::cloud::SurfaceCloud;
+use super::format_1;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
+use super::quantities::{ERROR_MAX, ERROR_RELATIVE, FIELD, REFERENCE, VALUE};
 use crate::schemes::measured_errors::against_exact;
-use crate::simulation::state::check_length;
-use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
+use crate::simulation::{ErrorEntry, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
 
@@ -37,12 +38,23 @@ impl<const D: usize> Problem<D> for Pointwise {
         Ok(())
     }
 
-    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
-        // Nothing is computed before the first step.
-        let value = if clock.step == 0 { vec![f64::NAN; self.value.len()] } else { self.value.clone() };
-        let mut columns = vec![("value", value), ("field", self.field.clone())];
-        columns.extend(self.reference.iter().map(|reference| ("reference", reference.clone())));
+    fn columns(&self) -> Vec<&'static Quantity> {
+        let mut columns = vec![&VALUE, &FIELD];
+        columns.extend(self.reference.as_ref().map(|_| &REFERENCE));
         columns
+    }
+
+    fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {
+        if *quantity == FIELD {
+            self.field.clone()
+        } else if *quantity == REFERENCE {
+            self.reference.clone().unwrap_or_default()
+        } else if clock.step == 0 {
+            // Nothing is computed before the first step.
+            vec![f64::NAN; self.value.len()]
+        } else {
+            self.value.clone()
+        }
     }
 
     fn watched(&self) -> Watched<'_> {
@@ -64,18 +76,21 @@ impl<const D: usize> Problem<D> for Pointwise {
         }
         let errors = Problem::<D>::errors(self, cloud, clock);
         let of = |norm: &str| errors.iter().find(|e| e.norm == norm).map_or(f64::NAN, |e| e.value);
-        vec![("error_relative", of("relative")), ("error_max", of("max"))]
+        vec![(&ERROR_RELATIVE, of("relative")), (&ERROR_MAX, of("max"))]
     }
 
-    fn save(&self, state: &mut State) {
-        state.push_reals("value", &self.value);
+    fn save(&self, section: &mut Section) {
+        section.put_reals("value", &self.value);
     }
 
-    fn load(&mut self, state: &State) -> Result<(), RestoreError> {
-        let value = state.reals("value")?;
-        check_length("value", value.len(), self.value.len())?;
+    fn load(&mut self, section: &Section) -> Result<(), LoadError> {
+        let value = section.reals_of("value", self.value.len())?;
         self.value.copy_from_slice(value);
         Ok(())
+    }
+
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        format_1::pointwise(arrays)
     }
 
     fn describe(&self, _method: &mut BTreeMap<&'static str, String>) {}

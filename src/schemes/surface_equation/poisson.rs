@@ -1,14 +1,15 @@
 //! Δ_S u = f: some points hold their value, or the solution has no mean.
 
 use super::cloud::SurfaceCloud;
+use super::format_1;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
+use super::quantities::{FIELD, ITERATIONS, REFERENCE, RESIDUAL, VALUE};
 use super::solver::{Solver, Workspace};
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::{Convergence, Interruptible, LinearMap, WithMean};
 use crate::schemes::measured_errors::{against_exact, entry};
-use crate::simulation::state::check_length;
-use crate::simulation::{ErrorEntry, Observables, RestoreError, State, StepError};
+use crate::simulation::{Check, Diagnostic, ErrorEntry, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
 
@@ -107,11 +108,22 @@ impl<const D: usize> Problem<D> for Poisson {
         Ok(())
     }
 
-    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)> {
-        let value = if clock.step == 0 { vec![f64::NAN; self.value.len()] } else { self.value.clone() };
-        let mut columns = vec![("value", value), ("field", self.right.clone())];
-        columns.extend(self.exact.iter().map(|exact| ("reference", exact.clone())));
+    fn columns(&self) -> Vec<&'static Quantity> {
+        let mut columns = vec![&VALUE, &FIELD];
+        columns.extend(self.exact.as_ref().map(|_| &REFERENCE));
         columns
+    }
+
+    fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {
+        if *quantity == FIELD {
+            self.right.clone()
+        } else if *quantity == REFERENCE {
+            self.exact.clone().unwrap_or_default()
+        } else if clock.step == 0 {
+            vec![f64::NAN; self.value.len()]
+        } else {
+            self.value.clone()
+        }
     }
 
     fn watched(&self) -> Watched<'_> {
@@ -132,24 +144,40 @@ impl<const D: usize> Problem<D> for Poisson {
     }
 
     fn observables(&self, _cloud: &SurfaceCloud<D>, _clock: Clock) -> Observables {
-        vec![("iterations", self.convergence.iterations as f64), ("residual", self.convergence.residual)]
+        vec![(&ITERATIONS, self.convergence.iterations as f64), (&RESIDUAL, self.convergence.residual)]
     }
 
-    fn save(&self, state: &mut State) {
-        state.push_reals("value", &self.value);
-        state.push_counts("iterations", vec![self.convergence.iterations]);
-        state.push_reals("residual", &[self.convergence.residual]);
+    fn save(&self, section: &mut Section) {
+        section.put_reals("value", &self.value);
+        section.put_count("iterations", self.convergence.iterations);
+        section.put_real("residual", self.convergence.residual);
+        section.put_real("residual_floor", self.convergence.floor);
     }
 
-    fn load(&mut self, state: &State) -> Result<(), RestoreError> {
-        let (value, iterations) = (state.reals("value")?, state.counts("iterations")?);
-        let residual = state.reals("residual")?;
-        check_length("value", value.len(), self.value.len())?;
-        check_length("iterations", iterations.len(), 1)?;
-        check_length("residual", residual.len(), 1)?;
+    fn load(&mut self, section: &Section) -> Result<(), LoadError> {
+        let value = section.reals_of("value", self.value.len())?;
+        let (iterations, residual) = (section.count("iterations")?, section.real("residual")?);
+        let floor = section.real("residual_floor")?;
         self.value.copy_from_slice(value);
-        self.convergence = Convergence { iterations: iterations[0], residual: residual[0], ..Convergence::default() };
+        self.convergence = Convergence { iterations, residual, floor };
         Ok(())
+    }
+
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        format_1::poisson(arrays)
+    }
+
+    fn checks(&self, steps: u64) -> Vec<Check> {
+        let residual = (steps > 0).then_some(self.convergence.residual);
+        vec![Check::at_most("solver_residual", residual, self.convergence.bound(self.solver.stopping()), "")]
+    }
+
+    fn diagnostics(&self) -> Vec<Diagnostic> {
+        let Convergence { iterations, residual, .. } = self.convergence;
+        vec![
+            Diagnostic::count("solver.iterations", iterations, "Iterations of the solver."),
+            Diagnostic::new("solver.residual", residual, "Norm of b - A x by that of b."),
+        ]
     }
 
     fn describe(&self, method: &mut BTreeMap<&'static str, String>) {

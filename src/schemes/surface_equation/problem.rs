@@ -3,7 +3,7 @@
 use super::cloud::SurfaceCloud;
 use super::method::{Operators, Wanted};
 use crate::parallel::Interrupt;
-use crate::simulation::{ErrorEntry, Observables, Phases, RestoreError, State, StepError};
+use crate::simulation::{Check, Diagnostic, ErrorEntry, LoadError, Observables, Phases, Quantity, Section, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
 
@@ -37,8 +37,11 @@ pub trait Problem<const D: usize>: Send {
     /// [`StepError`].
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError>;
 
-    /// What frames show beside the surface.
-    fn columns(&self, clock: Clock) -> Vec<(&'static str, Vec<f64>)>;
+    /// The fields that frames show beside the surface; their values are computed by [`Self::column`].
+    fn columns(&self) -> Vec<&'static Quantity>;
+
+    /// The values of a field at the points.
+    fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64>;
 
     /// The unknowns whose finiteness is watched, by name.
     fn watched(&self) -> Watched<'_>;
@@ -50,13 +53,29 @@ pub trait Problem<const D: usize>: Send {
     fn observables(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Observables;
 
     /// Everything that the future depends on.
-    fn save(&self, state: &mut State);
+    fn save(&self, section: &mut Section);
 
     /// Takes it back.
     ///
     /// # Errors
-    /// [`RestoreError`]; nothing is changed then.
-    fn load(&mut self, state: &State) -> Result<(), RestoreError>;
+    /// [`LoadError`]; nothing is changed then.
+    fn load(&mut self, section: &Section) -> Result<(), LoadError>;
+
+    /// The section that the arrays of a checkpoint of format 1 stand for.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError>;
+
+    /// What it watches: bounds that end the run where they do not hold. `steps` are done.
+    fn checks(&self, _steps: u64) -> Vec<Check> {
+        Vec::new()
+    }
+
+    /// What it counts of its own work.
+    fn diagnostics(&self) -> Vec<Diagnostic> {
+        Vec::new()
+    }
 
     /// What choices came to.
     fn describe(&self, method: &mut BTreeMap<&'static str, String>);

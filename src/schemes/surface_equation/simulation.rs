@@ -1,15 +1,18 @@
 //! A problem on a surface as a simulation: the first step constructs the operators, every step is the problem's.
 
 use super::cloud::SurfaceCloud;
+use super::format_1;
 use super::method::{Form, Method, Operators};
 use super::problem::{Problem, Tools};
+use super::quantities::{CURVATURE, NORMAL, TIME};
 use crate::linear_algebra::SparseRows;
 use crate::operators::{Support, SupportDiagnostics};
 use crate::parallel::Interrupt;
-use crate::simulation::report::Newton;
-use crate::simulation::state::check_length;
+use crate::schemes::measured_errors::{SUPPORTS, support_diagnostics};
+use crate::simulation::course::check_finite;
 use crate::simulation::{
-    CpuClock, Fields, Finding, Health, Observables, Phases, Report, RestoreError, Simulation, State, StepError,
+    Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Mark, Observables, Phases, Report,
+    Section, Selection, Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
@@ -23,14 +26,12 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     fit_diagnostics: SupportDiagnostics,
     /// Points whose curvature is too large for their support.
     coarse: u64,
-    fixed: FixedStep,
-    step: u64,
     interrupt: Interrupt,
-    phases: Phases,
     /// Of points from outside: what they are, for the report.
     origin: Option<String>,
-    /// Of points from outside: what is wrong with them, until it was told.
-    findings: Vec<Finding>,
+    /// Points from outside that findings are about.
+    marks: Vec<Mark>,
+    course: Course,
 }
 
 /// |κ| r_c beyond which a fit does not see the surface as nearly flat.
@@ -60,45 +61,42 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
         interrupt: Interrupt,
         cpu_clock: CpuClock,
     ) -> Self {
-        let fit_diagnostics = SupportDiagnostics::default();
-        let phases = Phases::new(cpu_clock);
         Self {
             cloud,
             method,
             problem,
             operators: None,
-            fit_diagnostics,
+            fit_diagnostics: SupportDiagnostics::default(),
             coarse: 0,
-            fixed,
-            step: 0,
             interrupt,
-            phases,
             origin: None,
-            findings: Vec::new(),
+            marks: Vec::new(),
+            course: Course::new(fixed.into(), Phases::new(cpu_clock), BTreeMap::new()),
         }
     }
 
     /// The same on points from outside: what they are, and what is wrong with them.
     #[must_use]
-    pub fn on_points(mut self, origin: String, findings: Vec<Finding>) -> Self {
-        (self.origin, self.findings) = (Some(origin), findings);
+    pub fn on_points(mut self, origin: String, findings: Vec<Finding>, marks: Vec<Mark>) -> Self {
+        (self.origin, self.course.findings, self.marks) = (Some(origin), findings, marks);
         self
     }
 }
 
 impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
-    fn clock(&self) -> Clock {
-        self.fixed.clock(self.step)
+    fn course(&self) -> &Course {
+        &self.course
     }
 
-    fn end(&self) -> Clock {
-        self.fixed.clock(self.fixed.steps)
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
     }
 
     /// 1. Operators, where there are none yet: a row for every point. 2. The problem's step. 3. A look at the numbers.
     fn step(&mut self) -> Result<(), StepError> {
-        let Self { cloud, method, problem, operators, phases, interrupt, fit_diagnostics, coarse, fixed, .. } = self;
-        let (from, to) = (fixed.clock(self.step), fixed.clock(self.step + 1));
+        let Self { cloud, method, problem, operators, course, interrupt, fit_diagnostics, coarse, .. } = self;
+        let (from, to) = (course.clock(), course.next());
+        let phases = &mut course.phases;
         let operators = match operators {
             Some(operators) => operators,
             None => {
@@ -121,66 +119,59 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         problem.step(Tools { cloud, operators, interrupt, phases, from, to })?;
         interrupt.check()?;
         for (field, values) in problem.watched() {
-            if let Some(particle) = values.iter().position(|value| !value.is_finite()) {
-                return Err(StepError::NonFinite { field, particle, step: to.step, time: to.time });
-            }
+            check_finite(field, values, to)?;
         }
-        self.step += 1;
+        course.step += 1;
         Ok(())
     }
 
     fn observables(&self) -> Observables {
         let clock = self.clock();
-        let mut row = vec![("time", clock.time)];
+        let mut row: Observables = vec![(&TIME, clock.time)];
         row.extend(self.problem.observables(&self.cloud, clock));
         row
     }
 
-    fn fields(&self) -> Fields {
+    fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
         let rows = self.cloud.rows;
-        let mut fields = Fields::at(&self.cloud.points[..rows]);
-        for (name, values) in self.problem.columns(self.clock()) {
-            fields.scalar(name, values);
+        let mut fields = Fields::new(&self.cloud.points[..rows], selection);
+        for quantity in self.problem.columns() {
+            fields.scalar(quantity, || self.problem.column(quantity, self.clock()));
         }
-        fields.vector("normal", self.cloud.normals[..rows].iter().copied());
+        fields.vector(&NORMAL, || self.cloud.normals[..rows].iter().copied());
         if !self.cloud.curvatures.is_empty() {
-            fields.scalar("curvature", self.cloud.curvatures.clone());
+            fields.scalar(&CURVATURE, || self.cloud.curvatures.clone());
         }
-        fields.id("particle_id", (0..rows as u64).collect());
+        fields.particle_id();
+        fields.marks.clone_from(&self.marks);
         fields
     }
 
-    fn state(&self) -> State {
-        let Clock { step, time } = self.clock();
-        let mut state = State { step, time, ..State::default() };
-        self.problem.save(&mut state);
-        let (counts, min_pivot) = self.fit_diagnostics.to_numbers();
-        state.push_counts("soundness", counts.to_vec());
-        state.push_counts("coarse", vec![self.coarse]);
-        state.push_reals("least_pivot", &[min_pivot]);
-        state
+    fn save(&self, state: &mut Section) {
+        self.course.save(state);
+        state.put_section("problem", |section| self.problem.save(section));
+        state.put_component("fits", &self.fit_diagnostics);
+        state.put_count("coarse_points", self.coarse);
     }
 
-    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
-        if state.step > self.fixed.steps {
-            return Err(RestoreError::Beyond { step: state.step, last: self.fixed.steps });
-        }
-        let (counts, coarse, pivot) =
-            (state.counts("soundness")?, state.counts("coarse")?, state.reals("least_pivot")?);
-        check_length("soundness", counts.len(), 4)?;
-        check_length("coarse", coarse.len(), 1)?;
-        check_length("least_pivot", pivot.len(), 1)?;
-        self.problem.load(state)?;
-        self.fit_diagnostics = SupportDiagnostics::from_numbers([counts[0], counts[1], counts[2], counts[3]], pivot[0]);
-        self.coarse = coarse[0];
+    fn load(&mut self, state: &Section) -> Result<(), LoadError> {
+        let clock = self.course.check(state)?;
+        let (soundness, coarse) = (state.component("fits")?, state.count("coarse_points")?);
+        state.section("problem", |section| self.problem.load(section))?;
+        // From here on nothing fails.
+        (self.fit_diagnostics, self.coarse) = (soundness, coarse);
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
-        if state.step > 0 {
-            // It was told at the start.
-            self.findings.clear();
+        if clock.step > 0 {
+            // They were told at the start.
+            self.course.findings.clear();
         }
-        self.step = state.step;
+        self.course.step = clock.step;
         Ok(())
+    }
+
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        format_1::translate(arrays, self.problem.translate_format_1(arrays)?)
     }
 
     fn report(&self) -> Report {
@@ -189,14 +180,6 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
             Form::Intrinsic { .. } => "tangent planes".to_owned(),
             Form::Copies { layers, spacing } => format!("{layers} copies to either side, {spacing:.6} apart"),
         };
-        let SupportDiagnostics { enlarged, low_rank, unresolved, failed, min_pivot, .. } = self.fit_diagnostics;
-        let rescued = [
-            ("supports.larger_radius", enlarged),
-            ("supports.low_rank", low_rank),
-            ("supports.unresolved", unresolved),
-            ("supports.coarse", self.coarse),
-            ("rows.failed", failed),
-        ];
         let entries = self.operators.iter().flat_map(|o| &o.rows).map(SparseRows::entries).sum::<usize>();
         let mut method = BTreeMap::from([("operator", format!("degree {degree}, support {radius:.6}, {form}"))]);
         if entries > 0 {
@@ -204,30 +187,22 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         }
         method.extend(self.origin.iter().map(|origin| ("points", origin.clone())));
         self.problem.describe(&mut method);
-        Report {
-            errors: self.problem.errors(&self.cloud, self.clock()),
-            health: self.health(),
-            worst_condition: 1.0 / min_pivot,
-            rescued_fits: rescued.into_iter().filter(|(_, count)| *count > 0).collect(),
-            newton: Newton::default(),
-            method,
-        }
-    }
-
-    fn phases(&self) -> &Phases {
-        &self.phases
+        let mut diagnostics = support_diagnostics(SUPPORTS, &self.fit_diagnostics);
+        let doc = "Points whose curvature is too large for their support.";
+        diagnostics.push(Diagnostic::count("supports.coarse", self.coarse, doc));
+        diagnostics.extend(self.problem.diagnostics());
+        Report { errors: self.problem.errors(&self.cloud, self.clock()), health: self.health(), diagnostics, method }
     }
 
     fn health(&self) -> Health {
         let finite = self.problem.watched().iter().all(|(_, values)| values.iter().all(|value| value.is_finite()));
-        Health { finite, max_cfl: 0.0, volume_drift: None, rescued_fits: self.fit_diagnostics.rescued() }
+        let unmet = (self.course.step > 0).then_some(self.fit_diagnostics.failed as f64);
+        let mut checks = vec![Check::at_most("unmet_moment_conditions", unmet, 0.0, "points")];
+        checks.extend(self.problem.checks(self.course.step));
+        Health { finite, max_cfl: 0.0, volume_drift: None, checks }
     }
 
     fn particle_count(&self) -> usize {
         self.cloud.rows
-    }
-
-    fn take_findings(&mut self) -> Vec<Finding> {
-        std::mem::take(&mut self.findings)
     }
 }

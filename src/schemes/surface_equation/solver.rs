@@ -71,7 +71,8 @@ impl Solver {
         }
     }
 
-    fn stopping(&self) -> Stopping {
+    /// When a solution is good enough.
+    pub(super) fn stopping(&self) -> Stopping {
         match self {
             Self::BiCgStab(stopping) | Self::Gmres { stopping, .. } => *stopping,
             Self::SparseLu => DIRECT,

@@ -1,34 +1,53 @@
 //! What a series shows of two fluids, and what a report makes of it.
 
+use super::quantities;
 use super::system::SphSystem;
 use crate::closest_point::enclosed_moments::{EnclosedMoments, enclosed_moments};
 use crate::geometry::Vector;
 use crate::geometry::domain::Axis;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::Interrupted;
+use crate::simulation::section::known;
+use crate::simulation::{LoadError, Quantity, Section};
 
-/// Numbers of one moment, in the order of [`names`].
+/// Numbers of one state, in the order of [`names`].
 pub(super) type Row = Vec<f64>;
 
-/// The columns of a series behind time and time step.
-pub(super) fn names(dimension: usize) -> Vec<&'static str> {
-    let axes = |three: [&'static str; 3]| three.into_iter().take(dimension);
-    let mut names = vec!["kinetic_energy"];
-    names.extend(axes(["momentum_x", "momentum_y", "momentum_z"]));
-    names.extend(["curvature_mean", "curvature_std", if dimension == 2 { "area" } else { "volume" }]);
-    names.extend(axes(["center_x", "center_y", "center_z"]));
-    names.extend(axes(["extent_x", "extent_y", "extent_z"]));
+/// The quantities of a row: the columns of a series behind time and time step.
+pub(super) fn names(dimension: usize) -> Vec<&'static Quantity> {
+    let axes = |three: [&'static Quantity; 3]| three.into_iter().take(dimension);
+    let mut names = vec![&quantities::KINETIC_ENERGY];
+    names.extend(axes([&quantities::MOMENTUM_X, &quantities::MOMENTUM_Y, &quantities::MOMENTUM_Z]));
+    let measure = if dimension == 2 { &quantities::AREA } else { &quantities::VOLUME };
+    names.extend([&quantities::CURVATURE_MEAN, &quantities::CURVATURE_STD, measure]);
+    names.extend(axes([&quantities::CENTER_X, &quantities::CENTER_Y, &quantities::CENTER_Z]));
+    names.extend(axes([&quantities::EXTENT_X, &quantities::EXTENT_Y, &quantities::EXTENT_Z]));
     names.extend([
-        "deformation",
-        "pressure_inside",
-        "pressure_outside",
-        "pressure_eos_jump",
-        "droplets",
-        "mach",
-        "cfl",
-        "least_pair_distance_h",
+        &quantities::DEFORMATION,
+        &quantities::PRESSURE_INSIDE,
+        &quantities::PRESSURE_OUTSIDE,
+        &quantities::PRESSURE_EOS_JUMP,
+        &quantities::DROPLETS,
+        &quantities::MACH,
+        &quantities::CFL,
+        &quantities::LEAST_PAIR_DISTANCE_H,
     ]);
     names
+}
+
+/// Saves a row by the names of its quantities; what is not known is left open.
+pub(super) fn save_row<const D: usize>(row: &Row, section: &mut Section) {
+    for (quantity, value) in names(D).into_iter().zip(row) {
+        section.put_optional(quantity.name, known(*value));
+    }
+}
+
+/// The row of a state.
+///
+/// # Errors
+/// [`LoadError`] where a number is missing.
+pub(super) fn load_row<const D: usize>(section: &Section) -> Result<Row, LoadError> {
+    names(D).into_iter().map(|quantity| Ok(section.optional(quantity.name)?.unwrap_or(f64::NAN))).collect()
 }
 
 /// Mean and standard deviation.

@@ -1,69 +1,47 @@
 //! Two fluids step by step.
 
 use super::components::ball_curvature;
-use super::monitors::{Row, deformation, names};
+use super::format_1;
+use super::monitors::{Row, deformation, load_row, names, save_row};
+use super::quantities::{DENSITY, MASS, PHASE, PRESSURE, TIME, TIME_STEP, VELOCITY};
 use super::summary::Summary;
 use super::system::{EvaluationError, SphSystem};
 use super::time_step::longest_step;
 use crate::closest_point::FitDiagnostics;
-use crate::geometry::Vector;
 use crate::operators::SupportDiagnostics;
-use crate::schemes::measured_errors::{closest_point_report, rescued};
-use crate::simulation::state::check_length;
+use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, support_diagnostics};
+use crate::simulation::components::{check_particles, load_particles, save_particles};
+use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
+use crate::simulation::fields::{CURVATURE, NORMAL};
+use crate::simulation::section::{copy_vectors, known};
 use crate::simulation::{
-    CpuClock, Fields, Finding, Health, Observables, OutputPlan, Phases, Report, RestoreError, Simulation, State,
-    StepError,
+    Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Report,
+    Section, Selection, Simulation, StepError,
 };
-use crate::time::clock::TIME_SLACK;
-use crate::time::{Clock, FixedStep};
+use crate::time::{Clock, FixedStep, Pace};
 use std::collections::BTreeMap;
 
 /// Two fluids as a simulation.
 pub struct WeaklyCompressibleSph<const D: usize> {
     system: SphSystem<D>,
-    pace: Pace,
     plan: OutputPlan,
-    step: u64,
+    end_time: f64,
     /// Parts that the last step was cut into.
     parts_of_step: u64,
     max_cfl: f64,
-    /// Steps in a row in which nobody was too fast for rest.
+    /// Steps in a row in which no particle was too fast for rest.
     resting: u64,
-    /// What the first evaluation failed with.
+    /// Failure of the first evaluation.
     failure: Option<StepError>,
     row: Row,
     summary: Summary,
-    findings: Vec<Finding>,
-    phases: Phases,
-    method: BTreeMap<&'static str, String>,
+    course: Course,
 }
 
-/// Steps of one length from an origin: where a run began, or where its time step was changed at a restart.
-#[derive(Debug, Clone, Copy)]
-struct Pace {
-    time_step: f64,
-    end_time: f64,
-    origin: Clock,
-    /// The last step.
-    last: u64,
-}
-
-impl Pace {
-    fn new(time_step: f64, end_time: f64, origin: Clock) -> Self {
-        let steps = ((end_time - origin.time) / time_step - TIME_SLACK).ceil().max(0.0) as u64;
-        Self { time_step, end_time, origin, last: origin.step + steps }
-    }
-
-    fn clock(&self, step: u64) -> Clock {
-        let since = step.saturating_sub(self.origin.step) as f64;
-        Clock { step, time: self.origin.time + since * self.time_step }
-    }
-
-    /// For the plan of output, which thinks of equal steps from the start.
-    fn fixed(&self) -> FixedStep {
-        let end = self.clock(self.last);
-        FixedStep { time_step: end.time / end.step.max(1) as f64, steps: end.step }
-    }
+/// Equal steps from the start that end like a run, for the plan of output.
+fn mean_steps(pace: &Pace) -> FixedStep {
+    let end = pace.clock(pace.last);
+    FixedStep { time_step: end.time / end.step.max(1) as f64, steps: end.step }
 }
 
 /// Parts that a step may be cut into.
@@ -92,20 +70,18 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         cpu_clock: CpuClock,
         method: BTreeMap<&'static str, String>,
     ) -> Self {
+        let pace = Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 });
         let mut this = Self {
             failure: None,
             system,
-            pace: Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 }),
             plan,
-            step: 0,
+            end_time,
             parts_of_step: 1,
             max_cfl: 0.0,
             resting: 0,
             row: Row::new(),
-            summary: Summary::default(),
-            findings: Vec::new(),
-            phases: Phases::new(cpu_clock),
-            method,
+            summary: Summary::new(end_time),
+            course: Course::new(pace, Phases::new(cpu_clock), method),
         };
         this.failure = this.begin().err();
         this
@@ -115,14 +91,14 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let start = Clock { step: 0, time: 0.0 };
         // A row of the right length, whatever happens.
         self.row = vec![f64::NAN; names(D).len()];
-        self.system.evaluate(0.0, false, &mut self.phases).map_err(|error| failed(error, start))?;
+        self.system.evaluate(0.0, false, &mut self.course.phases).map_err(|error| failed(error, start))?;
         if self.system.initial_measure.is_nan()
             && let Some(moments) = self.system.moments()?
         {
             // Of a drop that is known by its particles alone, the first quadrature says what is to be kept.
             self.system.initial_measure = moments.area_or_volume;
             self.system.renew_ball_curvatures();
-            self.system.evaluate(0.0, false, &mut self.phases).map_err(|error| failed(error, start))?;
+            self.system.evaluate(0.0, false, &mut self.course.phases).map_err(|error| failed(error, start))?;
         }
         self.summary.droplets = self.system.ball_curvatures.len() as f64;
         self.take_row()
@@ -134,34 +110,35 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
     }
 
     fn time_of_part(&self) -> f64 {
-        self.pace.time_step / self.parts_of_step as f64
+        self.course.pace.time_step / self.parts_of_step as f64
     }
 
     /// Takes a row, and what the summary wants of it.
     fn take_row(&mut self) -> Result<(), StepError> {
         let time_step = self.time_of_part();
         let system = &self.system;
-        let moments = self.phases.measure("measure", || system.moments())?;
-        self.row = self.phases.measure("measure", || system.row(time_step, moments.as_ref()));
-        let Clock { time, .. } = self.clock();
-        let of = |name: &str| names(D).iter().position(|n| *n == name).map_or(f64::NAN, |k| self.row[k]);
+        let moments = self.course.phases.measure("measure", || system.moments())?;
+        self.row = self.course.phases.measure("measure", || system.row(time_step, moments.as_ref()));
+        let Clock { step, time } = self.clock();
+        let of =
+            |name: &str| names(D).iter().position(|quantity| quantity.name == name).map_or(f64::NAN, |k| self.row[k]);
         let jump = of("pressure_inside") - of("pressure_outside");
         let momentum = self.row[1..=D].iter().map(|m| m * m).sum::<f64>().sqrt();
         let numbers = [jump, of("pressure_eos_jump"), of("curvature_mean"), of("curvature_std"), momentum];
         self.summary.take(time >= 0.8 * self.end().time, numbers);
         if let Some(moments) = moments {
             let turned = self.summary.take_shape(time, moments.area_or_volume, deformation(&moments));
-            if let Some((name, message)) = turned {
-                self.findings.push(Finding { name, message, time });
+            if let Some((code, message)) = turned {
+                self.course.findings.push(Finding::info(code, message, (step, time)));
             }
         }
         Ok(())
     }
 
     fn is_row_due(&self, step: u64) -> bool {
-        step >= self.pace.last
-            || self.plan.is_series_due(&self.pace.fixed(), step)
-            || step.is_multiple_of(measurement_interval(self.pace.last))
+        step >= self.course.pace.last
+            || self.plan.is_series_due(&mean_steps(&self.course.pace), step)
+            || step.is_multiple_of(measurement_interval(self.course.pace.last))
     }
 
     /// How many parts a step must be cut into, for the present speed.
@@ -171,37 +148,21 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         }
         let speed = self.system.largest_speed();
         let (limit, _) = longest_step(&self.system.parts, speed);
-        let parts = (self.pace.time_step / limit - 1e-9).ceil().max(1.0);
+        let parts = (self.course.pace.time_step / limit - 1e-9).ceil().max(1.0);
         if parts <= MOST_PARTS {
             return Ok(parts as u64);
         }
-        let (time_step, stable) = (self.pace.time_step, limit);
+        let (time_step, stable) = (self.course.pace.time_step, limit);
         Err(StepError::TimeStepFloor { speed, time_step, stable, step: next.step, time: next.time })
     }
 
     fn check(&mut self, next: Clock) -> Result<(), StepError> {
         let system = &self.system;
-        let of = |field, particle| StepError::NonFinite { field, particle, step: next.step, time: next.time };
-        let broken = |values: &[Vector<D>]| values.iter().position(|v| v.iter().any(|c| !c.is_finite()));
-        if let Some(particle) = broken(&system.velocity) {
-            return Err(of("velocity", particle));
-        }
-        if let Some(particle) = system.density.iter().position(|d| !d.is_finite()) {
-            return Err(of("density", particle));
-        }
-        if let Some((field, particle)) = system.columns.find_broken(&system.particles) {
-            return Err(of(field, particle));
-        }
-        let mut fastest = (0, 0.0);
-        for (i, u) in system.velocity.iter().enumerate() {
-            let square = u.norm_squared();
-            if square > fastest.1 {
-                fastest = (i, square);
-            }
-        }
-        let (particle, speed) = (fastest.0, fastest.1.sqrt());
+        check_finite_vectors("velocity", &system.velocity, next)?;
+        check_finite("density", &system.density, next)?;
+        first_broken(system.columns.find_broken(&system.particles), next)?;
+        let Fastest { particle, speed, sound_speed } = fastest(system);
         self.max_cfl = self.max_cfl.max(speed * self.time_of_part() / system.parts.spacing);
-        let sound_speed = system.parts.fluid(system.phase[particle] == 1).sound_speed;
         if speed > sound_speed {
             // What would have held at the speeds that a sound run has.
             let (stable, bound) = longest_step(&system.parts, super::time_step::REFERENCE_SPEED);
@@ -214,11 +175,31 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             _ => 0,
         };
         if self.resting == STEPS_OF_REST {
-            let message = format!("nobody has been faster than {speed:.3e} for {STEPS_OF_REST} steps");
-            self.findings.push(Finding { name: "came_to_rest", message, time: next.time });
+            let message = format!("no particle has been faster than {speed:.3e} for {STEPS_OF_REST} steps");
+            self.course.findings.push(Finding::info("came_to_rest", message, (next.step, next.time)));
         }
         Ok(())
     }
+}
+
+/// The fastest particle.
+struct Fastest {
+    particle: usize,
+    speed: f64,
+    /// Speed of sound in its fluid.
+    sound_speed: f64,
+}
+
+fn fastest<const D: usize>(system: &SphSystem<D>) -> Fastest {
+    let mut fastest = (0, 0.0);
+    for (i, u) in system.velocity.iter().enumerate() {
+        let square = u.norm_squared();
+        if square > fastest.1 {
+            fastest = (i, square);
+        }
+    }
+    let (particle, speed) = (fastest.0, fastest.1.sqrt());
+    Fastest { particle, speed, sound_speed: system.parts.fluid(system.phase[particle] == 1).sound_speed }
 }
 
 fn failed(error: EvaluationError, at: Clock) -> StepError {
@@ -228,26 +209,17 @@ fn failed(error: EvaluationError, at: Clock) -> StepError {
     }
 }
 
-/// What was counted of the fits of the flow.
-fn fits_of(state: &State) -> Result<SupportDiagnostics, RestoreError> {
-    let (counts, pivot) = (state.counts("flow")?, state.reals("flow_pivot")?);
-    check_length("flow_pivot", pivot.len(), 1)?;
-    let of_length: Result<[u64; 4], _> = counts.try_into();
-    let length = |_| RestoreError::Length { name: "flow".to_owned(), got: counts.len(), expected: 4 };
-    Ok(SupportDiagnostics::from_numbers(of_length.map_err(length)?, pivot[0]))
-}
-
 impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
-    fn clock(&self) -> Clock {
-        self.pace.clock(self.step)
+    fn course(&self) -> &Course {
+        &self.course
     }
 
-    fn end(&self) -> Clock {
-        self.pace.clock(self.pace.last)
+    fn course_mut(&mut self) -> &mut Course {
+        &mut self.course
     }
 
     fn is_finished(&self) -> bool {
-        self.step >= self.pace.last || self.resting >= STEPS_OF_REST
+        self.course.step >= self.course.pace.last || self.resting >= STEPS_OF_REST
     }
 
     /// 1. The parts that the limits ask for. 2. Each part by the integrator. 3. A look at soundness and, where due, a row.
@@ -255,21 +227,23 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
-        let (start, next) = (self.clock(), self.pace.clock(self.step + 1));
+        let (start, next) = (self.clock(), self.course.next());
         self.parts_of_step = self.parts_needed(next)?;
         let part = self.time_of_part();
         for k in 0..self.parts_of_step {
             let time = start.time + k as f64 * part;
-            let changed = self.system.advance(time, part, &mut self.phases).map_err(|error| failed(error, next))?;
+            let changed =
+                self.system.advance(time, part, &mut self.course.phases).map_err(|error| failed(error, next))?;
             if let Some(droplets) = changed {
-                let name = if droplets as f64 > self.summary.droplets { "split" } else { "merged" };
+                let code = if droplets as f64 > self.summary.droplets { "split" } else { "merged" };
                 let message = format!("there are {droplets} droplets now");
-                self.findings.push(Finding { name, message, time: time + part });
+                let finding = Finding::info(code, message, (next.step, time + part));
+                self.course.findings.push(finding.with_count(droplets as u64));
                 self.summary.droplets = droplets as f64;
             }
         }
         self.check(next)?;
-        self.step = next.step;
+        self.course.step = next.step;
         if self.is_row_due(next.step) || self.is_finished() {
             self.take_row()?;
         }
@@ -277,14 +251,14 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn observables(&self) -> Observables {
-        let mut row = vec![("time", self.clock().time), ("time_step", self.time_of_part())];
+        let mut row: Observables = vec![(&TIME, self.clock().time), (&TIME_STEP, self.time_of_part())];
         row.extend(names(D).into_iter().zip(self.row.iter().copied()));
         row
     }
 
-    fn fields(&self) -> Fields {
+    fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
         let system = &self.system;
-        let mut fields = Fields::at(system.particles.positions());
+        let mut fields = Fields::new(system.particles.positions(), selection);
         if system.parts.has_tension() {
             if system.interface.is_some() {
                 fields.surface(&system.particles, &system.columns, true);
@@ -293,198 +267,202 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
                 let known = |i: usize, value: f64| if band[i] == 1 { value } else { f64::NAN };
                 let (normal, curvature) =
                     (system.particles.vector(system.columns.normal), system.particles.scalar(system.columns.curvature));
-                fields.vector("normal", normal.iter().enumerate().map(|(i, n)| n.map(|c| known(i, c))));
-                fields.scalar("curvature", curvature.iter().enumerate().map(|(i, c)| known(i, *c)).collect());
+                fields.vector(&NORMAL, || normal.iter().enumerate().map(|(i, n)| n.map(|c| known(i, c))));
+                fields.scalar(&CURVATURE, || curvature.iter().enumerate().map(|(i, c)| known(i, *c)).collect());
             }
         }
-        fields.vector("velocity", system.velocity.iter().copied());
-        fields.scalar("density", system.density.clone());
+        fields.vector(&VELOCITY, || system.velocity.iter().copied());
+        fields.scalar(&DENSITY, || system.density.clone());
         let pressures = system.pressure.iter().enumerate();
-        fields.scalar("pressure", pressures.map(|(i, p)| p + system.absorbed_pressure(i)).collect());
-        fields.scalar("phase", system.phase.iter().map(|phase| f64::from(*phase)).collect());
+        fields.scalar(&PRESSURE, || pressures.map(|(i, p)| p + system.absorbed_pressure(i)).collect());
+        fields.scalar(&PHASE, || system.phase.iter().map(|phase| f64::from(*phase)).collect());
         if !system.parts.has_one_mass() {
-            fields.scalar("mass", (0..system.phase.len()).map(|i| system.mass(i)).collect());
+            fields.scalar(&MASS, || (0..system.phase.len()).map(|i| system.mass(i)).collect());
         }
-        fields.id("particle_id", (0..system.phase.len() as u64).collect());
+        fields.particle_id();
         fields
     }
 
-    fn state(&self) -> State {
-        let Clock { step, time } = self.clock();
+    fn save(&self, state: &mut Section) {
         let system = &self.system;
-        let mut state = State { step, time, ..State::default() };
-        state.push_particles(&system.particles);
-        state.push_vectors("velocity", &system.velocity);
-        state.push_vectors("acceleration", &system.acceleration);
-        state.push_vectors("reference", &system.reference);
-        state.push_reals("density", &system.density);
-        state.push_reals("density_rate", &system.density_rate);
-        let flags = |values: &[u8]| values.iter().map(|v| u64::from(*v)).collect();
-        state.push_counts("phase", flags(&system.phase));
-        state.push_counts("candidate", flags(&system.candidate));
-        state.push_counts("droplet", flags(&system.droplet));
-        state.push_reals("ball_curvatures", &system.ball_curvatures);
-        let (counts, condition, bounded) = system.interface.as_ref().map_or((Vec::new(), 0.0, 0), |interface| {
-            let fit_diagnostics = interface.surface.fit_diagnostics();
-            let counts = fit_diagnostics.counts.entries().iter().map(|e| e.1).collect();
-            (counts, fit_diagnostics.worst_condition, interface.bounded)
+        self.course.save(state);
+        state.put_section("pace", |section| {
+            section.put_real("time_step", self.course.pace.time_step);
+            section.put_component("origin", &self.course.pace.origin);
+            section.put_count("parts_of_step", self.parts_of_step);
         });
-        state.push_counts("rescues", counts);
-        state.push_counts("counters", vec![self.parts_of_step, self.resting, bounded, system.strays.absorbed]);
-        state.push_reals("monitors", &[self.max_cfl, condition, system.initial_measure]);
-        let Clock { step, time } = self.pace.origin;
-        state.push_counts("origin_step", vec![step]);
-        state.push_reals("origin", &[time, self.pace.time_step]);
-        // What is not known is no number, which a checkpoint's arrays of numbers would not hold: their bits are kept.
-        state.push_counts("row", self.row.iter().map(|v| v.to_bits()).collect());
-        if let Some(flow) = &system.dcpse {
-            let (counts, min_pivot) = flow.fit_diagnostics.to_numbers();
-            state.push_counts("flow", counts.to_vec());
-            state.push_reals("flow_pivot", &[min_pivot]);
+        state.put_section("particles", |section| {
+            save_particles(&system.particles, section);
+            section.put_flags("phase", &system.phase);
+            section.put_vectors("velocity", &system.velocity);
+            section.put_vectors("acceleration", &system.acceleration);
+            section.put_vectors("reference", &system.reference);
+            section.put_reals("density", &system.density);
+            section.put_reals("density_rate", &system.density_rate);
+        });
+        state.put_section("droplets", |section| {
+            section.put_flags("candidate", &system.candidate);
+            section.put_flags("droplet", &system.droplet);
+            section.put_reals("ball_curvatures", &system.ball_curvatures);
+            section.put_optional("initial_measure", known(system.initial_measure));
+        });
+        if let Some(interface) = &system.interface {
+            state.put_component("redistancing", interface.surface.fit_diagnostics());
+            state.put_count("bounded_curvatures", interface.bounded);
         }
-        let summary = self.summary.to_numbers(self.pace.end_time);
-        state.push_counts("summary", summary.iter().map(|v| v.to_bits()).collect());
-        state
+        if let Some(flow) = &system.dcpse {
+            state.put_component("flow_fits", &flow.fit_diagnostics);
+        }
+        state.put_count("absorbed_strays", system.strays.absorbed);
+        state.put_real("max_cfl", self.max_cfl);
+        state.put_count("resting_steps", self.resting);
+        state.put_section("row", |section| save_row::<D>(&self.row, section));
+        state.put_component("summary", &self.summary);
     }
 
-    fn restore(&mut self, state: &State) -> Result<(), RestoreError> {
-        let (origin_step, origin) = (state.counts("origin_step")?, state.reals("origin")?);
-        check_length("origin_step", origin_step.len(), 1)?;
-        check_length("origin", origin.len(), 2)?;
-        let is_same_pace = origin[1].to_bits() == self.pace.time_step.to_bits();
-        let origin = if is_same_pace {
-            Clock { step: origin_step[0], time: origin[0] }
-        } else {
-            Clock { step: state.step, time: state.time }
-        };
-        let pace = Pace::new(self.pace.time_step, self.pace.end_time, origin);
-        if state.step > pace.last {
-            return Err(RestoreError::Beyond { step: state.step, last: pace.last });
+    fn load(&mut self, state: &Section) -> Result<(), LoadError> {
+        // 1. Everything is read, and checked against this scene.
+        let clock: Clock = state.component("clock")?;
+        let (pace, parts_of_step) = state.section("pace", |section| {
+            let (time_step, origin) = (section.real("time_step")?, section.component("origin")?);
+            // Steps of another length begin at the restart.
+            let is_same = time_step.to_bits() == self.course.pace.time_step.to_bits();
+            let pace = Pace::new(self.course.pace.time_step, self.end_time, if is_same { origin } else { clock });
+            Ok((pace, section.count("parts_of_step")?))
+        })?;
+        if clock.step > pace.last {
+            return Err(LoadError::Beyond { step: clock.step, last: pace.last });
         }
-        let count = self.system.phase.len();
-        for name in ["velocity", "acceleration", "reference"] {
-            check_length(name, state.reals(name)?.len(), count * D)?;
-        }
-        check_length("density", state.reals("density")?.len(), count)?;
-        check_length("density_rate", state.reals("density_rate")?.len(), self.system.density_rate.len())?;
-        for name in ["phase", "candidate", "droplet"] {
-            check_length(name, state.counts(name)?.len(), count)?;
-        }
-        let (rescues, counters, monitors) =
-            (state.counts("rescues")?, state.counts("counters")?, state.reals("monitors")?);
-        let entries = self.system.interface.as_ref().map_or(0, |i| i.surface.fit_diagnostics().counts.entries().len());
-        check_length("rescues", rescues.len(), entries)?;
-        check_length("counters", counters.len(), 4)?;
-        check_length("monitors", monitors.len(), 3)?;
-        check_length("row", state.counts("row")?.len(), self.row.len())?;
-        let flow = match &self.system.dcpse {
-            Some(_) => Some(fits_of(state)?),
+        let interface: Option<(FitDiagnostics, u64)> = match &self.system.interface {
+            Some(_) => Some((state.component("redistancing")?, state.count("bounded_curvatures")?)),
             None => None,
         };
-        let numbers = |name| -> Result<Vec<f64>, RestoreError> {
-            Ok(state.counts(name)?.iter().map(|bits| f64::from_bits(*bits)).collect())
+        let flow_fits: Option<SupportDiagnostics> = match &self.system.dcpse {
+            Some(_) => Some(state.component("flow_fits")?),
+            None => None,
         };
-        let (row, summary) = (numbers("row")?, numbers("summary")?);
-        let got = summary.len();
-        let Some(summary) = Summary::from_numbers(&summary, pace.end_time) else {
-            return Err(RestoreError::Length { name: "summary".to_owned(), got, expected: Summary::HEAD });
-        };
-        state.pull_particles(&mut self.system.particles)?;
+        let (absorbed, max_cfl) = (state.count("absorbed_strays")?, state.real("max_cfl")?);
+        let (resting, row) = (state.count("resting_steps")?, state.section("row", load_row::<D>)?);
+        let summary: Summary = state.component("summary")?;
+        state.section("particles", |section| check_columns(&self.system, section))?;
+        state.section("droplets", |section| check_droplets(&self.system, section))?;
+        // 2. From here on nothing fails.
+        state.section("particles", |section| load_columns(&mut self.system, section))?;
+        state.section("droplets", |section| load_droplets(&mut self.system, section))?;
         let system = &mut self.system;
-        let vectors = |name: &str, to: &mut [Vector<D>]| -> Result<(), RestoreError> {
-            for (vector, numbers) in to.iter_mut().zip(state.reals(name)?.chunks_exact(D)) {
-                vector.as_mut_slice().copy_from_slice(numbers);
-            }
-            Ok(())
-        };
-        vectors("velocity", &mut system.velocity)?;
-        vectors("acceleration", &mut system.acceleration)?;
-        vectors("reference", &mut system.reference)?;
-        system.density.copy_from_slice(state.reals("density")?);
-        system.density_rate.copy_from_slice(state.reals("density_rate")?);
-        let flags = |name: &str, to: &mut [u8]| -> Result<(), RestoreError> {
-            for (flag, count) in to.iter_mut().zip(state.counts(name)?) {
-                *flag = (*count).min(255) as u8;
-            }
-            Ok(())
-        };
-        flags("phase", &mut system.phase)?;
-        flags("candidate", &mut system.candidate)?;
-        flags("droplet", &mut system.droplet)?;
-        system.ball_curvatures = state.reals("ball_curvatures")?.to_vec();
-        system.initial_measure = monitors[2];
-        system.strays.absorbed = counters[3];
-        if let Some(interface) = &mut system.interface {
-            let fit_diagnostics = interface.surface.fit_diagnostics_mut();
-            fit_diagnostics.counts.restore(rescues);
-            fit_diagnostics.worst_condition = monitors[1];
-            interface.bounded = counters[2];
+        if let (Some((soundness, bounded)), Some(interface)) = (interface, &mut system.interface) {
+            *interface.surface.fit_diagnostics_mut() = soundness;
+            interface.bounded = bounded;
         }
-        if let (Some(known), Some(flow)) = (flow, &mut system.dcpse) {
-            flow.fit_diagnostics = known;
+        if let (Some(soundness), Some(flow)) = (flow_fits, &mut system.dcpse) {
+            flow.fit_diagnostics = soundness;
         }
+        system.strays.absorbed = absorbed;
         // An interrupt ends the run before its next step.
         let _ = system.derive();
         self.failure = None;
-        self.pace = pace;
-        self.max_cfl = monitors[0];
-        self.parts_of_step = counters[0].max(1);
-        self.resting = counters[1];
-        self.row = row;
-        self.summary = summary;
-        self.findings.clear();
-        self.step = state.step;
+        (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
+        (self.row, self.summary) = (row, summary.with_end(self.end_time));
+        self.course.pace = pace;
+        self.course.findings.clear();
+        self.course.step = clock.step;
         Ok(())
     }
 
-    fn report(&self) -> Report {
-        let nothing = FitDiagnostics::default();
-        let fit_diagnostics =
-            self.system.interface.as_ref().map_or(&nothing, |interface| interface.surface.fit_diagnostics());
-        let whole = self.whole_curvature();
-        let expected = (self.system.parts.tension * whole, whole, self.system.initial_measure);
-        let errors = self.summary.entries(D, self.clock().time, expected);
-        let mut report = closest_point_report(fit_diagnostics, errors, self.health(), self.method.clone());
-        if let Some(interface) = self.system.interface.as_ref().filter(|interface| interface.bounded > 0) {
-            report.newton.rescued.insert("curvature.bounded", interface.bounded);
-        }
-        if let Some(flow) = &self.system.dcpse {
-            let found = &flow.fit_diagnostics;
-            report.worst_condition = report.worst_condition.max(1.0 / found.min_pivot);
-            let counts = [
-                ("flow.larger_radius", found.enlarged),
-                ("flow.low_rank", found.low_rank),
-                ("flow.unresolved", found.unresolved),
-                ("flow.failed", found.failed),
-            ];
-            report.rescued_fits.extend(counts.into_iter().filter(|(_, count)| *count > 0));
-        }
-        if self.system.strays.absorbed > 0 {
-            report.newton.rescued.insert("strays.absorbed", self.system.strays.absorbed);
-        }
-        report
+    fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
+        let has = (self.system.interface.is_some(), self.system.dcpse.is_some());
+        format_1::translate(arrays, &self.system.particles, has)
     }
 
-    fn phases(&self) -> &Phases {
-        &self.phases
+    fn report(&self) -> Report {
+        let whole = self.whole_curvature();
+        let expected = (self.system.parts.tension * whole, whole, self.system.initial_measure);
+        Report {
+            errors: self.summary.entries(D, self.clock().time, expected),
+            health: self.health(),
+            diagnostics: self.diagnostics(),
+            method: self.course.method.clone(),
+        }
     }
 
     fn health(&self) -> Health {
-        let fit_diagnostics = self.system.interface.as_ref().map(|interface| interface.surface.fit_diagnostics());
-        let fits = self.system.dcpse.as_ref().map_or(0, |flow| flow.fit_diagnostics.rescued());
-        Health {
-            finite: self.system.velocity.iter().all(|u| u.iter().all(|c| c.is_finite())),
-            max_cfl: self.max_cfl,
-            volume_drift: self.summary.last_measure().map(|measure| measure / self.system.initial_measure - 1.0),
-            rescued_fits: fits + fit_diagnostics.map_or(0, |fit_diagnostics| rescued(&fit_diagnostics.counts)),
+        let volume_drift = self.summary.last_measure().map(|measure| measure / self.system.initial_measure - 1.0);
+        let Fastest { speed, sound_speed, .. } = fastest(&self.system);
+        let mut checks = vec![Check::at_most("mach", Some(speed / sound_speed), 1.0, "")];
+        if self.system.interface.is_some() {
+            checks.push(Check::watched(if D == 2 { "area_drift" } else { "volume_drift" }, volume_drift, ""));
+            checks.push(Check::watched("absorbed_strays", Some(self.system.strays.absorbed as f64), "particles"));
         }
+        let finite = self.system.velocity.iter().all(is_finite);
+        Health { finite, max_cfl: self.max_cfl, volume_drift, checks }
     }
 
     fn particle_count(&self) -> usize {
         self.system.particles.len()
     }
+}
 
-    fn take_findings(&mut self) -> Vec<Finding> {
-        std::mem::take(&mut self.findings)
+impl<const D: usize> WeaklyCompressibleSph<D> {
+    fn diagnostics(&self) -> Vec<Diagnostic> {
+        let mut diagnostics = Vec::new();
+        if let Some(interface) = &self.system.interface {
+            diagnostics.extend(closest_point_diagnostics(interface.surface.fit_diagnostics()));
+            let doc = "Curvatures that were bounded to what the spacing resolves.";
+            diagnostics.push(Diagnostic::count("curvature.clipped", interface.bounded, doc));
+        }
+        if let Some(flow) = &self.system.dcpse {
+            diagnostics.extend(support_diagnostics(FLOW_FITS, &flow.fit_diagnostics));
+        }
+        let doc = "Particles without a neighbor of their own fluid that took the side of their neighbors.";
+        diagnostics.push(Diagnostic::count("strays.absorbed", self.system.strays.absorbed, doc));
+        diagnostics
+    }
+}
+
+/// Checks the columns of particles against this scene.
+fn check_columns<const D: usize>(system: &SphSystem<D>, section: &Section) -> Result<(), LoadError> {
+    let count = system.phase.len();
+    check_particles(&system.particles, section)?;
+    section.counts_of("phase", count)?;
+    for name in ["velocity", "acceleration", "reference"] {
+        section.reals_of(name, count * D)?;
+    }
+    section.reals_of("density", count)?;
+    section.reals_of("density_rate", system.density_rate.len())?;
+    Ok(())
+}
+
+/// Loads the columns of particles, as they were checked.
+fn load_columns<const D: usize>(system: &mut SphSystem<D>, section: &Section) -> Result<(), LoadError> {
+    load_particles(&mut system.particles, section)?;
+    copy_flags(section.counts("phase")?, &mut system.phase);
+    copy_vectors(section.reals("velocity")?, &mut system.velocity);
+    copy_vectors(section.reals("acceleration")?, &mut system.acceleration);
+    copy_vectors(section.reals("reference")?, &mut system.reference);
+    system.density.copy_from_slice(section.reals("density")?);
+    system.density_rate.copy_from_slice(section.reals("density_rate")?);
+    Ok(())
+}
+
+/// Checks which particle belongs to which droplet.
+fn check_droplets<const D: usize>(system: &SphSystem<D>, section: &Section) -> Result<(), LoadError> {
+    section.counts_of("candidate", system.candidate.len())?;
+    section.counts_of("droplet", system.droplet.len())?;
+    section.reals("ball_curvatures")?;
+    section.optional("initial_measure").map(|_| ())
+}
+
+/// Loads which particle belongs to which droplet, as it was checked.
+fn load_droplets<const D: usize>(system: &mut SphSystem<D>, section: &Section) -> Result<(), LoadError> {
+    copy_flags(section.counts("candidate")?, &mut system.candidate);
+    copy_flags(section.counts("droplet")?, &mut system.droplet);
+    system.ball_curvatures = section.reals("ball_curvatures")?.to_vec();
+    system.initial_measure = section.optional("initial_measure")?.unwrap_or(f64::NAN);
+    Ok(())
+}
+
+fn copy_flags(from: &[u64], to: &mut [u8]) {
+    for (flag, count) in to.iter_mut().zip(from) {
+        *flag = (*count).min(255) as u8;
     }
 }

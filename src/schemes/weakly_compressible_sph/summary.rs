@@ -1,81 +1,205 @@
 //! What a run has come to: means of its late part, extremes, and the turns of its shape.
 
+use super::quantities::{CROSSINGS, EXTREMES, MOST_TURNS};
 use crate::schemes::measured_errors::entry;
-use crate::simulation::ErrorEntry;
+use crate::simulation::section::{check_length, known};
+use crate::simulation::{Component, ErrorEntry, LoadError, Section};
 
-/// Sums and extremes over the measured moments of a run.
+/// Sums and extremes over the measured states of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Summary {
-    /// Sums over the last fifth: count, pressure jump, its part by the equation of state, mean curvature.
-    late: [f64; 4],
-    /// Mean and deviation of the curvature at the last moment, and the least deviation.
-    curvature: [f64; 3],
+    pub late: Late,
+    /// Mean and standard deviation of the curvature in the last measured state; NaN before.
+    pub curvature_mean: f64,
+    pub curvature_std: f64,
+    /// Least standard deviation of the curvature; infinite before the first.
+    pub least_curvature_std: f64,
     /// Largest Σ m u.
-    momentum: f64,
+    pub momentum: f64,
+    /// Connected components of the inner fluid.
     pub droplets: f64,
-    measure: f64,
-    /// The last two moments and deformations.
-    shapes: [[f64; 2]; 2],
-    /// Where the deformation last turned, or began; and the largest since it last passed zero.
-    swing: [f64; 2],
+    /// Enclosed area or volume in the last measured state; NaN before.
+    pub measure: f64,
+    /// The last two measured states.
+    pub before_last: Shape,
+    pub last: Shape,
+    /// Deformation at its last turn, or at the start; NaN before.
+    pub turned_at: f64,
+    /// Largest size of the deformation since it last passed zero.
+    pub largest_since_zero: f64,
     /// Times at which the deformation passed zero.
-    crossings: Vec<f64>,
-    /// Times and values of its extremes.
-    extremes: Vec<[f64; 2]>,
+    pub crossings: Vec<f64>,
+    pub extremes: Vec<Shape>,
 }
 
-impl Default for Summary {
-    fn default() -> Self {
-        Self {
-            late: [0.0; 4],
-            curvature: [f64::NAN, f64::NAN, f64::INFINITY],
-            momentum: 0.0,
-            droplets: 1.0,
-            measure: f64::NAN,
-            shapes: [[f64::NAN; 2]; 2],
-            swing: [f64::NAN, 0.0],
-            crossings: Vec::new(),
-            extremes: Vec::new(),
-        }
-    }
+/// Sums over the last fifth of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Late {
+    /// End of the run that the last fifth is of.
+    pub end_time: f64,
+    pub count: f64,
+    pub pressure_jump: f64,
+    pub pressure_eos_jump: f64,
+    pub curvature: f64,
+}
+
+/// The deformation at a time; NaN where nothing was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Shape {
+    pub time: f64,
+    pub deformation: f64,
+}
+
+impl Shape {
+    const UNKNOWN: Self = Self { time: f64::NAN, deformation: f64::NAN };
 }
 
 /// Swings of the deformation that are more than noise.
 const LEAST_SWING: f64 = 0.01;
-/// Turns of the shape that are kept.
-const MOST_TURNS: usize = 8;
+
+impl Late {
+    fn new(end_time: f64) -> Self {
+        Self { end_time, count: 0.0, pressure_jump: 0.0, pressure_eos_jump: 0.0, curvature: 0.0 }
+    }
+}
+
+impl Component for Late {
+    fn save(&self, section: &mut Section) {
+        section.put_real("end_time", self.end_time);
+        section.put_real("count", self.count);
+        // Sums of what is not known stay unknown.
+        section.put_optional("pressure_jump", known(self.pressure_jump));
+        section.put_optional("pressure_eos_jump", known(self.pressure_eos_jump));
+        section.put_optional("curvature", known(self.curvature));
+    }
+
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        Ok(Self {
+            end_time: section.real("end_time")?,
+            count: section.real("count")?,
+            pressure_jump: section.optional("pressure_jump")?.unwrap_or(f64::NAN),
+            pressure_eos_jump: section.optional("pressure_eos_jump")?.unwrap_or(f64::NAN),
+            curvature: section.optional("curvature")?.unwrap_or(f64::NAN),
+        })
+    }
+}
+
+impl Component for Shape {
+    fn save(&self, section: &mut Section) {
+        section.put_optional("time", known(self.time));
+        section.put_optional("deformation", known(self.deformation));
+    }
+
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        Ok(Self {
+            time: section.optional("time")?.unwrap_or(f64::NAN),
+            deformation: section.optional("deformation")?.unwrap_or(f64::NAN),
+        })
+    }
+}
+
+impl Component for Summary {
+    fn save(&self, section: &mut Section) {
+        section.put_component("late", &self.late);
+        section.put_optional("curvature_mean", known(self.curvature_mean));
+        section.put_optional("curvature_std", known(self.curvature_std));
+        section.put_optional("least_curvature_std", known(self.least_curvature_std));
+        section.put_real("momentum", self.momentum);
+        section.put_real("droplets", self.droplets);
+        section.put_optional("measure", known(self.measure));
+        section.put_component("before_last", &self.before_last);
+        section.put_component("last", &self.last);
+        section.put_optional("turned_at", known(self.turned_at));
+        section.put_real("largest_since_zero", self.largest_since_zero);
+        section.put_reals("crossings", &self.crossings);
+        let extreme = |of: fn(&Shape) -> f64| self.extremes.iter().map(of).collect::<Vec<f64>>();
+        section.put_reals("extreme_times", &extreme(|extreme| extreme.time));
+        section.put_reals("extreme_values", &extreme(|extreme| extreme.deformation));
+    }
+
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        let or_nan = |name: &str| Ok::<f64, LoadError>(section.optional(name)?.unwrap_or(f64::NAN));
+        let crossings = section.reals("crossings")?;
+        check_length("crossings", crossings.len(), crossings.len().min(MOST_TURNS))?;
+        let times = section.reals("extreme_times")?;
+        check_length("extreme_times", times.len(), times.len().min(MOST_TURNS))?;
+        let values = section.reals_of("extreme_values", times.len())?;
+        let extreme = |(time, deformation): (&f64, &f64)| Shape { time: *time, deformation: *deformation };
+        Ok(Self {
+            late: section.component("late")?,
+            curvature_mean: or_nan("curvature_mean")?,
+            curvature_std: or_nan("curvature_std")?,
+            least_curvature_std: section.optional("least_curvature_std")?.unwrap_or(f64::INFINITY),
+            momentum: section.real("momentum")?,
+            droplets: section.real("droplets")?,
+            measure: or_nan("measure")?,
+            before_last: section.component("before_last")?,
+            last: section.component("last")?,
+            turned_at: or_nan("turned_at")?,
+            largest_since_zero: section.real("largest_since_zero")?,
+            crossings: crossings.to_vec(),
+            extremes: times.iter().zip(values).map(extreme).collect(),
+        })
+    }
+}
 
 impl Summary {
-    /// Numbers before the lists.
-    pub const HEAD: usize = 19;
+    /// Nothing measured yet, of a run to an end.
+    pub fn new(end_time: f64) -> Self {
+        Self {
+            late: Late::new(end_time),
+            curvature_mean: f64::NAN,
+            curvature_std: f64::NAN,
+            least_curvature_std: f64::INFINITY,
+            momentum: 0.0,
+            droplets: 1.0,
+            measure: f64::NAN,
+            before_last: Shape::UNKNOWN,
+            last: Shape::UNKNOWN,
+            turned_at: f64::NAN,
+            largest_since_zero: 0.0,
+            crossings: Vec::new(),
+            extremes: Vec::new(),
+        }
+    }
+
+    /// The same for a run to an end; sums for another end are forgotten.
+    pub fn with_end(mut self, end_time: f64) -> Self {
+        if self.late.end_time.to_bits() != end_time.to_bits() {
+            self.late = Late::new(end_time);
+        }
+        self
+    }
 
     /// Takes pressure jump, its part by the equation of state, mean and deviation of the curvature, and |Σ m u|.
     pub fn take(&mut self, is_late: bool, [jump, eos, mean, deviation, momentum]: [f64; 5]) {
         if is_late {
-            for (sum, value) in self.late.iter_mut().zip([1.0, jump, eos, mean]) {
-                *sum += value;
-            }
+            self.late.count += 1.0;
+            self.late.pressure_jump += jump;
+            self.late.pressure_eos_jump += eos;
+            self.late.curvature += mean;
         }
-        self.curvature = [mean, deviation, self.curvature[2].min(deviation)];
+        (self.curvature_mean, self.curvature_std) = (mean, deviation);
+        self.least_curvature_std = self.least_curvature_std.min(deviation);
         self.momentum = self.momentum.max(momentum);
     }
 
-    /// Takes the enclosed measure and the deformation; tells of a turn that has just been passed.
+    /// Takes the enclosed measure and the deformation; code and message of a turn that has just been passed.
     pub fn take_shape(&mut self, time: f64, measure: f64, value: f64) -> Option<(&'static str, String)> {
         self.measure = measure;
-        let [[t0, d0], [t1, d1]] = self.shapes;
+        let (Shape { time: t0, deformation: d0 }, Shape { time: t1, deformation: d1 }) = (self.before_last, self.last);
         if time <= t1 {
             return None;
         }
-        self.shapes = [[t1, d1], [time, value]];
-        if self.swing[0].is_nan() {
-            self.swing[0] = value;
+        (self.before_last, self.last) = (self.last, Shape { time, deformation: value });
+        if self.turned_at.is_nan() {
+            self.turned_at = value;
         }
-        self.swing[1] = self.swing[1].max(value.abs());
+        self.largest_since_zero = self.largest_since_zero.max(value.abs());
         let mut found = None;
-        if d1 * value < 0.0 && self.swing[1] > LEAST_SWING && self.crossings.len() < MOST_TURNS {
+        if d1 * value < 0.0 && self.largest_since_zero > LEAST_SWING && self.crossings.len() < MOST_TURNS {
             self.crossings.push(t1 + (time - t1) * d1 / (d1 - value));
-            self.swing[1] = 0.0;
+            self.largest_since_zero = 0.0;
         }
         if (d1 - d0) * (value - d1) < 0.0 && self.extremes.len() < MOST_TURNS {
             // The vertex of the parabola through the three.
@@ -83,11 +207,11 @@ impl Summary {
             let bend = (b - a) / (time - t0);
             let vertex = 0.5 * (t0 + t1) - 0.5 * a / bend;
             let height = d1 + (vertex - t1) * (a + bend * (vertex - t0));
-            if (height - self.swing[0]).abs() < LEAST_SWING {
+            if (height - self.turned_at).abs() < LEAST_SWING {
                 return None;
             }
-            self.swing[0] = height;
-            self.extremes.push([vertex, height]);
+            self.turned_at = height;
+            self.extremes.push(Shape { time: vertex, deformation: height });
             let is_first = self.extremes.len() == 1;
             let message = format!("the deformation turned at {height:.4}, time {vertex:.4}");
             found = Some((if is_first { "largest_elongation" } else { "turned" }, message));
@@ -96,41 +220,7 @@ impl Summary {
     }
 
     pub fn last_measure(&self) -> Option<f64> {
-        Some(self.measure).filter(|measure| measure.is_finite())
-    }
-
-    pub fn to_numbers(&self, end: f64) -> Vec<f64> {
-        let mut numbers = vec![end];
-        numbers.extend(self.late);
-        numbers.extend(self.curvature);
-        numbers.extend([self.momentum, self.droplets, self.measure]);
-        numbers.extend(self.shapes.as_flattened());
-        numbers.extend(self.swing);
-        numbers.extend([self.crossings.len() as f64, self.extremes.len() as f64]);
-        numbers.extend(&self.crossings);
-        numbers.extend(self.extremes.as_flattened());
-        numbers
-    }
-
-    /// None where the numbers are none of a summary. What was summed for another end is forgotten.
-    pub fn from_numbers(numbers: &[f64], end: f64) -> Option<Self> {
-        let (head, lists) = numbers.split_at_checked(Self::HEAD)?;
-        let (crossings, extremes) = (head[17] as usize, head[18] as usize);
-        if lists.len() != crossings + 2 * extremes {
-            return None;
-        }
-        let is_same_end = head[0].to_bits() == end.to_bits();
-        Some(Self {
-            late: if is_same_end { [head[1], head[2], head[3], head[4]] } else { [0.0; 4] },
-            curvature: [head[5], head[6], head[7]],
-            momentum: head[8],
-            droplets: head[9],
-            measure: head[10],
-            shapes: [[head[11], head[12]], [head[13], head[14]]],
-            swing: [head[15], head[16]],
-            crossings: lists[..crossings].to_vec(),
-            extremes: lists[crossings..].as_chunks::<2>().0.to_vec(),
-        })
+        known(self.measure)
     }
 
     /// Report entries; `expected` is the pressure jump, curvature and measure of one ball at rest.
@@ -142,7 +232,8 @@ impl Summary {
                 entries.push(entry(quantity, norm, value, time, reference));
             }
         };
-        let [count, jumps, eos, means] = self.late.map(|sum| sum / self.late[0]);
+        let Late { count: all, pressure_jump, pressure_eos_jump, curvature: curvatures, .. } = self.late;
+        let [count, jumps, eos, means] = [all, pressure_jump, pressure_eos_jump, curvatures].map(|sum| sum / all);
         if count.is_finite() && self.droplets < 1.5 {
             let late = "Young–Laplace, mean of the last fifth";
             add("pressure_jump", "relative", (jumps / jump - 1.0).abs(), time, late);
@@ -150,51 +241,60 @@ impl Summary {
             add("pressure_eos_jump", "relative", (eos / jump).abs(), time, late);
             add("curvature", "mean_error", (means - curvature).abs(), time, "ball of the initial measure");
         }
-        add("curvature", "mean", self.curvature[0], time, "over the band");
-        add("curvature", "std", self.curvature[1], time, "over the band");
-        add("curvature", "std_least", self.curvature[2], time, "over the band, least of the run");
+        add("curvature", "mean", self.curvature_mean, time, "over the band");
+        add("curvature", "std", self.curvature_std, time, "over the band");
+        add("curvature", "std_least", self.least_curvature_std, time, "over the band, least of the run");
         let name = if dimension == 2 { "area" } else { "volume" };
         add(name, "relative", (self.measure / measure - 1.0).abs(), time, "conservation");
         if self.droplets < 1.5 {
             let power = if dimension == 2 { -0.5 } else { -1.0 / 3.0 };
             let of_measure = curvature * (self.measure / measure).powf(power);
-            add("curvature", "of_measure", (self.curvature[0] / of_measure - 1.0).abs(), time, "ball of the measure");
+            add("curvature", "of_measure", (self.curvature_mean / of_measure - 1.0).abs(), time, "ball of the measure");
         }
         add("momentum", "max", self.momentum, time, "conservation");
         add("droplets", "count", self.droplets, time, "connected components");
         for (k, crossing) in self.crossings.iter().enumerate() {
-            add("deformation", CROSSINGS[k], *crossing, *crossing, "time of the passage");
+            add("deformation", CROSSINGS[k].name, *crossing, *crossing, "time of the passage");
         }
-        for (k, [at, value]) in self.extremes.iter().enumerate() {
-            add("deformation", EXTREMES[k], *value, *at, "value of the extreme");
-            add("deformation_time", EXTREMES[k], *at, *at, "time of the extreme");
+        for (k, Shape { time: at, deformation: value }) in self.extremes.iter().enumerate() {
+            add("deformation", EXTREMES[k].name, *value, *at, "value of the extreme");
+            add("deformation_time", EXTREMES[k].name, *at, *at, "time of the extreme");
         }
         entries
     }
 }
 
-const CROSSINGS: [&str; MOST_TURNS] = ["zero_1", "zero_2", "zero_3", "zero_4", "zero_5", "zero_6", "zero_7", "zero_8"];
-const EXTREMES: [&str; MOST_TURNS] =
-    ["extreme_1", "extreme_2", "extreme_3", "extreme_4", "extreme_5", "extreme_6", "extreme_7", "extreme_8"];
-
 #[cfg(test)]
 mod tests {
-    use super::Summary;
+    use super::{Component, Section, Summary};
 
     #[test]
     fn turns_of_a_cosine_are_found_and_survive_a_round_trip() {
-        let mut summary = Summary::default();
+        let mut summary = Summary::new(1.0);
         for k in 0..=400 {
             let time = f64::from(k) * 0.0025;
             summary.take_shape(time, 1.0, (20.0 * time).cos());
         }
         assert!((summary.crossings[0] - std::f64::consts::PI / 40.0).abs() < 1e-5);
-        assert!((summary.extremes[0][0] - std::f64::consts::PI / 20.0).abs() < 1e-5);
-        assert!((summary.extremes[0][1] + 1.0).abs() < 1e-5);
-        let numbers = summary.to_numbers(1.0);
-        let again = Summary::from_numbers(&numbers, 1.0).unwrap();
-        assert_eq!(again.to_numbers(1.0).len(), numbers.len());
-        assert_eq!(again.extremes, summary.extremes);
-        assert!(Summary::from_numbers(&numbers[..numbers.len() - 1], 1.0).is_none());
+        assert!((summary.extremes[0].time - std::f64::consts::PI / 20.0).abs() < 1e-5);
+        assert!((summary.extremes[0].deformation + 1.0).abs() < 1e-5);
+        summary.take(true, [1.0, 2.0, 3.0, 4.0, 5.0]);
+        let mut section = Section::default();
+        summary.save(&mut section);
+        assert_eq!(section.find_non_finite(), None);
+        let again = Summary::load(&section).unwrap();
+        assert_eq!(again, summary);
+        assert_eq!(again.clone().with_end(1.0), summary);
+        assert_eq!(again.with_end(2.0).late.count.to_bits(), 0_f64.to_bits(), "sums for another end are forgotten");
+        section.put_reals("extreme_values", &[0.0]);
+        assert!(Summary::load(&section).is_err());
+    }
+
+    #[test]
+    fn a_summary_of_nothing_survives_a_round_trip() {
+        let mut section = Section::default();
+        Summary::new(1.0).save(&mut section);
+        let again = Summary::load(&section).unwrap();
+        assert!(again.measure.is_nan() && again.last.time.is_nan() && again.least_curvature_std.is_infinite());
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::common::{Expected, checkpoint_files};
 use crate::support::{Service, chance, eventually, long_job, steady_job};
-use meniscus::simulation::State;
+use meniscus::simulation::Section;
 use meniscus_jobs::formats::checkpoint::{Counters, meta, read, write_verified};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -63,12 +63,19 @@ pub fn kills_between_operations(count: u64, seed: u64) -> String {
     format!("{fired} ends between operations at {} places, all data identical", PLACES.len())
 }
 
-fn sample(directory: &Path) -> (std::path::PathBuf, String, State) {
-    let mut state = State { step: 7, time: 0.7, ..State::default() };
+fn sample(directory: &Path) -> (std::path::PathBuf, String, Section) {
+    let mut state = Section::default();
     let numbers: Vec<f64> = (0..3000).map(|k| f64::from(k).sin()).collect();
-    state.push_reals("position", &numbers);
-    state.push_reals("phi", &numbers[..1000]);
-    state.push_counts("rescues", (0..100).collect());
+    state.put_section("clock", |clock| {
+        clock.put_count("step", 7);
+        clock.put_real("time", 0.7);
+    });
+    state.put_section("particles", |particles| {
+        particles.put_reals("position", &numbers);
+        particles.put_reals("phi", &numbers[..1000]);
+    });
+    state.put_counts("rescues", 0..100);
+    state.put_optional("vanished_at", None);
     let path = directory.join("sample.h5");
     let body: Value = json!({"scene": {"kind": "redistance"}});
     let (sha256, _) = write_verified(&path, meta("job", &body, 7, 0.7, Counters::default()), &state).unwrap();
@@ -136,9 +143,9 @@ pub fn fall_back(count: u64, seed: u64) -> String {
         std::fs::write(&file, bytes).unwrap();
         service.act(&id, "resume");
         let job = service.wait_for(&id, &["succeeded"]);
-        let warnings = job["health"]["warnings"].as_array().unwrap();
+        let warnings = job["warnings"].as_array().unwrap();
         assert_eq!(warnings.len(), 1, "{warnings:?}");
-        assert!(warnings[0].as_str().unwrap().contains("passed over"));
+        assert!(warnings[0]["message"].as_str().unwrap().contains("passed over"));
         expected.check(&service, &id);
     }
     format!("{count} damaged newest checkpoints passed over for the one before, all data identical")

@@ -90,7 +90,7 @@ pub fn full_disk(count: u64, seed: u64) -> String {
         let other = (answer.status == 201).then(|| answer.json()["id"].as_str().unwrap().to_owned());
         disk.relieve();
         let job = service.wait_for(&id, &["succeeded"]);
-        assert_eq!(job["health"]["warnings"], json!([]));
+        assert_eq!(job["warnings"], json!([]));
         expected.check(&service, &id);
         if let Some(other) = other {
             service.wait_for(&other, &["succeeded"]);

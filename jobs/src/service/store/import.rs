@@ -4,10 +4,13 @@
 use super::{Store, StoreError, calibration, events, rows};
 use crate::spec::attempt_files::{self, attempt_directory};
 use crate::spec::forecast::measured;
+use crate::spec::health::{Finding, FindingLog, HealthStatus, Severity};
 use crate::spec::records::{self, CheckpointRecord, FileRecord, Line, Progress, Record, Usage, Verdict};
+use crate::spec::report::{Results, RunReport};
 use crate::spec::run_options::RunOptions;
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 /// Least time between two progress events of a job.
@@ -181,23 +184,32 @@ impl Store {
     /// Keeps the errors and the cost of a finished run in its row, so that tables of thousands open no file.
     fn keep_results(&self, transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
         let directory = attempt_directory(&self.job_directory(of.job), of.epoch);
-        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(directory.join(attempt_files::REPORT))?)?;
-        let results = json!({"errors": report["errors"], "cost": report["cost"]});
+        let RunReport { errors, cost, .. } =
+            serde_json::from_slice(&std::fs::read(directory.join(attempt_files::REPORT))?)?;
         // Runs that began in the middle or were cut off tell nothing about whole ones.
         if let Some(row) =
             rows::job(transaction, of.job)?.filter(|row| row.attempt == 1 && row.restarted_from.is_none())
         {
             let threads = RunOptions::from_resolved(&row.resolved)?.limits.threads;
-            calibration::add(transaction, &measured(&row.forecast, &report["cost"], threads))?;
+            calibration::add(transaction, &measured(&row.forecast, &cost, threads))?;
         }
-        transaction.execute("UPDATE jobs SET results = ?2 WHERE id = ?1", params![of.job, results.to_string()])?;
+        transaction.execute(
+            "UPDATE jobs SET results = ?2 WHERE id = ?1",
+            params![of.job, serde_json::to_string(&Results { errors, cost })?],
+        )?;
         Ok(())
     }
 
     fn take(&self, transaction: &Transaction, of: &Attempt, record: &Record) -> Result<(), StoreError> {
         let job = of.job;
         match record {
-            Record::Started { frames, step, .. } => take_start(transaction, job, *frames, *step)?,
+            Record::Started { frames, step, from_checkpoint, .. } => {
+                take_start(transaction, job, *frames, *step)?;
+                // Findings of steps that are to come again are void, too.
+                change_findings(transaction, job, |log| {
+                    if *from_checkpoint { log.truncate(*step) } else { *log = FindingLog::default() }
+                })?;
+            }
             Record::File(file) => {
                 take_file(transaction, of, file)?;
                 if file.path == attempt_files::REPORT {
@@ -205,24 +217,48 @@ impl Store {
                 }
             }
             Record::Warning { code, message } => {
-                let warnings: String =
-                    transaction.query_row("SELECT warnings FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
-                let mut warnings: Vec<String> = serde_json::from_str(&warnings)?;
-                warnings.push(message.clone());
+                let Some(row) = rows::job(transaction, job)? else { return Ok(()) };
+                let (step, time) = (row.progress.step, row.progress.time);
+                let mut warnings = row.warnings;
+                warnings.push(Finding {
+                    code: Cow::Owned(code.clone()),
+                    ..Finding::warning("", message.clone(), (step, time))
+                });
                 transaction.execute(
                     "UPDATE jobs SET warnings = ?2, progress_count = progress_count + 1 WHERE id = ?1",
                     params![job, serde_json::to_string(&warnings)?],
                 )?;
                 of.append_event(transaction, "warning", &json!({"code": code, "message": message}))?;
             }
-            Record::Finding { name, message, time } => {
-                let data = json!({"name": name, "message": message, "time": time});
-                of.append_event(transaction, "finding", &data)?;
+            Record::Finding(finding) => {
+                change_findings(transaction, job, |log| log.push(finding.clone()))?;
+                if finding.severity == Severity::Warning {
+                    let doubtful = HealthStatus::Doubtful.word();
+                    transaction.execute("UPDATE jobs SET health = ?2 WHERE id = ?1", params![job, doubtful])?;
+                }
+                of.append_event(transaction, "finding", &serde_json::to_value(finding)?)?;
             }
             Record::Progress(_) | Record::Checkpoint(_) | Record::Verdict(_) => {}
         }
         Ok(())
     }
+}
+
+/// Changes the findings that a job keeps.
+fn change_findings(
+    transaction: &Transaction,
+    job: &str,
+    change: impl FnOnce(&mut FindingLog),
+) -> Result<(), StoreError> {
+    let text: String =
+        transaction.query_row("SELECT findings FROM jobs WHERE id = ?1", [job], |row| row.get("findings"))?;
+    let mut log = FindingLog::new(serde_json::from_str(&text)?);
+    change(&mut log);
+    transaction.execute(
+        "UPDATE jobs SET findings = ?2, progress_count = progress_count + 1 WHERE id = ?1",
+        params![job, serde_json::to_string(log.findings())?],
+    )?;
+    Ok(())
 }
 
 /// Takes the start of an attempt from a checkpoint: what was published after the checkpoint is void until it comes again.
@@ -328,8 +364,15 @@ fn take_progress(
     let mut shown = progress.clone();
     shown.fraction = shown.fraction.max(before);
     transaction
-        .prepare_cached("UPDATE jobs SET progress = ?2, usage = ?3, progress_count = progress_count + 1 WHERE id = ?1")?
-        .execute(params![job, serde_json::to_string(&shown)?, serde_json::to_string(&progress.usage)?])?;
+        .prepare_cached(
+            "UPDATE jobs SET progress = ?2, usage = ?3, health = ?4, progress_count = progress_count + 1 WHERE id = ?1",
+        )?
+        .execute(params![
+            job,
+            serde_json::to_string(&shown)?,
+            serde_json::to_string(&progress.usage)?,
+            progress.health.status.map(HealthStatus::word),
+        ])?;
     if is_event {
         append_progress(transaction, of, &shown)?;
     }

@@ -1,6 +1,7 @@
 //! Lists of jobs: filters, order, and pages that inserts never shift.
 
 use super::{JobRow, Store, StoreError, rows};
+use crate::spec::health::HealthStatus;
 use crate::spec::states::State;
 use rusqlite::params_from_iter;
 use rusqlite::types::Value as SqlValue;
@@ -16,6 +17,8 @@ pub struct JobFilter {
     pub study: Option<String>,
     /// With this name.
     pub name: Option<String>,
+    /// With this health.
+    pub health: Option<HealthStatus>,
     /// With all these labels.
     pub labels: Vec<(String, String)>,
     /// Made after.
@@ -59,6 +62,9 @@ impl Store {
             if let Some(value) = value {
                 add(condition, value.clone(), &mut conditions);
             }
+        }
+        if let Some(health) = filter.health {
+            conditions.push(format!("health = '{}'", health.word()));
         }
         for (key, value) in &filter.labels {
             add("EXISTS (SELECT 1 FROM json_each(jobs.labels) WHERE key = ?", key.clone(), &mut conditions);

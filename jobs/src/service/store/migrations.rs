@@ -172,6 +172,11 @@ const MIGRATIONS: &[&str] = &[
     ALTER TABLE jobs DROP COLUMN worker_pid;
     ALTER TABLE jobs RENAME COLUMN condemned TO kill_reason;
 ",
+    "
+    ALTER TABLE jobs ADD COLUMN findings TEXT NOT NULL DEFAULT '[]';
+    ALTER TABLE jobs ADD COLUMN health TEXT;
+    CREATE INDEX jobs_by_health ON jobs (health, id) WHERE health = 'doubtful';
+",
 ];
 
 /// Makes the changes that are missing, each in a transaction of its own.

@@ -3,10 +3,13 @@
 use super::StoreError;
 use crate::formats::frame_index;
 use crate::spec::forecast::ForecastRecord;
+use crate::spec::health::{Finding, HealthStatus};
 use crate::spec::records::{Progress, Usage, Verdict};
+use crate::spec::report::Results;
 use crate::spec::states::{Reason, State};
 use crate::system::digest;
 use rusqlite::{Connection, OptionalExtension, Row};
+use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -63,8 +66,12 @@ pub struct JobRow {
     pub progress: Progress,
     /// Counts changes of progress.
     pub progress_count: i64,
-    /// Warnings.
-    pub warnings: Vec<String>,
+    /// What was known before it ran, and remarks of the service.
+    pub warnings: Vec<Finding>,
+    /// What its run noticed.
+    pub findings: Vec<Finding>,
+    /// Whether its results can be trusted; none before the first look.
+    pub health: Option<HealthStatus>,
     /// Cost so far, over all attempts.
     pub usage: Usage,
     /// Running time at the last resume.
@@ -80,7 +87,7 @@ pub struct JobRow {
     /// Job that it repeats.
     pub retry_of: Option<String>,
     /// Errors and cost, once it has succeeded.
-    pub results: Option<Value>,
+    pub results: Option<Results>,
 }
 
 impl JobRow {
@@ -151,6 +158,23 @@ pub(super) fn json<T: serde::de::DeserializeOwned + Default>(row: &Row, column: 
     )
 }
 
+/// A remark of the service; version 0.1 kept the message alone.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Remark {
+    Whole(Finding),
+    Message(String),
+}
+
+impl From<Remark> for Finding {
+    fn from(remark: Remark) -> Self {
+        match remark {
+            Remark::Whole(finding) => finding,
+            Remark::Message(message) => Self::warning("service", message, (0, 0.0)),
+        }
+    }
+}
+
 pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
     let state: String = row.get("state")?;
     let reason: Option<String> = row.get("reason")?;
@@ -180,7 +204,9 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         kill_reason: row.get::<_, Option<String>>("kill_reason")?.as_deref().and_then(Reason::from_word),
         progress: json(row, "progress")?,
         progress_count: row.get("progress_count")?,
-        warnings: json(row, "warnings")?,
+        warnings: json::<Vec<Remark>>(row, "warnings")?.into_iter().map(Finding::from).collect(),
+        findings: json(row, "findings")?,
+        health: row.get::<_, Option<String>>("health")?.as_deref().and_then(HealthStatus::from_word),
         usage: json(row, "usage")?,
         leg_wall_s: row.get("leg_wall_s")?,
         restarted_from: row.get("restarted_from")?,

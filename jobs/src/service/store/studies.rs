@@ -5,11 +5,13 @@ use super::submission::{NewJob, insert};
 use super::transitions::apply;
 use super::{Change, ChangeError, Store, StoreError, remove_directory, rows};
 use crate::spec::forecast::ForecastRecord;
+use crate::spec::health::HealthStatus;
 use crate::spec::records::{Progress, Usage};
+use crate::spec::report::Results;
 use crate::spec::states::{Reason, State, Trigger};
 use crate::spec::study::Study;
 use rusqlite::{Connection, OptionalExtension, Row, params};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
 /// A study.
@@ -94,8 +96,10 @@ pub struct PointRow {
     pub particles: u64,
     /// Steps done.
     pub steps: u64,
+    /// Whether its results can be trusted; none before the first look.
+    pub health: Option<HealthStatus>,
     /// Errors by `QUANTITY.NORM`, each at its latest time; None before the end.
-    pub errors: Option<Map<String, Value>>,
+    pub errors: Option<BTreeMap<String, f64>>,
 }
 
 /// Jobs changed in one transaction: between two of them others get their turn.
@@ -226,7 +230,7 @@ impl Store {
             let many = (limit - points.len() as u64).min(CHUNK as u64);
             let connection = self.read();
             let mut statement = connection.prepare_cached(
-                "SELECT study_index, id, state, reason, spec, resolved, usage, progress, estimate, results FROM jobs
+                "SELECT study_index, id, state, reason, spec, resolved, usage, progress, estimate, results, health FROM jobs
                  WHERE study = ?1 AND superseded = 0 AND study_index > ?2 ORDER BY study_index LIMIT ?3",
             )?;
             let rows = statement.query_map(params![study.id, after, many as i64], |row| point_of(row, &study.axes))?;
@@ -370,11 +374,12 @@ fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
     let progress: Progress = rows::json(row, "progress")?;
     let usage: Usage = rows::json(row, "usage")?;
     let (spec, resolved): (Value, Value) = (rows::json(row, "spec")?, rows::json(row, "resolved")?);
-    let value_at = |pointer: &str| {
-        let sent = spec.pointer(pointer).filter(|value| !value.is_null());
-        sent.or_else(|| resolved.pointer(pointer)).cloned().unwrap_or(Value::Null)
+    let value_at = |axis: &str| {
+        // Axes are JSON pointers of the client's.
+        let sent = Value::pointer(&spec, axis).filter(|value| !value.is_null());
+        sent.or_else(|| Value::pointer(&resolved, axis)).cloned().unwrap_or(Value::Null)
     };
-    let results: Option<Value> = rows::json(row, "results")?;
+    let results: Option<Results> = rows::json(row, "results")?;
     Ok(PointRow {
         index: row.get::<_, i64>("study_index")? as u64,
         job: row.get("id")?,
@@ -385,15 +390,12 @@ fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
         spent: [usage.cpu_s, usage.wall_s],
         particles: if progress.particles > 0 { progress.particles } else { forecast.particles },
         steps: progress.step,
-        errors: results.map(|results| errors_of(&results)),
+        health: row.get::<_, Option<String>>("health")?.as_deref().and_then(HealthStatus::from_word),
+        errors: results.map(errors_of),
     })
 }
 
 /// Errors come in the order of their times: the latest stays.
-fn errors_of(results: &Value) -> Map<String, Value> {
-    let word = |error: &Value, name: &str| error[name].as_str().unwrap_or_default().to_owned();
-    let listed = results["errors"].as_array().into_iter().flatten();
-    listed
-        .map(|error| (format!("{}.{}", word(error, "quantity"), word(error, "norm")), error["value"].clone()))
-        .collect()
+fn errors_of(results: Results) -> BTreeMap<String, f64> {
+    results.errors.into_iter().map(|error| (format!("{}.{}", error.quantity, error.norm), error.value)).collect()
 }

@@ -4,7 +4,7 @@ use crate::formats::checkpoint::{self, CheckpointError, Counters};
 use crate::spec::attempt_files;
 use crate::spec::records::CheckpointRecord;
 use crate::system::build;
-use meniscus::simulation::Simulation;
+use meniscus::simulation::{Simulation, state_of};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -57,7 +57,7 @@ impl Checkpoints {
         std::fs::create_dir_all(&folder)?;
         let name = format!("{:012}.{}", clock.step, attempt_files::CHECKPOINT_ENDING);
         let meta = checkpoint::meta(&self.job, &self.body, clock.step, clock.time, counters);
-        let (sha256, size_bytes) = checkpoint::write_verified(&folder.join(&name), meta, &simulation.state())?;
+        let (sha256, size_bytes) = checkpoint::write_verified(&folder.join(&name), meta, &state_of(simulation))?;
         self.last = Instant::now();
         self.last_step = Some(clock.step);
         Ok(CheckpointRecord {

@@ -6,7 +6,7 @@ use crate::spec::records::FileRecord;
 use crate::system::artifacts;
 use crate::system::digest;
 use meniscus::simulation::run::ObserverError;
-use meniscus::simulation::{OutputPlan, Simulation};
+use meniscus::simulation::{OutputPlan, Selection, Simulation};
 use meniscus::time::FixedStep;
 use std::path::PathBuf;
 
@@ -65,7 +65,8 @@ impl Frames {
         };
         let path = self.directory.join(&name);
         std::fs::create_dir_all(self.directory.join(attempt_files::FRAMES))?;
-        vtkhdf::write_frame(&artifacts::unfinished(&path), &simulation.fields(), &self.chosen, clock.time, clock.step)?;
+        let fields = simulation.fields(Selection::Named(&self.chosen));
+        vtkhdf::write_frame(&artifacts::unfinished(&path), &fields, clock.time, clock.step)?;
         artifacts::finish(&path)?;
         let (sha256, size_bytes) = digest::of_file(&path)?;
         let frame = FileRecord {

@@ -1,7 +1,8 @@
 //! How far a run is, how fast it goes, what it costs.
 
 use crate::spec::calibration::TimeForecast;
-use crate::spec::records::{HealthRecord, Progress, Usage};
+use crate::spec::health::FindingLog;
+use crate::spec::records::{Progress, Usage};
 use crate::system::process;
 use meniscus::scenes::work_estimate::REST;
 use meniscus::simulation::Simulation;
@@ -129,7 +130,7 @@ impl ProgressMeter {
     }
 
     /// A record of the present state, at most every 0.4 s unless it `must` be made.
-    pub fn observe(&mut self, simulation: &dyn Simulation, must: bool) -> Option<Progress> {
+    pub fn observe(&mut self, simulation: &dyn Simulation, findings: &FindingLog, must: bool) -> Option<Progress> {
         let clock = simulation.clock();
         if self.first_step.is_none() {
             self.first_step = Some(clock.step);
@@ -149,7 +150,6 @@ impl ProgressMeter {
             Some(_) => self.time_left(simulation, done, left, seconds),
             None => (None, None),
         };
-        let health = simulation.health();
         Some(Progress {
             fraction: clock.step as f64 / end.step.max(1) as f64,
             time: clock.time,
@@ -160,12 +160,7 @@ impl ProgressMeter {
             phase: if simulation.is_finished() { "finishing" } else { "stepping" }.to_owned(),
             eta_s,
             eta_basis,
-            health: HealthRecord {
-                finite: health.finite,
-                max_cfl: health.max_cfl,
-                volume_drift: health.volume_drift,
-                rescued_fits: health.rescued_fits,
-            },
+            health: findings.health(simulation.health()),
             usage: self.usage(),
         })
     }

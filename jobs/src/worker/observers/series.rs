@@ -71,7 +71,8 @@ impl Series {
         if !is_first && !self.plan.is_series_due(&fixed_step(simulation), simulation.clock().step) {
             return Ok(());
         }
-        let (names, values): (Vec<&str>, Vec<f64>) = simulation.observables().into_iter().unzip();
+        let (names, values): (Vec<&str>, Vec<f64>) =
+            simulation.observables().into_iter().map(|(quantity, value)| (quantity.name, value)).unzip();
         let mut text = if is_first { csv::header(&names) } else { String::new() };
         text += &csv::row(&values);
         // One write, so that a reader sees whole rows.

@@ -1,0 +1,115 @@
+//! What frames, series and reports of two fluids show.
+
+use super::parts::{Geometry, SphParts};
+use crate::schemes::measured_errors;
+use crate::simulation::Quantity;
+use crate::simulation::fields::{COMMON_FIELDS, CURVATURE, NORMAL, SURFACE_FIELDS};
+use crate::simulation::quantity::{quantities, without_repetition};
+
+quantities! {
+    /// Scalars of the series.
+    pub OBSERVABLES {
+        TIME = "time", "time", "Scene time.";
+        TIME_STEP = "time_step", "time", "Length of the parts that the last step was made of.";
+        KINETIC_ENERGY = "kinetic_energy", "mass*length^2/time^2", "Sum of m u^2/2 over all particles.";
+        MOMENTUM_X = "momentum_x", "mass*length/time", "Sum of m u over all particles, along x.";
+        MOMENTUM_Y = "momentum_y", "mass*length/time", "Sum of m u over all particles, along y.";
+        MOMENTUM_Z = "momentum_z", "mass*length/time", "Sum of m u over all particles, along z.";
+        CURVATURE_MEAN = "curvature_mean", "1/length", "Mean curvature over the particles that feel surface tension.";
+        CURVATURE_STD = "curvature_std", "1/length", "Standard deviation of the curvature over the same particles.";
+        AREA = "area", "length^2", "Area of the inner fluid, by quadrature on the fits.";
+        VOLUME = "volume", "length^3", "Volume of the inner fluid, by quadrature on the fits.";
+        CENTER_X = "center_x", "length", "Centroid of the inner fluid, along x.";
+        CENTER_Y = "center_y", "length", "Centroid of the inner fluid, along y.";
+        CENTER_Z = "center_z", "length", "Centroid of the inner fluid, along z.";
+        EXTENT_X = "extent_x", "length", "Extent of the inner fluid, along x.";
+        EXTENT_Y = "extent_y", "length", "Extent of the inner fluid, along y.";
+        EXTENT_Z = "extent_z", "length", "Extent of the inner fluid, along z.";
+        DEFORMATION = "deformation", "", "(Qxx - Qyy)/(Qxx + Qyy) of the central second moments.";
+        PRESSURE_INSIDE = "pressure_inside", "mass/(length*time^2)", "Mean pressure well inside the inner fluid.";
+        PRESSURE_OUTSIDE = "pressure_outside", "mass/(length*time^2)", "Mean pressure well outside the inner fluid.";
+        PRESSURE_EOS_JUMP = "pressure_eos_jump", "mass/(length*time^2)", "Jump of the pressure by the equation of state alone.";
+        DROPLETS = "droplets", "", "Connected components of the inner fluid.";
+        MACH = "mach", "", "Largest speed by the lower speed of sound.";
+        CFL = "cfl", "spacings", "Longest way of a particle in a part of the last step.";
+        LEAST_PAIR_DISTANCE_H = "least_pair_distance_h", "spacings", "Least distance of two particles.";
+    }
+}
+
+quantities! {
+    /// Fields of frames that only this scheme has.
+    pub OWN_FIELDS {
+        VELOCITY = "velocity", "length/time", "Velocity of the particle.";
+        DENSITY = "density", "mass/length^D", "Density.";
+        PRESSURE = "pressure", "mass/(length*time^2)", "Pressure, with the part of surface tension that it balances.";
+        PHASE = "phase", "", "Fluid of the particle: 1 inside, 0 outside.";
+        MASS = "mass", "mass", "Mass of the particle.";
+    }
+}
+
+quantities! {
+    /// Norms of the report that only this scheme has.
+    pub OWN_NORMS {
+        MEAN_ERROR = "mean_error", "of the quantity", "Difference of the mean of the last fifth of the run from the reference.";
+        STD = "std", "of the quantity", "Standard deviation over the band.";
+        STD_LEAST = "std_least", "of the quantity", "Least standard deviation over the band in the run.";
+        OF_MEASURE = "of_measure", "", "Relative difference from the curvature of a ball of the present area or volume.";
+        COUNT = "count", "", "Number of items, no error.";
+        ZERO_1 = "zero_1", "time", "First time at which the quantity passed zero.";
+        ZERO_2 = "zero_2", "time", "Second time at which the quantity passed zero.";
+        ZERO_3 = "zero_3", "time", "Third time at which the quantity passed zero.";
+        ZERO_4 = "zero_4", "time", "Fourth time at which the quantity passed zero.";
+        ZERO_5 = "zero_5", "time", "Fifth time at which the quantity passed zero.";
+        ZERO_6 = "zero_6", "time", "Sixth time at which the quantity passed zero.";
+        ZERO_7 = "zero_7", "time", "Seventh time at which the quantity passed zero.";
+        ZERO_8 = "zero_8", "time", "Eighth time at which the quantity passed zero.";
+        EXTREME_1 = "extreme_1", "of the quantity", "First extreme of the quantity.";
+        EXTREME_2 = "extreme_2", "of the quantity", "Second extreme of the quantity.";
+        EXTREME_3 = "extreme_3", "of the quantity", "Third extreme of the quantity.";
+        EXTREME_4 = "extreme_4", "of the quantity", "Fourth extreme of the quantity.";
+        EXTREME_5 = "extreme_5", "of the quantity", "Fifth extreme of the quantity.";
+        EXTREME_6 = "extreme_6", "of the quantity", "Sixth extreme of the quantity.";
+        EXTREME_7 = "extreme_7", "of the quantity", "Seventh extreme of the quantity.";
+        EXTREME_8 = "extreme_8", "of the quantity", "Eighth extreme of the quantity.";
+    }
+}
+
+/// Turns of the deformation that a report shows.
+pub const MOST_TURNS: usize = 8;
+/// Norms of the times at which the deformation passed zero.
+pub(super) static CROSSINGS: [&Quantity; MOST_TURNS] =
+    [&ZERO_1, &ZERO_2, &ZERO_3, &ZERO_4, &ZERO_5, &ZERO_6, &ZERO_7, &ZERO_8];
+/// Norms of the extremes of the deformation.
+pub(super) static EXTREMES: [&Quantity; MOST_TURNS] =
+    [&EXTREME_1, &EXTREME_2, &EXTREME_3, &EXTREME_4, &EXTREME_5, &EXTREME_6, &EXTREME_7, &EXTREME_8];
+
+/// Norms of the report.
+#[must_use]
+pub fn norms() -> Vec<&'static Quantity> {
+    let shared: &[&Quantity] = &[&measured_errors::MAX, &measured_errors::MEAN, &measured_errors::RELATIVE];
+    without_repetition(&[shared, OWN_NORMS])
+}
+
+/// Every field that frames of this scheme may show.
+#[must_use]
+pub fn all_fields() -> Vec<&'static Quantity> {
+    without_repetition(&[SURFACE_FIELDS, OWN_FIELDS, COMMON_FIELDS])
+}
+
+/// Fields of frames.
+#[must_use]
+pub fn fields<const D: usize>(parts: &SphParts<D>) -> Vec<&'static Quantity> {
+    let mut fields: Vec<&'static Quantity> = Vec::new();
+    if parts.has_tension() {
+        match parts.geometry {
+            Geometry::Pcp { .. } => fields.extend(SURFACE_FIELDS),
+            Geometry::ColorField => fields.extend([&NORMAL, &CURVATURE]),
+        }
+    }
+    fields.extend([&VELOCITY, &DENSITY, &PRESSURE, &PHASE]);
+    if !parts.has_one_mass() {
+        fields.push(&MASS);
+    }
+    fields.extend(COMMON_FIELDS);
+    fields
+}
