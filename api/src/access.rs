@@ -9,7 +9,7 @@ use std::path::Path;
 /// Permission that a token carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Scope {
-    /// Read everything.
+    /// Read all objects and files.
     Read,
     /// Create jobs, studies, uploads and estimates.
     Submit,

@@ -27,7 +27,7 @@ impl Creation {
     /// creation from the client's budget if nothing was created under the key before.
     ///
     /// # Errors
-    /// [`ApiError`].
+    /// [`ApiError`] for a wrong key, an unreadable or too large body, an exhausted budget, or a failing store.
     pub async fn receive(state: &AppState, request: Request, limit: usize) -> Result<Self, ApiError> {
         let (parts, body) = request.into_parts();
         let client = parts.extensions.get::<Client>().cloned().unwrap_or_default();

@@ -24,7 +24,7 @@ pub struct FileFacts {
 /// Answers with a file, or with the part of it that the headers of the request ask for.
 ///
 /// # Errors
-/// [`ApiError`].
+/// [`ApiError::NotFound`] without the file, [`ApiError::RangeNotSatisfiable`], or a failing disk.
 pub async fn file_response(path: &Path, facts: &FileFacts, headers: &HeaderMap) -> Result<Response, ApiError> {
     let mut file = match tokio::fs::File::open(path).await {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -51,7 +51,7 @@ pub async fn file_response(path: &Path, facts: &FileFacts, headers: &HeaderMap) 
 /// Answers with bytes in memory, or with the part of them that the headers of the request ask for.
 ///
 /// # Errors
-/// [`ApiError`].
+/// [`ApiError::RangeNotSatisfiable`].
 pub fn bytes_response(bytes: &[u8], facts: &FileFacts, headers: &HeaderMap) -> Result<Response, ApiError> {
     let size = bytes.len() as u64;
     match part_of(facts, headers, size)? {

@@ -114,7 +114,7 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
         return Err(RunError::NotEmpty(out.display().to_string()));
     }
     let out = std::fs::canonicalize(out)?;
-    let order = AttemptSpec {
+    let attempt_spec = AttemptSpec {
         job: "foreground".to_owned(),
         epoch: 1,
         body: resolved.to_json(),
@@ -128,7 +128,7 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
     };
     let keep = resolved.options.checkpoint.keep as usize;
     let mut sink = Screen::new(out.clone(), keep);
-    let verdict = attempt::run_attempt(&order, &out, &Control::default(), &mut sink);
+    let verdict = attempt::run_attempt(&attempt_spec, &out, &Control::default(), &mut sink);
     sink.bar.finish_and_clear();
     let mut output = io::stdout().lock();
     match verdict {

@@ -72,7 +72,8 @@ pub fn link_next(response: &mut Response, uri: &Uri, cursor: &str) {
 
 #[cfg(test)]
 mod tests {
-    use super::{PageSize, link_next};
+    use super::{PageQuery, PageSize, link_next};
+    use crate::query;
     use axum::http::Uri;
     use axum::response::Response;
 
@@ -83,6 +84,17 @@ mod tests {
         link_next(&mut response, &uri, "job_2");
         let expected = "</v1/jobs?state=running&name=a%20b&limit=2&cursor=job_2>; rel=\"next\"";
         assert_eq!(response.headers()["link"], expected);
+    }
+
+    #[test]
+    fn a_size_out_of_range_is_refused_with_its_name() {
+        let read = |text: &str| query::parse::<PageQuery>(vec![("limit".to_owned(), text.to_owned())]);
+        assert_eq!(read("500").unwrap().limit, PageSize(500));
+        for (text, code) in [("501", "range"), ("0", "range"), ("x", "type")] {
+            let errors = read(text).unwrap_err();
+            assert_eq!((errors[0].pointer.as_str(), errors[0].code.as_str(), errors.len()), ("limit", code, 1));
+            assert_eq!(errors[0].got, text);
+        }
     }
 
     #[test]

@@ -26,10 +26,10 @@ pub enum ServeError {
     /// The data directory is in use.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// The store failed.
+    /// The store cannot be opened.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The system failed.
+    /// A call of the operating system failed, such as binding the address.
     #[error("{0}")]
     Io(#[from] io::Error),
 }

@@ -23,12 +23,7 @@ impl<'a> StoreSources<'a> {
     ///
     /// # Errors
     /// All that is wrong with the body, or a failing store.
-    pub fn understand(
-        &self,
-        spec: &Value,
-        allowance: Allowance,
-        calibration: &Calibration,
-    ) -> Result<JobBody, ApiError> {
+    pub fn resolve(&self, spec: &Value, allowance: Allowance, calibration: &Calibration) -> Result<JobBody, ApiError> {
         let mut body = body::parse(spec, allowance, self)?;
         body.forecast.time_by(calibration);
         Ok(body)

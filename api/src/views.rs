@@ -6,7 +6,7 @@ macro_rules! list {
         $(#[$doc])*
         #[derive(Debug, Serialize, ToSchema)]
         pub struct $name {
-            /// The entries.
+            /// Entries of the page.
             pub items: Vec<$item>,
             #[doc = $next]
             pub next: Option<String>,
@@ -34,7 +34,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// A job.
+/// A job: one simulation with its state, its progress and links to its results.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct JobView {
     /// `job_` and a ULID.
@@ -163,13 +163,13 @@ pub struct EventView {
 /// A page of events.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct EventList {
-    /// The events.
+    /// Events in the order of their numbers.
     pub items: Vec<EventView>,
     /// Value of `after` for the next page.
     pub next: Option<u64>,
 }
 
-/// A published file.
+/// A file that a job has published.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct FileView {
     /// Path below `/v1/jobs/{id}/files/`.
@@ -191,7 +191,7 @@ list! {
     FileList of FileView, next: "Always null: the list is whole."
 }
 
-/// A verified checkpoint.
+/// A checkpoint that was verified after it was written.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct CheckpointView {
     /// `ckpt_` and a ULID.
@@ -226,7 +226,7 @@ list! {
 pub struct ServiceView {
     /// Always `meniscus`.
     pub name: &'static str,
-    /// Version and commit.
+    /// Version and commit of the program.
     pub build: String,
     /// Instruction set of the numerics.
     pub isa: String,

@@ -126,7 +126,7 @@ fn other_requests_get_problems_too() {
 #[test]
 fn all_errors_of_a_query_come_at_once() {
     let (_directory, service) = service(&[]);
-    let query = "stat=queued&state=queued,asleep&limit=501&created_after=yesterday&sort=created&label.a=1";
+    let query = "stat=queued&state=queued,asleep&limit=501&created_after=yesterday&sort=create_at&label.a=1";
     let answer = service.get(&format!("/v1/jobs?{query}"));
     assert_eq!(answer.status, 422, "{}", answer.text());
     assert_eq!(answer.pointers(), ["stat", "state", "limit", "created_after", "sort"]);

@@ -79,7 +79,10 @@ impl<'de> MapAccess<'de> for Fields<'_> {
     }
 
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
-        seed.deserialize(Texts(std::mem::take(&mut self.value)))
+        let texts = Texts(std::mem::take(&mut self.value));
+        let last = texts.last();
+        // A type may refuse a value after it has read the text.
+        seed.deserialize(texts).map_err(|refusal| last.refuse(refusal))
     }
 }
 
@@ -169,7 +172,8 @@ impl<'de> SeqAccess<'de> for Pieces<'_> {
     type Error = Refusal;
 
     fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, Refusal> {
-        self.0.next().map(|entry| seed.deserialize(Texts(vec![entry]))).transpose()
+        let read = |entry: Entry| seed.deserialize(Texts(vec![entry])).map_err(|refusal| entry.refuse(refusal));
+        self.0.next().map(read).transpose()
     }
 }
 
@@ -191,6 +195,6 @@ impl<'de> MapAccess<'de> for Keys<'_> {
 
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Refusal> {
         let entry = self.value.take().ok_or_else(|| Refusal::invalid_type(Unexpected::Map, &"a value for each key"))?;
-        seed.deserialize(Texts(vec![entry]))
+        seed.deserialize(Texts(vec![entry])).map_err(|refusal| entry.refuse(refusal))
     }
 }

@@ -19,7 +19,7 @@ use meniscus_jobs::spec::states::State as JobState;
 #[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 200, body = CheckpointList), (status = 404, body = Problem)))]
 pub async fn list(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<CheckpointList>, ApiError> {
-    let views = of_job(&state, id).await?.into_iter().map(CheckpointView::from).collect();
+    let views = checkpoints_of(&state, id).await?.into_iter().map(CheckpointView::from).collect();
     Ok(Json(CheckpointList::from((views, None))))
 }
 
@@ -40,13 +40,13 @@ pub async fn request(State(state): State<AppState>, Path(id): Path<String>) -> R
 #[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints/latest/content", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 307), (status = 404, body = Problem)))]
 pub async fn latest(State(state): State<AppState>, Path(id): Path<String>) -> Result<Redirect, ApiError> {
-    let rows = of_job(&state, id).await?;
+    let rows = checkpoints_of(&state, id).await?;
     let newest = rows.first().ok_or(ApiError::NotFound("checkpoint"))?;
     Ok(Redirect::temporary(&format!("/v1/checkpoints/{}/content", newest.id)))
 }
 
 /// The checkpoints of a job, newest first.
-async fn of_job(state: &AppState, id: String) -> Result<Vec<CheckpointRow>, ApiError> {
+async fn checkpoints_of(state: &AppState, id: String) -> Result<Vec<CheckpointRow>, ApiError> {
     let job = resource::find::<JobRow>(state, id).await?;
     state.with_store(move |store| Ok(store.checkpoints(&job.id)?)).await
 }

@@ -25,7 +25,7 @@ pub async fn estimate(
     let allowance = state.config.allowance();
     let estimated = state.with_store(move |store| {
         let spec = request_body::parse_json(&bytes)?;
-        let body = StoreSources::new(store).understand(&spec, allowance, &store.calibration()?)?;
+        let body = StoreSources::new(store).resolve(&spec, allowance, &store.calibration()?)?;
         Ok::<_, ApiError>(Json(EstimateView::from(body)))
     });
     estimated.await

@@ -23,12 +23,12 @@ use tokio_stream::wrappers::ReceiverStream;
 #[utoipa::path(get, path = "/v1/jobs/{id}/files", tag = "files", params(("id" = String, Path)),
     responses((status = 200, body = FileList), (status = 404, body = Problem)))]
 pub async fn list(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<FileList>, ApiError> {
-    let views = of_job(&state, &id).await?.into_iter().map(FileView::from).collect();
+    let views = files_of(&state, &id).await?.into_iter().map(FileView::from).collect();
     Ok(Json(FileList::from((views, None))))
 }
 
 /// All published files of a job in the order of their paths.
-async fn of_job(state: &AppState, id: &str) -> Result<Vec<FileRow>, ApiError> {
+async fn files_of(state: &AppState, id: &str) -> Result<Vec<FileRow>, ApiError> {
     let job = resource::find::<JobRow>(state, id.to_owned()).await?;
     state.with_store(move |store| Ok(store.files(&job.id)?)).await
 }
@@ -70,7 +70,7 @@ pub async fn get(
 #[utoipa::path(get, path = "/v1/jobs/{id}/files.tar", tag = "files", params(("id" = String, Path)),
     responses((status = 200, content_type = "application/x-tar"), (status = 404, body = Problem)))]
 pub async fn tar(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    let files = of_job(&state, &id).await?;
+    let files = files_of(&state, &id).await?;
     let places: Vec<(FileRow, PathBuf)> = files.into_iter().map(|f| (f.clone(), location(&state, &id, &f))).collect();
     // A slow reader occupies a thread, so the number of archives is limited.
     let permit = Arc::clone(&state.archives).try_acquire_owned().map_err(|_| ApiError::Busy)?;

@@ -43,7 +43,7 @@ pub async fn submit(State(state): State<AppState>, request: Request) -> Result<R
         if let Some(made) = creation.known.take() {
             return creation.respond(made);
         }
-        let body = StoreSources::new(store).understand(&spec, here.config.allowance(), &store.calibration()?)?;
+        let body = StoreSources::new(store).resolve(&spec, here.config.allowance(), &store.calibration()?)?;
         check_capacity(&here, store, 1, body.forecast.disk_bytes)?;
         let answer = |row: JobRow| {
             stored_response(StatusCode::CREATED, Some(format!("/v1/jobs/{}", row.id)), &JobView::from(row))
@@ -205,7 +205,7 @@ pub(super) async fn page(state: &AppState, uri: &Uri, query: JobQuery) -> Result
 
 impl JobQuery {
     /// The same query, of the jobs of one study.
-    pub(super) fn of_study(self, study: &str) -> Self {
+    pub(super) fn with_study(self, study: &str) -> Self {
         Self { study: Some(study.to_owned()), ..self }
     }
 }

@@ -28,7 +28,7 @@ pub struct LogQuery {
 }
 
 /// The content of a file of every attempt in order. Attempts without the file are left out.
-fn of_attempts(store: &Store, row: &JobRow, name: &str) -> Vec<Vec<u8>> {
+fn read_attempts(store: &Store, row: &JobRow, name: &str) -> Vec<Vec<u8>> {
     let directory = store.job_directory(&row.id);
     (1..=row.attempt).filter_map(|n| std::fs::read(attempt_directory(&directory, n).join(name)).ok()).collect()
 }
@@ -44,7 +44,7 @@ pub async fn log(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let row = resource::find::<JobRow>(&state, id.clone()).await?;
-    let read = move |store: &Store| Ok::<_, ApiError>(of_attempts(store, &row, attempt_files::LOG).concat());
+    let read = move |store: &Store| Ok::<_, ApiError>(read_attempts(store, &row, attempt_files::LOG).concat());
     let text = state.with_store(read).await?;
     let text = match query.tail {
         None => text,

@@ -134,7 +134,7 @@ pub async fn jobs_of(
     QueryParameters(query): QueryParameters<JobQuery>,
 ) -> Result<Response, ApiError> {
     let row = resource::find::<StudyRow>(&state, id).await?;
-    jobs::page(&state, &uri, query.of_study(&row.id)).await
+    jobs::page(&state, &uri, query.with_study(&row.id)).await
 }
 
 /// Which rows of a table.
@@ -276,7 +276,7 @@ fn new_jobs(state: &AppState, store: &Store, study: &StudyRow) -> Result<Vec<New
             continue;
         }
         let Some(old) = store.job(&point.job)? else { continue };
-        let body = sources.understand(&old.spec, state.config.allowance(), &calibration)?;
+        let body = sources.resolve(&old.spec, state.config.allowance(), &calibration)?;
         let mut job = NewJob::from_body(&body);
         job.study = Some((study.id.clone(), point.index));
         job.retry_of = Some(point.job);

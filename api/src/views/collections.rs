@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// A study.
+/// A study: one body and a sweep of its values, run as one job for each point.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct StudyView {
     /// `std_` and a ULID.
@@ -57,7 +57,7 @@ pub struct DryRunView {
     pub estimate: Value,
 }
 
-/// An upload.
+/// A file that a client uploaded.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct UploadView {
     /// `upl_` and a ULID.
