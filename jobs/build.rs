@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/validation/cases");
+    let root = variable("CARGO_MANIFEST_DIR")?.join("../tests/validation/cases");
     println!("cargo:rerun-if-changed={}", root.display());
     let mut files = Vec::new();
     collect(&root, &mut files)?;
@@ -19,8 +19,13 @@ fn main() -> io::Result<()> {
             writeln!(text, "    ({:?}, include_str!({:?})),", name.display().to_string(), file.display().to_string());
     }
     text.push_str("];\n");
-    let target = env::var_os("OUT_DIR").ok_or_else(|| io::Error::other("cargo sets OUT_DIR"))?;
-    fs::write(PathBuf::from(target).join("verification_cases.rs"), text)
+    fs::write(variable("OUT_DIR")?.join("verification_cases.rs"), text)
+}
+
+/// A path that cargo hands to build scripts. At run time, so that a script built in another folder serves this one too.
+fn variable(name: &str) -> io::Result<PathBuf> {
+    let value = env::var_os(name).ok_or_else(|| io::Error::other(format!("cargo sets {name}")))?;
+    Ok(PathBuf::from(value))
 }
 
 fn collect(directory: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
