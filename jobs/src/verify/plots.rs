@@ -82,9 +82,8 @@ impl Workspace {
     fn history(&self, scene: &Value, column: &str) -> Result<Vec<(f64, f64)>, String> {
         let directory = self.run(&json!({"scene": scene}), Keep::Report)?;
         let text = fs::read_to_string(directory.join(attempt_files::SERIES)).map_err(|error| error.to_string())?;
-        let rows = csv::to_json(&text)["rows"].take();
-        let number = |row: &Value, name: &str| row[name].as_f64().unwrap_or(f64::NAN);
-        Ok(rows.as_array().into_iter().flatten().map(|row| (number(row, "time"), number(row, column))).collect())
+        let table = csv::Table::from_text(&text);
+        Ok(table.column("time").zip(table.column(column)).collect())
     }
 
     /// A field of the last frame of a run over the signed distance.
