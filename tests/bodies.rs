@@ -79,9 +79,8 @@ fn are_found(before: &BTreeSet<Place>, now: &BTreeSet<Place>) -> bool {
     let is_known = |pointer: &str, code: &str| now.iter().any(|(p, c, _)| p == pointer && c == code);
     before.iter().all(|place| {
         let (pointer, code, _) = place;
-        let is_changed = |(p, c, new_p, new_c): &(&str, &str, &str, &str)| {
-            p == pointer && c == code && is_known(new_p, new_c)
-        };
+        let is_changed =
+            |(p, c, new_p, new_c): &(&str, &str, &str, &str)| p == pointer && c == code && is_known(new_p, new_c);
         // A shape of points without a source was told twice: as required, and as of the wrong type.
         let is_told_once = code == "type" && is_known(pointer, "required");
         now.contains(place) || CHANGED.iter().any(is_changed) || is_told_once
