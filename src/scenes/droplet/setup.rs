@@ -13,10 +13,10 @@ use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{BuildContext, Estimate, Scene, Understood, Violation};
 use crate::scenes::{pcp_parameters, shapes, work_estimate};
-use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, longest_step};
+use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    BodyForce, DensityMethod, Discretization, Drop, Fluid, Geometry, Integrator, SphParts, SphSystem, TensionForce,
-    WeaklyCompressibleSph, measurement_interval,
+    BodyForce, DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, SphConfig, SphSystem,
+    TensionForce, WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Simulation};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
@@ -29,7 +29,7 @@ struct DropletScene<const D: usize> {
     low: Vector<D>,
     high: Vector<D>,
     sides: [usize; D],
-    parts: SphParts<D>,
+    config: SphConfig<D>,
     time_step: f64,
     steps: u64,
     end_time: f64,
@@ -171,12 +171,11 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         let detail = "steps are given instead of a time step; give one of them";
         violations.push(Violation::new("/time_step", "conflict", detail, &json!(step), Value::Null));
     }
-    let parts = SphParts {
+    let config = SphConfig {
         spacing: h,
         smoothing_length: smoothing_h * h,
         kernel: flow.kernel,
-        inside: fluid(&written.fluids.inside),
-        outside: fluid(&written.fluids.outside),
+        fluids: Fluids { inside: fluid(&written.fluids.inside), outside: fluid(&written.fluids.outside) },
         tension: written.surface_tension.unwrap_or(case.tension),
         tension_force: if written.tension_force == "csf" { TensionForce::Csf } else { TensionForce::Balanced },
         geometry: geometry.unwrap_or(Geometry::ColorField),
@@ -191,7 +190,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         is_adaptive: given_step.is_none() && written.steps.is_none(),
         rest_below: written.stop_when.map(|Stop::AtRest { velocity }| velocity),
     };
-    let (limit, bound) = longest_step(&parts, REFERENCE_SPEED);
+    let StepLimit { length: limit, cause: bound } = longest_step(&config, REFERENCE_SPEED);
     let time_step = match (given_step, written.steps) {
         (Some(step), _) => step,
         (None, Some(steps)) => written.end_time / steps as f64,
@@ -206,7 +205,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
     }
     let domain = domain_of(&low, &lengths);
     if violations.is_empty()
-        && let Err(error) = Pencils::<D>::new(&domain, parts.reach())
+        && let Err(error) = Pencils::<D>::new(&domain, config.cutoff())
     {
         violations.push(Violation::new("/domain", "range", error.to_string(), &resolved["domain"], json!(error.least)));
     }
@@ -214,7 +213,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         return Err(violations);
     }
     let mut chosen = BTreeMap::new();
-    if parts.is_adaptive {
+    if config.is_adaptive {
         let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {REFERENCE_SPEED}");
         chosen.insert("time_step", why);
     }
@@ -222,7 +221,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         ("dimension", json!(D)),
         ("shape", shape.clone()),
         ("domain", json!({"low": corners.low, "high": corners.high})),
-        ("surface_tension", json!(parts.tension)),
+        ("surface_tension", json!(config.tension)),
         ("discretization", flow.full),
         ("density_method", flow.full_density),
         ("shifting", json!(shifting)),
@@ -239,7 +238,7 @@ fn scene<const D: usize>(written: &Written, mut resolved: Value) -> Understood {
         low,
         high,
         sides,
-        parts,
+        config,
         time_step,
         steps: steps as u64,
         end_time: written.end_time,
@@ -263,8 +262,8 @@ fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Domain<D> 
 impl<const D: usize> DropletScene<D> {
     /// Work of the forces: sums over pairs, or fits.
     fn momentum_work(&self, pairs: f64, particles: f64) -> f64 {
-        let Discretization::Dcpse(support) = self.parts.discretization else { return pairs };
-        let cutoff = support.radius / self.parts.spacing;
+        let Discretization::Dcpse(support) = self.config.discretization else { return pairs };
+        let cutoff = support.radius / self.config.spacing;
         let nodes = if D == 2 { 3.1 } else { 4.2 } * cutoff.powi(D as i32);
         let terms = term_count::<D>(support.degree) as f64;
         particles * nodes * (40.0 + 0.25 * terms * terms)
@@ -323,16 +322,16 @@ impl<const D: usize> DropletScene<D> {
     /// Signed distances from the surface of points that came from elsewhere.
     fn levels_of_points(&self, context: &BuildContext, positions: &[Vector<D>]) -> Result<Vec<f64>, Violation> {
         let (points, level) = cloud::points_with_levels::<D>(&context.clouds, "/shape")?;
-        if let Some(found) = cloud::check_spacing(&points, self.parts.spacing) {
+        if let Some(found) = cloud::check_spacing(&points, self.config.spacing) {
             return Err(found);
         }
         let domain = domain_of(&self.low, &self.lengths());
         let points: Vec<Vector<D>> = points.iter().map(|x| domain.wrap(*x)).collect();
-        let method = match &self.parts.geometry {
+        let method = match &self.config.geometry {
             Geometry::Pcp { method, .. } => method.clone(),
             Geometry::ColorField => pcp_parameters::defaults(D, RATIO)?,
         };
-        let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.parts.spacing)));
+        let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.config.spacing)));
         let never = Interrupt::default();
         let fitted =
             surface.detect(&points, &level, &never).and_then(|()| surface.fit_samples(&points, &level, None, &never));
@@ -355,14 +354,14 @@ impl<const D: usize> Scene for DropletScene<D> {
 
     fn field_names(&self) -> Vec<&'static str> {
         let mut names = Vec::new();
-        if self.parts.has_tension() {
-            match self.parts.geometry {
+        if self.config.has_tension() {
+            match self.config.geometry {
                 Geometry::Pcp { .. } => names.extend(["phi", "closest_point", "normal", "curvature"]),
                 Geometry::ColorField => names.extend(["normal", "curvature"]),
             }
         }
         names.extend(["velocity", "density", "pressure", "phase"]);
-        if !self.parts.has_one_mass() {
+        if !self.config.fluids.have_one_mass() {
             names.push("mass");
         }
         names.push("particle_id");
@@ -387,19 +386,19 @@ impl<const D: usize> Scene for DropletScene<D> {
     }
 
     fn family(&self) -> String {
-        let geometry = match &self.parts.geometry {
+        let geometry = match &self.config.geometry {
             Geometry::Pcp { method, .. } => work_estimate::method_name(method),
             Geometry::ColorField => "colorfield".to_owned(),
         };
-        let flow = if let Discretization::Dcpse(_) = self.parts.discretization { "/dcpse" } else { "" };
+        let flow = if let Discretization::Dcpse(_) = self.config.discretization { "/dcpse" } else { "" };
         format!("droplet/{D}/{geometry}{flow}")
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
         let (particles, steps_done) = (particles as f64, steps as f64);
-        let evaluations = steps_done * if self.parts.integrator == Integrator::KickDriftKick { 1.0 } else { 2.0 };
-        let support = self.parts.kernel.support() * self.parts.smoothing_length / self.parts.spacing;
+        let evaluations = steps_done * if self.config.integrator == Integrator::KickDriftKick { 1.0 } else { 2.0 };
+        let support = self.config.kernel.support() * self.config.smoothing_length / self.config.spacing;
         let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
         let pairs = particles * ball * support.powi(D as i32) * evaluations;
         let mut work = vec![
@@ -409,22 +408,22 @@ impl<const D: usize> Scene for DropletScene<D> {
             PhaseWork::every_step("sph/tension", particles * evaluations),
             PhaseWork::every_step("neighbors", particles * steps_done),
         ];
-        if self.parts.density == DensityMethod::Summation {
+        if self.config.density == DensityMethod::Summation {
             work.push(PhaseWork::every_step("sph/density", pairs));
         }
-        if self.parts.is_shifted {
+        if self.config.is_shifted {
             work.push(PhaseWork::every_step("sph/shifting", pairs));
         }
         // Steps that are measured for both reasons count twice: they are few.
         let measurements =
             steps_done / plan.series_every_steps.max(1) as f64 + steps_done / measurement_interval(steps) as f64;
         let measured = |weight: f64| PhaseWork::every_step("measure", (measurements + 2.0) * weight);
-        if self.parts.has_tension() {
+        if self.config.has_tension() {
             work.push(PhaseWork::every_step("droplets", particles * steps_done));
-            match &self.parts.geometry {
+            match &self.config.geometry {
                 Geometry::Pcp { method, half_band } => {
                     let band = self.near(2.0 * half_band);
-                    let reach_h = half_band / self.parts.spacing;
+                    let reach_h = half_band / self.config.spacing;
                     work.extend(work_estimate::redistancing::<D>(
                         method,
                         band,
@@ -459,7 +458,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         };
         let cell = lengths.product() / self.count() as f64;
         let drop = Drop { positions, level, measure };
-        let system = SphSystem::new(self.parts.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
+        let system = SphSystem::new(self.config.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
             vec![Violation::new("/domain", "range", error.to_string(), &self.resolved["domain"], json!(error.least))]
         })?;
         let (plan, clock) = (context.plan, context.cpu_clock);
@@ -479,6 +478,6 @@ impl<const D: usize> DropletScene<D> {
         } else {
             (36.0 * std::f64::consts::PI).cbrt() * measure.powf(2.0 / 3.0)
         };
-        (area * width / self.parts.spacing.powi(D as i32)).min(self.count() as f64)
+        (area * width / self.config.spacing.powi(D as i32)).min(self.count() as f64)
     }
 }

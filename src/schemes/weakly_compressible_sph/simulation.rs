@@ -1,10 +1,12 @@
 //! Two fluids step by step.
 
-use super::components::ball_curvature;
+use super::droplets::ball_curvature;
 use super::monitors::{Row, deformation, names};
+use super::species::Species;
+use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, SphSystem};
-use super::time_step::longest_step;
+use super::time_step::{REFERENCE_SPEED, StepLimit, longest_step};
 use crate::closest_point::Soundness;
 use crate::geometry::Vector;
 use crate::operators::Soundness as FitSoundness;
@@ -21,6 +23,7 @@ use std::collections::BTreeMap;
 /// Two fluids as a simulation.
 pub struct WeaklyCompressibleSph<const D: usize> {
     system: SphSystem<D>,
+    stepper: Stepper<D>,
     pace: Pace,
     plan: OutputPlan,
     step: u64,
@@ -94,6 +97,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
     ) -> Self {
         let mut this = Self {
             failure: None,
+            stepper: Stepper::new(&system.config, system.flow.count()),
             system,
             pace: Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 }),
             plan,
@@ -116,21 +120,21 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         // A row of the right length, whatever happens.
         self.row = vec![f64::NAN; names(D).len()];
         self.system.evaluate(0.0, false, &mut self.phases).map_err(|error| failed(error, start))?;
-        if self.system.initial_measure.is_nan()
+        if self.system.droplets.initial_measure.is_nan()
             && let Some(moments) = self.system.moments()?
         {
             // Of a drop that is known by its particles alone, the first quadrature says what is to be kept.
-            self.system.initial_measure = moments.measure;
-            self.system.renew_ball_curvatures();
+            self.system.droplets.initial_measure = moments.measure;
+            self.system.droplets.renew_ball_curvatures();
             self.system.evaluate(0.0, false, &mut self.phases).map_err(|error| failed(error, start))?;
         }
-        self.summary.droplets = self.system.ball_curvatures.len() as f64;
+        self.summary.droplets = self.system.droplets.number() as f64;
         self.take_row()
     }
 
     /// κ₀ of one droplet that holds everything.
     fn whole_curvature(&self) -> f64 {
-        ball_curvature::<D>(self.system.initial_measure)
+        ball_curvature::<D>(self.system.droplets.initial_measure)
     }
 
     fn time_of_part(&self) -> f64 {
@@ -166,11 +170,11 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
 
     /// How many parts a step must be cut into, for the present speed.
     fn parts_needed(&self, next: Clock) -> Result<u64, StepError> {
-        if !self.system.parts.is_adaptive {
+        if !self.system.config.is_adaptive {
             return Ok(1);
         }
-        let speed = self.system.largest_speed();
-        let (limit, _) = longest_step(&self.system.parts, speed);
+        let speed = self.system.flow.largest_speed();
+        let StepLimit { length: limit, .. } = longest_step(&self.system.config, speed);
         let parts = (self.pace.time_step / limit - 1e-9).ceil().max(1.0);
         if parts <= MOST_PARTS {
             return Ok(parts as u64);
@@ -183,33 +187,33 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let system = &self.system;
         let of = |field, particle| StepError::NonFinite { field, particle, step: next.step, time: next.time };
         let broken = |values: &[Vector<D>]| values.iter().position(|v| v.iter().any(|c| !c.is_finite()));
-        if let Some(particle) = broken(&system.velocity) {
+        if let Some(particle) = broken(&system.flow.velocity) {
             return Err(of("velocity", particle));
         }
-        if let Some(particle) = system.density.iter().position(|d| !d.is_finite()) {
+        if let Some(particle) = system.flow.density.iter().position(|d| !d.is_finite()) {
             return Err(of("density", particle));
         }
         if let Some((field, particle)) = system.columns.find_broken(&system.particles) {
             return Err(of(field, particle));
         }
         let mut fastest = (0, 0.0);
-        for (i, u) in system.velocity.iter().enumerate() {
+        for (i, u) in system.flow.velocity.iter().enumerate() {
             let square = u.norm_squared();
             if square > fastest.1 {
                 fastest = (i, square);
             }
         }
         let (particle, speed) = (fastest.0, fastest.1.sqrt());
-        self.max_cfl = self.max_cfl.max(speed * self.time_of_part() / system.parts.spacing);
-        let sound_speed = system.parts.fluid(system.phase[particle] == 1).sound_speed;
+        self.max_cfl = self.max_cfl.max(speed * self.time_of_part() / system.config.spacing);
+        let sound_speed = system.flow.fluid(particle).sound_speed;
         if speed > sound_speed {
             // What would have held at the speeds that a sound run has.
-            let (stable, bound) = longest_step(&system.parts, super::time_step::REFERENCE_SPEED);
+            let StepLimit { length: stable, cause: bound } = longest_step(&system.config, REFERENCE_SPEED);
             let time_step = self.time_of_part();
             let Clock { step, time } = next;
             return Err(StepError::TooFast { particle, speed, sound_speed, time_step, stable, bound, step, time });
         }
-        self.resting = match system.parts.rest_below {
+        self.resting = match system.config.rest_below {
             Some(limit) if speed < limit => self.resting + 1,
             _ => 0,
         };
@@ -224,8 +228,14 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
 fn failed(error: EvaluationError, at: Clock) -> StepError {
     match error {
         EvaluationError::Interrupted => StepError::Interrupted,
-        EvaluationError::InterfaceLost => StepError::InterfaceLost { step: at.step, time: at.time },
+        EvaluationError::Lost => StepError::InterfaceLost { step: at.step, time: at.time },
     }
+}
+
+/// The species of all particles.
+fn species_of(state: &State) -> Result<Vec<Species>, RestoreError> {
+    let unknown = || RestoreError::Missing { name: "phase of 0 or 1".to_owned() };
+    state.counts("phase")?.iter().map(|code| Species::from_code(*code).ok_or_else(unknown)).collect()
 }
 
 /// What was counted of the fits of the flow.
@@ -260,7 +270,10 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let part = self.time_of_part();
         for k in 0..self.parts_of_step {
             let time = start.time + k as f64 * part;
-            let changed = self.system.advance(time, part, &mut self.phases).map_err(|error| failed(error, next))?;
+            let changed = self
+                .stepper
+                .advance(&mut self.system, time, part, &mut self.phases)
+                .map_err(|error| failed(error, next))?;
             if let Some(droplets) = changed {
                 let name = if droplets as f64 > self.summary.droplets { "split" } else { "merged" };
                 let message = format!("there are {droplets} droplets now");
@@ -285,8 +298,8 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     fn fields(&self) -> Fields {
         let system = &self.system;
         let mut fields = Fields::at(system.particles.positions());
-        if system.parts.has_tension() {
-            if system.interface.is_some() {
+        if system.config.has_tension() {
+            if system.interface.level_set().is_some() {
                 fields.surface(&system.particles, &system.columns, true);
             } else {
                 let band = system.particles.flag(system.columns.in_band);
@@ -297,15 +310,15 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
                 fields.scalar("curvature", curvature.iter().enumerate().map(|(i, c)| known(i, *c)).collect());
             }
         }
-        fields.vector("velocity", system.velocity.iter().copied());
-        fields.scalar("density", system.density.clone());
-        let pressures = system.pressure.iter().enumerate();
+        fields.vector("velocity", system.flow.velocity.iter().copied());
+        fields.scalar("density", system.flow.density.clone());
+        let pressures = system.flow.pressure.iter().enumerate();
         fields.scalar("pressure", pressures.map(|(i, p)| p + system.absorbed_pressure(i)).collect());
-        fields.scalar("phase", system.phase.iter().map(|phase| f64::from(*phase)).collect());
-        if !system.parts.has_one_mass() {
-            fields.scalar("mass", (0..system.phase.len()).map(|i| system.mass(i)).collect());
+        fields.scalar("phase", system.flow.species.iter().map(|species| f64::from(species.code())).collect());
+        if !system.config.fluids.have_one_mass() {
+            fields.scalar("mass", (0..system.flow.count()).map(|i| system.flow.mass(i)).collect());
         }
-        fields.id("particle_id", (0..system.phase.len() as u64).collect());
+        fields.id("particle_id", (0..system.flow.count() as u64).collect());
         fields
     }
 
@@ -314,30 +327,31 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let system = &self.system;
         let mut state = State { step, time, ..State::default() };
         state.push_particles(&system.particles);
-        state.push_vectors("velocity", &system.velocity);
-        state.push_vectors("acceleration", &system.acceleration);
-        state.push_vectors("reference", &system.reference);
-        state.push_reals("density", &system.density);
-        state.push_reals("density_rate", &system.density_rate);
+        state.push_vectors("velocity", &system.flow.velocity);
+        state.push_vectors("acceleration", &system.rates.acceleration);
+        state.push_vectors("reference", &system.pairs.lists.reference);
+        state.push_reals("density", &system.flow.density);
+        state.push_reals("density_rate", &system.rates.density);
         let flags = |values: &[u8]| values.iter().map(|v| u64::from(*v)).collect();
-        state.push_counts("phase", flags(&system.phase));
-        state.push_counts("candidate", flags(&system.candidate));
-        state.push_counts("droplet", flags(&system.droplet));
-        state.push_reals("ball_curvatures", &system.ball_curvatures);
-        let (counts, condition, bounded) = system.interface.as_ref().map_or((Vec::new(), 0.0, 0), |interface| {
+        state.push_counts("phase", system.flow.species.iter().map(|species| u64::from(species.code())).collect());
+        let candidates = system.interface.level_set().map(|level_set| flags(&level_set.is_candidate));
+        state.push_counts("candidate", candidates.unwrap_or_else(|| vec![0; system.flow.count()]));
+        state.push_counts("droplet", flags(&system.droplets.label));
+        state.push_reals("ball_curvatures", &system.droplets.ball_curvatures);
+        let (counts, condition, bounded) = system.interface.level_set().map_or((Vec::new(), 0.0, 0), |interface| {
             let soundness = interface.surface.soundness();
             let counts = soundness.counts.entries().iter().map(|e| e.1).collect();
             (counts, soundness.worst_condition, interface.bounded)
         });
         state.push_counts("rescues", counts);
         state.push_counts("counters", vec![self.parts_of_step, self.resting, bounded, system.strays.absorbed]);
-        state.push_reals("monitors", &[self.max_cfl, condition, system.initial_measure]);
+        state.push_reals("monitors", &[self.max_cfl, condition, system.droplets.initial_measure]);
         let Clock { step, time } = self.pace.origin;
         state.push_counts("origin_step", vec![step]);
         state.push_reals("origin", &[time, self.pace.time_step]);
         // What is not known is no number, which a checkpoint's arrays of numbers would not hold: their bits are kept.
         state.push_counts("row", self.row.iter().map(|v| v.to_bits()).collect());
-        if let Some(flow) = &system.dcpse {
+        if let Some(flow) = system.equations.fits() {
             let (counts, least_pivot) = flow.soundness.to_numbers();
             state.push_counts("flow", counts.to_vec());
             state.push_reals("flow_pivot", &[least_pivot]);
@@ -361,23 +375,24 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         if state.step > pace.last {
             return Err(RestoreError::Beyond { step: state.step, last: pace.last });
         }
-        let count = self.system.phase.len();
+        let count = self.system.flow.count();
         for name in ["velocity", "acceleration", "reference"] {
             check_length(name, state.reals(name)?.len(), count * D)?;
         }
         check_length("density", state.reals("density")?.len(), count)?;
-        check_length("density_rate", state.reals("density_rate")?.len(), self.system.density_rate.len())?;
+        check_length("density_rate", state.reals("density_rate")?.len(), self.system.rates.density.len())?;
         for name in ["phase", "candidate", "droplet"] {
             check_length(name, state.counts(name)?.len(), count)?;
         }
+        let species = species_of(state)?;
         let (rescues, counters, monitors) =
             (state.counts("rescues")?, state.counts("counters")?, state.reals("monitors")?);
-        let entries = self.system.interface.as_ref().map_or(0, |i| i.surface.soundness().counts.entries().len());
+        let entries = self.system.interface.level_set().map_or(0, |i| i.surface.soundness().counts.entries().len());
         check_length("rescues", rescues.len(), entries)?;
         check_length("counters", counters.len(), 4)?;
         check_length("monitors", monitors.len(), 3)?;
         check_length("row", state.counts("row")?.len(), self.row.len())?;
-        let flow = match &self.system.dcpse {
+        let flow = match self.system.equations.fits() {
             Some(_) => Some(fits_of(state)?),
             None => None,
         };
@@ -397,30 +412,32 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             }
             Ok(())
         };
-        vectors("velocity", &mut system.velocity)?;
-        vectors("acceleration", &mut system.acceleration)?;
-        vectors("reference", &mut system.reference)?;
-        system.density.copy_from_slice(state.reals("density")?);
-        system.density_rate.copy_from_slice(state.reals("density_rate")?);
+        vectors("velocity", &mut system.flow.velocity)?;
+        vectors("acceleration", &mut system.rates.acceleration)?;
+        vectors("reference", &mut system.pairs.lists.reference)?;
+        system.flow.density.copy_from_slice(state.reals("density")?);
+        system.rates.density.copy_from_slice(state.reals("density_rate")?);
         let flags = |name: &str, to: &mut [u8]| -> Result<(), RestoreError> {
             for (flag, count) in to.iter_mut().zip(state.counts(name)?) {
                 *flag = (*count).min(255) as u8;
             }
             Ok(())
         };
-        flags("phase", &mut system.phase)?;
-        flags("candidate", &mut system.candidate)?;
-        flags("droplet", &mut system.droplet)?;
-        system.ball_curvatures = state.reals("ball_curvatures")?.to_vec();
-        system.initial_measure = monitors[2];
+        system.flow.species.copy_from_slice(&species);
+        if let Some(level_set) = system.interface.level_set_mut() {
+            flags("candidate", &mut level_set.is_candidate)?;
+        }
+        flags("droplet", &mut system.droplets.label)?;
+        system.droplets.ball_curvatures = state.reals("ball_curvatures")?.to_vec();
+        system.droplets.initial_measure = monitors[2];
         system.strays.absorbed = counters[3];
-        if let Some(interface) = &mut system.interface {
+        if let Some(interface) = system.interface.level_set_mut() {
             let soundness = interface.surface.soundness_mut();
             soundness.counts.restore(rescues);
             soundness.worst_condition = monitors[1];
             interface.bounded = counters[2];
         }
-        if let (Some(known), Some(flow)) = (flow, &mut system.dcpse) {
+        if let (Some(known), Some(flow)) = (flow, system.equations.fits_mut()) {
             flow.soundness = known;
         }
         // An interrupt ends the run before its next step.
@@ -439,15 +456,15 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 
     fn report(&self) -> Report {
         let nothing = Soundness::default();
-        let soundness = self.system.interface.as_ref().map_or(&nothing, |interface| interface.surface.soundness());
+        let soundness = self.system.interface.level_set().map_or(&nothing, |interface| interface.surface.soundness());
         let whole = self.whole_curvature();
-        let expected = (self.system.parts.tension * whole, whole, self.system.initial_measure);
+        let expected = (self.system.config.tension * whole, whole, self.system.droplets.initial_measure);
         let errors = self.summary.entries(D, self.clock().time, expected);
         let mut report = closest_point_report(soundness, errors, self.health(), self.method.clone());
-        if let Some(interface) = self.system.interface.as_ref().filter(|interface| interface.bounded > 0) {
+        if let Some(interface) = self.system.interface.level_set().filter(|interface| interface.bounded > 0) {
             report.newton.rescued.insert("curvature.bounded", interface.bounded);
         }
-        if let Some(flow) = &self.system.dcpse {
+        if let Some(flow) = self.system.equations.fits() {
             let found = &flow.soundness;
             report.worst_condition = report.worst_condition.max(1.0 / found.least_pivot);
             let counts = [
@@ -469,12 +486,15 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn health(&self) -> Health {
-        let soundness = self.system.interface.as_ref().map(|interface| interface.surface.soundness());
-        let fits = self.system.dcpse.as_ref().map_or(0, |flow| flow.soundness.rescued());
+        let soundness = self.system.interface.level_set().map(|interface| interface.surface.soundness());
+        let fits = self.system.equations.fits().map_or(0, |flow| flow.soundness.rescued());
         Health {
-            finite: self.system.velocity.iter().all(|u| u.iter().all(|c| c.is_finite())),
+            finite: self.system.flow.velocity.iter().all(|u| u.iter().all(|c| c.is_finite())),
             max_cfl: self.max_cfl,
-            volume_drift: self.summary.last_measure().map(|measure| measure / self.system.initial_measure - 1.0),
+            volume_drift: self
+                .summary
+                .last_measure()
+                .map(|measure| measure / self.system.droplets.initial_measure - 1.0),
             rescued_fits: fits + soundness.map_or(0, |soundness| rescued(&soundness.counts)),
         }
     }
