@@ -1,5 +1,6 @@
 //! What a series shows of two fluids, and what a report makes of it.
 
+use super::species::Species;
 use super::system::SphSystem;
 use crate::closest_point::enclosed_measure::{EnclosedMoments, enclosed_moments};
 use crate::geometry::Vector;
@@ -56,7 +57,7 @@ impl<const D: usize> SphSystem<D> {
     fn mean_pressures(&self) -> [(f64, f64); 2] {
         let far = 2.0 * self.config.smoothing_length;
         let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
-        let mut sums = [[0.0; 3]; 2];
+        let mut sums = [[0.0; 3]; Species::ALL.len()];
         for i in 0..phi.len() {
             if band[i] == 1 && phi[i].abs() <= far {
                 continue;
@@ -66,7 +67,10 @@ impl<const D: usize> SphSystem<D> {
             sum[1] += self.flow.pressure[i];
             sum[2] += self.flow.pressure[i] + self.absorbed_pressure(i);
         }
-        [1, 0].map(|side: usize| (sums[side][1] / sums[side][0], sums[side][2] / sums[side][0]))
+        [Species::Inside, Species::Outside].map(|species| {
+            let [count, pressure, full] = sums[usize::from(species.code())];
+            (pressure / count, full / count)
+        })
     }
 
     /// Area or volume, centre and second moments of the inside, by quadrature on the fits; None without an interface.

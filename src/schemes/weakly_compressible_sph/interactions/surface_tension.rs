@@ -46,10 +46,7 @@ impl SurfaceTension {
 
     /// The part τ κ₀ of the pressure that the balanced force has absorbed, at a particle: 0 outside the droplets.
     pub fn absorbed_pressure<const D: usize>(&self, species: Species, droplets: &Droplets<D>, i: usize) -> f64 {
-        match species {
-            Species::Inside => self.coefficient * self.force.absorbed_curvature(droplets, i),
-            Species::Outside => 0.0,
-        }
+        if species == Species::Inside { self.coefficient * self.force.absorbed_curvature(droplets, i) } else { 0.0 }
     }
 }
 
