@@ -202,3 +202,81 @@ const TINY: f64 = 1e-300;
 pub(super) fn harmonic_mean((a, b): (Lanes, Lanes)) -> Lanes {
     (a + a) * b / (a + b + Lanes::splat(TINY))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Lanes, Shares, harmonic_mean};
+    use crate::linear_algebra::number::Number;
+    use crate::schemes::weakly_compressible_sph::KernelChoice;
+    use crate::schemes::weakly_compressible_sph::test_setting::{Setting, setting};
+
+    /// Neighbors have the weight (2 − q)⁺, which a loop over all pairs finds as well.
+    fn weight(q: f64) -> f64 {
+        (2.0 - q).max(0.0)
+    }
+
+    fn check_both_sides<const D: usize>(this: &Setting<D>) {
+        let value = |i: usize| 1.0 + (i % 7) as f64;
+        let mut pairs = this.gathered();
+        pairs.gather(0, 0.0, value);
+        pairs
+            .sum_pairs::<1, 1, 2>(|pair| {
+                let weight = (Lanes::splat(2.0) - pair.q()).positive_part();
+                let (own, other) = pair.scalar(0);
+                Shares { own: [weight * other, weight], other: [weight * own, -weight] }
+            })
+            .unwrap();
+        let e = this.config.smoothing_length;
+        let (mut all, mut sizes) = (0.0, 0.0);
+        for (place, i) in pairs.occupied() {
+            all += pairs.sum(1, place);
+            sizes += pairs.sum(1, place).abs();
+            if i.is_multiple_of(37) {
+                let mut expected = 0.0;
+                this.each(i, |j, _, r| expected += weight(r / e) * value(j));
+                assert!((pairs.sum(0, place) - expected).abs() < 1e-11 * expected, "particle {i}");
+            }
+        }
+        assert!(all.abs() < 1e-13 * sizes, "opposite shares cancel: {all}");
+    }
+
+    #[test]
+    fn shares_reach_both_particles_of_every_pair_once() {
+        check_both_sides(&setting::<2>(KernelChoice::WendlandC2, 1.0));
+        check_both_sides(&setting::<3>(KernelChoice::WendlandC2, 1.0));
+    }
+
+    #[test]
+    fn places_that_meet_no_neighbors_are_still_met_by_those_that_list_them() {
+        let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
+        let mut pairs = this.gathered();
+        let is_marked = |i: usize| i.is_multiple_of(3);
+        pairs.gather(0, 0.0, |i| f64::from(u8::from(is_marked(i))));
+        pairs
+            .sum_pairs_where::<1, 1, 1>(
+                |scalars, place| scalars[0][place] != 0.0,
+                |pair| {
+                    let (own, other) = pair.scalar(0);
+                    let weight = (Lanes::splat(2.0) - pair.q()).positive_part() * own * other;
+                    Shares::equal([weight])
+                },
+            )
+            .unwrap();
+        for (place, i) in pairs.occupied().filter(|(_, i)| i.is_multiple_of(37)) {
+            let mut expected = 0.0;
+            this.each(i, |j, _, r| {
+                if is_marked(i) && is_marked(j) {
+                    expected += weight(r / this.config.smoothing_length);
+                }
+            });
+            assert!((pairs.sum(0, place) - expected).abs() < 1e-12, "particle {i}");
+        }
+    }
+
+    #[test]
+    fn harmonic_means_are_between_their_numbers_and_zero_of_two_zeros() {
+        let mean = |a: f64, b: f64| harmonic_mean((Lanes::splat(a), Lanes::splat(b))).to_array()[0];
+        assert!((mean(1.0, 3.0) - 1.5).abs() < 1e-15);
+        assert_eq!((mean(0.5, 0.5), mean(0.0, 2.0), mean(0.0, 0.0)), (0.5, 0.0, 0.0));
+    }
+}

@@ -298,3 +298,87 @@ fn new_interface<const D: usize>(config: &SphConfig<D>, domain: &Domain<D>, coun
         Geometry::ColorField => Interface::ColorField(ColorField::new(count)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Drop, FlowEquations, Interface, SphSystem};
+    use crate::geometry::Vector;
+    use crate::operators::Support;
+    use crate::parallel::Interrupt;
+    use crate::schemes::weakly_compressible_sph::test_setting::{Setting, setting};
+    use crate::schemes::weakly_compressible_sph::{
+        BodyForce, DensityMethod, Discretization, KernelChoice, Species, SphConfig, TensionForce,
+    };
+    use crate::simulation::{CpuClock, Phases};
+
+    fn evaluated(this: &Setting<2>, config: SphConfig<2>, level: Vec<f64>) -> SphSystem<2> {
+        let drop = Drop { positions: this.positions.clone(), level, measure: 2.0 };
+        let mut system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
+        system.flow.predicted.clone_from(&this.velocity);
+        system.evaluate(0.0, false, &mut Phases::new(CpuClock::still())).unwrap();
+        system
+    }
+
+    /// Σ m a by Σ m |a|.
+    fn net_force(system: &SphSystem<2>) -> f64 {
+        let forces = system.rates.acceleration.iter().enumerate().map(|(i, a)| a * system.flow.mass(i));
+        let (all, sizes) = forces.fold((Vector::<2>::zeros(), 0.0), |(all, sizes), f| (all + f, sizes + f.norm()));
+        all.norm() / sizes
+    }
+
+    #[test]
+    fn interactions_between_particles_keep_momentum_and_a_body_force_adds_its_own() {
+        let this = setting::<2>(KernelChoice::WendlandC2, 3.0);
+        for density in [DensityMethod::Summation, DensityMethod::Continuity { diffusion: 0.1 }] {
+            let config = SphConfig { tension: 0.0, density, ..this.config.clone() };
+            let free = evaluated(&this, config.clone(), this.level.clone());
+            assert!(net_force(&free) < 1e-13, "{}", net_force(&free));
+            let gravity = Vector::<2>::new(0.0, -9.0);
+            let config = SphConfig { body_force: Some(BodyForce::Constant(gravity)), ..config };
+            let falling = evaluated(&this, config, this.level.clone());
+            for (a, b) in falling.rates.acceleration.iter().zip(&free.rates.acceleration) {
+                assert!((a - b - gravity).norm() < 1e-9 * b.norm().max(1.0));
+            }
+        }
+    }
+
+    #[test]
+    fn the_equations_follow_from_discretization_and_density_method() {
+        let config = setting::<2>(KernelChoice::WendlandC2, 1.0).config;
+        let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
+        let equations = |config: &SphConfig<2>| FlowEquations::new(config, &this.domain, 4);
+        assert!(matches!(equations(&config), FlowEquations::VolumeForm));
+        let mass = SphConfig { density: DensityMethod::Continuity { diffusion: 0.1 }, ..config };
+        assert!(matches!(equations(&mass), FlowEquations::MassForm { diffusion: 0.1 }));
+        let discretization = Discretization::Dcpse(Support { degree: 3, radius: 0.35 });
+        let fits = SphConfig { discretization, ..mass };
+        let FlowEquations::Fits { spread, .. } = equations(&fits) else { panic!("no fits") };
+        assert!((spread - 0.1 * fits.smoothing_length).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_balanced_force_moves_the_pressure_of_the_droplet_into_the_pressure() {
+        let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
+        let center = Vector::<2>::new(0.6, 0.6);
+        let level: Vec<f64> =
+            this.positions.iter().map(|x| this.domain.displacement(&center, x).norm() - 0.8).collect();
+        let config = SphConfig { tension: 3.0, tension_force: TensionForce::Balanced, ..this.config.clone() };
+        let balanced = evaluated(&this, config.clone(), level.clone());
+        assert!(matches!(balanced.interface, Interface::ColorField(_)));
+        assert_eq!(balanced.droplets.number(), 1);
+        // κ₀ of the measure 2 that was given, times τ.
+        let expected = 3.0 * (std::f64::consts::PI / 2.0).sqrt();
+        let csf = evaluated(&this, SphConfig { tension_force: TensionForce::Csf, ..config }, level);
+        for i in this.probes() {
+            let absorbed = if balanced.flow.species[i] == Species::Inside { expected } else { 0.0 };
+            assert!((balanced.absorbed_pressure(i) - absorbed).abs() < 1e-14);
+            assert_eq!(csf.absorbed_pressure(i), 0.0);
+        }
+        // The two forces differ by τ κ₀ n δ/ρ.
+        let Interface::ColorField(color) = &balanced.interface else { panic!("no color field") };
+        for (i, (a, b)) in balanced.rates.acceleration.iter().zip(&csf.rates.acceleration).enumerate() {
+            let difference = color.gradient[i] * (expected / balanced.flow.density[i]);
+            assert!((a - b - difference).norm() < 1e-9 * a.norm().max(1.0));
+        }
+    }
+}
