@@ -1,4 +1,4 @@
-//! The equations in the mass form, for densities by continuity (PCP eqs. B.12 to B.14):
+//! The equations in the mass form, for densities by continuity (PCP eqs. B.12 to B.14; errata, PCP B.12 and B.13):
 //!
 //! du_i/dt = −Σ_j m_j (P_i/ρ_i² + P_j/ρ_j² + Π_ij) ∇W
 //!

@@ -10,7 +10,7 @@ use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use std::array::from_fn;
 
-/// The position of an empty slot, in ε: beyond the support of every kernel.
+/// The position of a padding slot, in ε: beyond the support of every kernel.
 const FAR: f64 = 1e15;
 /// Scalar columns that an interaction may gather.
 const SCALARS: usize = 6;
@@ -98,9 +98,9 @@ impl<const D: usize> PairWorkspace<D> {
         }
     }
 
-    /// Gathers a number of each particle into a scalar column; empty places get `of_empty`.
-    pub fn gather(&mut self, slot: usize, of_empty: f64, value: impl Fn(usize) -> f64) {
-        self.scalars[slot].refill(self.lists.pencils.by_place(of_empty, value));
+    /// Gathers a number of each particle into a scalar column; padding slots get `padding`.
+    pub fn gather(&mut self, slot: usize, padding: f64, value: impl Fn(usize) -> f64) {
+        self.scalars[slot].refill(self.lists.pencils.by_place(padding, value));
     }
 
     /// Sums over all pairs. `V` is 1 for positions alone and 2 with the gathered vectors, `S` the number of scalar columns,
@@ -147,7 +147,7 @@ impl<const D: usize> PairWorkspace<D> {
         self.scalars[slot][place]
     }
 
-    /// Replaces a gathered scalar of every place, empty ones included, by a function of its value and the first sum.
+    /// Replaces a gathered scalar of every place, padding slots included, by a function of its value and the first sum.
     pub fn update_scalar(&mut self, slot: usize, value: impl Fn(f64, f64) -> f64) {
         for (scalar, sum) in self.scalars[slot].iter_mut().zip(&self.sums[0][..]) {
             *scalar = value(*scalar, *sum);

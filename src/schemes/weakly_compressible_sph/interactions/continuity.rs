@@ -1,4 +1,4 @@
-//! The continuity equation with diffusion (PCP eq. B.12; its diffusion corrected, docs/errata.md).
+//! The continuity equation with diffusion (PCP eq. B.12; errata, PCP B.12).
 
 use super::mass_pair::MassPair;
 use crate::linear_algebra::number::Lanes;

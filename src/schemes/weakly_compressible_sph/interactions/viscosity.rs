@@ -35,7 +35,7 @@ impl<const D: usize, const S: usize> PairTerm<Pair<'_, D, 2, S>, [Lanes; D]> for
 }
 
 /// Viscosity in the mass form, Π_ij = −k ν_ij u_ij·x_ij/(ρ̄_ij (r² + μ̂ ε²)) with ρ̄_ij = (ρ_i + ρ_j)/2 (PCP eq. B.14). It
-/// stands for the physical viscosity, so it acts on approaching and on parting pairs.
+/// stands for the physical viscosity, so it acts on approaching and on parting pairs (errata, PCP B.13).
 #[derive(Debug, Clone, Copy)]
 pub struct MonaghanViscosity {
     drag: f64,

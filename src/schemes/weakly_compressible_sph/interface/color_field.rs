@@ -1,8 +1,8 @@
 //! The interface as the smoothed color of the species (PCP eqs. B.5 to B.10; Adami et al. 2010): normals from its gradient,
 //! curvatures from their divergence.
 //!
-//! The volume of particle j stands in the sum of B.6 (docs/errata.md). Curvatures have the sign of this project: positive where
-//! the inside is convex.
+//! The sum of B.6 runs over j with its volume (errata, PCP B.6). Curvatures have the sign of this project: positive where the
+//! inside is convex (errata, PCP B.9).
 
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::Vector;
