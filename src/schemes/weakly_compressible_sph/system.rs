@@ -59,7 +59,7 @@ pub(super) enum FlowEquations<const D: usize> {
     /// Densities by continuity with a diffusion ξ̂, forces in the mass form.
     MassForm { diffusion: f64 },
     /// Derivatives by fits, densities by continuity with a diffusion ξ̂ ε.
-    Fits { fits: DcpseFlow<D>, spread: f64 },
+    Fits { fits: Box<DcpseFlow<D>>, spread: f64 },
 }
 
 impl<const D: usize> FlowEquations<D> {
@@ -70,7 +70,7 @@ impl<const D: usize> FlowEquations<D> {
         };
         match (config.discretization, diffusion) {
             (Discretization::Dcpse(support), diffusion) => Self::Fits {
-                fits: DcpseFlow::new(support, domain.clone(), count),
+                fits: Box::new(DcpseFlow::new(support, domain.clone(), count)),
                 spread: diffusion.unwrap_or(0.0) * config.smoothing_length,
             },
             (Discretization::Kernels, Some(diffusion)) => Self::MassForm { diffusion },
