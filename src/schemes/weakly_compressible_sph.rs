@@ -9,7 +9,7 @@
 //! | the flow and its rates | `flow_state` |
 //! | sums over pairs | `neighbor_lists`, `pair_workspace`, `pair_sums`, `column` |
 //! | terms of the equations | `interactions` |
-//! | equations that combine the terms | `volume_form`, `mass_form`, `dcpse` |
+//! | equations that combine the terms | `equations`: `volume_form`, `mass_form` or `dcpse` |
 //! | the interface and what it encloses | `interface`, `droplets`, `strays` |
 //! | one evaluation | `system` |
 //! | steps in time | `stepping`, [`time_step`] |
@@ -19,6 +19,7 @@ mod column;
 pub mod config;
 mod dcpse;
 mod droplets;
+mod equations;
 mod flow_state;
 pub mod fluids;
 mod interactions;

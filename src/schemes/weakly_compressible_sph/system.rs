@@ -1,8 +1,8 @@
 //! The particles of the fluids, and one evaluation: from positions to rates of change.
 
-use super::config::{DensityMethod, Discretization, Geometry, SphConfig};
-use super::dcpse::DcpseFlow;
+use super::config::{Geometry, SphConfig};
 use super::droplets::{Droplets, Searched};
+use super::equations::FlowEquations;
 use super::flow_state::{FlowState, Rates};
 use super::interactions::surface_tension::SurfaceTension;
 use super::interactions::{Moment, ParticleForce, density_summation, shifting};
@@ -11,7 +11,6 @@ use super::kernel_choice::ScaledKernel;
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
 use super::strays::Strays;
-use super::{mass_form, volume_form};
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::pencils::BoxTooSmall;
@@ -50,49 +49,6 @@ pub struct SphSystem<const D: usize> {
     forces: Vec<Box<dyn ParticleForce<D>>>,
     pub(super) rates: Rates<D>,
     pub(super) interrupt: Interrupt,
-}
-
-/// The equations of the flow: which form the interactions between particles take.
-pub(super) enum FlowEquations<const D: usize> {
-    /// Densities by summation, forces in the volume form.
-    VolumeForm,
-    /// Densities by continuity with a diffusion ξ̂, forces in the mass form.
-    MassForm { diffusion: f64 },
-    /// Derivatives by fits, densities by continuity with a diffusion ξ̂ ε.
-    Fits { fits: Box<DcpseFlow<D>>, spread: f64 },
-}
-
-impl<const D: usize> FlowEquations<D> {
-    fn new(config: &SphConfig<D>, domain: &Domain<D>, count: usize) -> Self {
-        let diffusion = match config.density {
-            DensityMethod::Summation => None,
-            DensityMethod::Continuity { diffusion } => Some(diffusion),
-        };
-        match (config.discretization, diffusion) {
-            (Discretization::Dcpse(support), diffusion) => Self::Fits {
-                fits: Box::new(DcpseFlow::new(support, domain.clone(), count)),
-                spread: diffusion.unwrap_or(0.0) * config.smoothing_length,
-            },
-            (Discretization::Kernels, Some(diffusion)) => Self::MassForm { diffusion },
-            (Discretization::Kernels, None) => Self::VolumeForm,
-        }
-    }
-
-    /// The fits, where derivatives are found by fits.
-    pub fn fits(&self) -> Option<&DcpseFlow<D>> {
-        match self {
-            Self::Fits { fits, .. } => Some(fits),
-            Self::VolumeForm | Self::MassForm { .. } => None,
-        }
-    }
-
-    /// The fits, where derivatives are found by fits.
-    pub fn fits_mut(&mut self) -> Option<&mut DcpseFlow<D>> {
-        match self {
-            Self::Fits { fits, .. } => Some(fits),
-            Self::VolumeForm | Self::MassForm { .. } => None,
-        }
-    }
 }
 
 /// The reason why an evaluation did not end.
@@ -171,7 +127,10 @@ impl<const D: usize> SphSystem<D> {
                 found
             })?;
         }
-        phases.measure("sph/momentum", || self.find_flow_rates())?;
+        phases.measure("sph/momentum", || {
+            let Self { equations, particles, flow, pairs, rates, interrupt, .. } = self;
+            equations.find_rates(particles.positions(), flow, pairs, rates, interrupt)
+        })?;
         phases.measure("sph/tension", || self.add_forces(time));
         Ok(changed)
     }
@@ -249,18 +208,6 @@ impl<const D: usize> SphSystem<D> {
         Ok(())
     }
 
-    /// Accelerations, and rates of integrated densities, by the interactions between particles.
-    fn find_flow_rates(&mut self) -> Result<(), Interrupted> {
-        let Self { equations, flow, pairs, rates, particles, interrupt, .. } = self;
-        match equations {
-            FlowEquations::VolumeForm => volume_form::accelerate(flow, pairs, &mut rates.acceleration),
-            FlowEquations::MassForm { diffusion } => mass_form::find_rates(flow, *diffusion, pairs, rates),
-            FlowEquations::Fits { fits, spread } => {
-                fits.find_rates(particles.positions(), flow, *spread, rates, interrupt)
-            }
-        }
-    }
-
     fn add_forces(&mut self, time: f64) {
         let Self { particles, columns, flow, interface, droplets, forces, rates, .. } = self;
         let moment = Moment { time, particles, columns, flow, interface, droplets };
@@ -301,13 +248,12 @@ fn new_interface<const D: usize>(config: &SphConfig<D>, domain: &Domain<D>, coun
 
 #[cfg(test)]
 mod tests {
-    use super::{Drop, FlowEquations, Interface, SphSystem};
+    use super::{Drop, Interface, SphSystem};
     use crate::geometry::Vector;
-    use crate::operators::Support;
     use crate::parallel::Interrupt;
     use crate::schemes::weakly_compressible_sph::test_setting::{Setting, setting};
     use crate::schemes::weakly_compressible_sph::{
-        BodyForce, DensityMethod, Discretization, KernelChoice, Species, SphConfig, TensionForce,
+        BodyForce, DensityMethod, KernelChoice, Species, SphConfig, TensionForce,
     };
     use crate::simulation::{CpuClock, Phases};
 
@@ -340,20 +286,6 @@ mod tests {
                 assert!((a - b - gravity).norm() < 1e-9 * b.norm().max(1.0));
             }
         }
-    }
-
-    #[test]
-    fn the_equations_follow_from_discretization_and_density_method() {
-        let config = setting::<2>(KernelChoice::WendlandC2, 1.0).config;
-        let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
-        let equations = |config: &SphConfig<2>| FlowEquations::new(config, &this.domain, 4);
-        assert!(matches!(equations(&config), FlowEquations::VolumeForm));
-        let mass = SphConfig { density: DensityMethod::Continuity { diffusion: 0.1 }, ..config };
-        assert!(matches!(equations(&mass), FlowEquations::MassForm { diffusion: 0.1 }));
-        let discretization = Discretization::Dcpse(Support { degree: 3, radius: 0.35 });
-        let fits = SphConfig { discretization, ..mass };
-        let FlowEquations::Fits { spread, .. } = equations(&fits) else { panic!("no fits") };
-        assert!((spread - 0.1 * fits.smoothing_length).abs() < 1e-15);
     }
 
     #[test]
