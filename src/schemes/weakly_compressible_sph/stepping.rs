@@ -144,3 +144,48 @@ fn add_scaled(values: &mut [f64], step: f64, rates: &[f64]) {
         *value += rate * step;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Stepper;
+    use crate::geometry::Vector;
+    use crate::parallel::Interrupt;
+    use crate::schemes::weakly_compressible_sph::test_setting::setting;
+    use crate::schemes::weakly_compressible_sph::{
+        BodyForce, DensityMethod, Drop, Integrator, KernelChoice, SphConfig, SphSystem,
+    };
+    use crate::simulation::{CpuClock, Phases};
+
+    #[test]
+    fn in_free_fall_the_center_of_mass_moves_as_a_point_does() {
+        let this = setting::<2>(KernelChoice::WendlandC2, 3.0);
+        let gravity = Vector::<2>::new(0.5, -9.0);
+        let (step, steps) = (1e-4, 6);
+        for integrator in [Integrator::KickDriftKick, Integrator::PredictorCorrector] {
+            for density in [DensityMethod::Summation, DensityMethod::Continuity { diffusion: 0.1 }] {
+                let body_force = Some(BodyForce::Constant(gravity));
+                let config = SphConfig { tension: 0.0, integrator, density, body_force, ..this.config.clone() };
+                let mut stepper = Stepper::new(&config, this.positions.len());
+                let drop = Drop { positions: this.positions.clone(), level: this.level.clone(), measure: 1.0 };
+                let mut system =
+                    SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
+                let mut phases = Phases::new(CpuClock::still());
+                system.evaluate(0.0, false, &mut phases).unwrap();
+                for k in 0..steps {
+                    stepper.advance(&mut system, f64::from(k) * step, step, &mut phases).unwrap();
+                }
+                let flow = &system.flow;
+                let (mut mass, mut momentum, mut moved) = (0.0, Vector::<2>::zeros(), Vector::<2>::zeros());
+                for (i, x) in system.particles.positions().iter().enumerate() {
+                    mass += flow.mass(i);
+                    momentum += flow.velocity[i] * flow.mass(i);
+                    moved += this.domain.displacement(&this.positions[i], x) * flow.mass(i);
+                }
+                let time = step * f64::from(steps);
+                // Both integrators are exact for a constant acceleration.
+                assert!((momentum / mass - gravity * time).norm() < 1e-12, "{integrator:?}, {density:?}");
+                assert!((moved / mass - gravity * (0.5 * time * time)).norm() < 1e-13, "{integrator:?}, {density:?}");
+            }
+        }
+    }
+}
