@@ -1,38 +1,53 @@
 //! Two-phase flow by weakly compressible SPH with surface tension (PCP paper, sections 4.3 and 4.4, appendix B).
 //!
-//! Data flows one way within an evaluation: positions → neighbours → interface → densities and pressures → forces.
+//! Particles belong to a [`Species`]; the equations of motion are made of `interactions`, one item a term. Within an
+//! evaluation data flows one way: positions → neighbor lists → interface → densities and pressures → rates.
+//!
+//! | concept | files |
+//! | --- | --- |
+//! | configuration | [`config`], [`species`], [`fluids`], `kernel_choice` |
+//! | the flow and its rates | `flow_state` |
+//! | sums over pairs | `neighbor_lists`, `pair_workspace`, `pair_sums`, `column` |
+//! | terms of the equations | `interactions` |
+//! | equations that combine the terms | `equations`: `volume_form`, `mass_form` or `dcpse` |
+//! | the interface and what it encloses | `interface`, `droplets`, `strays` |
+//! | one evaluation | `system` |
+//! | steps in time | `stepping`, [`time_step`] |
+//! | the simulation and its figures | `simulation`, `monitors`, `summary` |
 
-mod body_force;
-mod color_field;
 mod column;
-mod components;
-mod continuity;
+pub mod config;
 mod dcpse;
-mod density;
+mod droplets;
+mod equations;
+mod flow_state;
 pub mod fluids;
 mod format_1;
-mod hydrodynamics;
+mod interactions;
 mod interface;
 mod kernel_choice;
-mod momentum;
+mod mass_form;
 mod monitors;
+mod neighbor_lists;
 mod pair_sums;
-pub mod parts;
+mod pair_workspace;
 pub mod quantities;
-mod shifting;
 mod simulation;
+pub mod species;
 mod stepping;
 mod strays;
 mod summary;
 mod system;
 pub mod time_step;
+mod volume_form;
 
-pub use body_force::BodyForce;
+pub use config::{DensityMethod, Discretization, Geometry, Integrator, SphConfig};
 pub use fluids::Fluid;
+pub use interactions::{BodyForce, TensionForce};
 pub use kernel_choice::KernelChoice;
-pub use parts::{DensityMethod, Discretization, Geometry, Integrator, SphParts, TensionForce};
 pub use simulation::{WeaklyCompressibleSph, measurement_interval};
+pub use species::{Fluids, Species};
 pub use system::{Drop, SphSystem};
 
 #[cfg(test)]
-mod tests;
+mod test_setting;

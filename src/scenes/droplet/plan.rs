@@ -18,10 +18,10 @@ use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
-use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, longest_step};
+use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    BodyForce, DensityMethod, Discretization, Drop, Fluid, Geometry, Integrator, SphParts, SphSystem, TensionForce,
-    WeaklyCompressibleSph, measurement_interval,
+    BodyForce, DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, SphConfig, SphSystem,
+    TensionForce, WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Coordinates, Parameter, Violation};
@@ -35,7 +35,7 @@ struct DropletScene<const D: usize> {
     low: Vector<D>,
     high: Vector<D>,
     sides: [usize; D],
-    parts: SphParts<D>,
+    config: SphConfig<D>,
     time_step: f64,
     steps: u64,
     chosen: BTreeMap<&'static str, String>,
@@ -172,10 +172,10 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let flow = FlowPlan::new(&mut spec, &case, &mut errors);
     let geometry = geometry(&mut spec, &case, D, flow.smoothing_h).map_err(|error| errors.push(error)).ok();
     let given_step = spec.time_step.or(if spec.steps.is_none() { case.time_step } else { None });
-    let parts = sph_parts(&mut spec, &case, flow, geometry, given_step, &mut errors);
-    let (time_step, steps, bound) = time_step(&spec, &parts, given_step, &mut errors);
+    let config = sph_config(&mut spec, &case, flow, geometry, given_step, &mut errors);
+    let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     if errors.is_empty()
-        && let Err(error) = Pencils::<D>::new(&domain_of(&low, &lengths), parts.reach())
+        && let Err(error) = Pencils::<D>::new(&domain_of(&low, &lengths), config.cutoff())
     {
         let got = corners.to_json();
         errors.push(Violation::new("/domain", "range", error.to_string(), got, error.least));
@@ -184,7 +184,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         return Err(errors);
     };
     let mut chosen = BTreeMap::new();
-    if parts.is_adaptive {
+    if config.is_adaptive {
         let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {REFERENCE_SPEED}");
         chosen.insert("time_step", why);
     }
@@ -193,26 +193,25 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         spec.time_step = given_step;
     }
     let clouds = points.into_iter().collect();
-    Ok(Box::new(DropletScene { spec, shape, low, high, sides: counts, parts, time_step, steps, chosen, clouds }))
+    Ok(Box::new(DropletScene { spec, shape, low, high, sides: counts, config, time_step, steps, chosen, clouds }))
 }
 
 /// What the scheme is made of; the spec gets what was left open.
-fn sph_parts<const D: usize>(
+fn sph_config<const D: usize>(
     spec: &mut Droplet,
     case: &Case,
     flow: FlowPlan,
     geometry: Option<Geometry>,
     given_step: Option<f64>,
     errors: &mut Vec<Violation>,
-) -> SphParts<D> {
+) -> SphConfig<D> {
     let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
     let body_force = body_force(force, errors);
-    SphParts {
+    SphConfig {
         spacing: spec.spacing,
         smoothing_length: flow.smoothing_h * spec.spacing,
         kernel: flow.kernel,
-        inside: Fluid::from(&spec.fluids.inside),
-        outside: Fluid::from(&spec.fluids.outside),
+        fluids: Fluids { inside: Fluid::from(&spec.fluids.inside), outside: Fluid::from(&spec.fluids.outside) },
         tension: *spec.surface_tension.get_or_insert(case.tension),
         tension_force: match spec.tension_force {
             TensionWord::Balanced => TensionForce::Balanced,
@@ -235,7 +234,7 @@ fn sph_parts<const D: usize>(
 /// The time step, the number of steps, and what binds the step.
 fn time_step<const D: usize>(
     spec: &Droplet,
-    parts: &SphParts<D>,
+    config: &SphConfig<D>,
     given_step: Option<f64>,
     errors: &mut Vec<Violation>,
 ) -> (f64, u64, &'static str) {
@@ -243,7 +242,7 @@ fn time_step<const D: usize>(
         let detail = "steps are given instead of a time step; give one of them";
         errors.push(Violation::new("/time_step", "conflict", detail, step, Value::Null));
     }
-    let (limit, bound) = longest_step(parts, REFERENCE_SPEED);
+    let StepLimit { length: limit, cause: bound } = longest_step(config, REFERENCE_SPEED);
     let time_step = match (given_step, spec.steps) {
         (Some(step), _) => step,
         (None, Some(steps)) => spec.end_time / steps as f64,
@@ -274,8 +273,8 @@ fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Domain<D> 
 impl<const D: usize> DropletScene<D> {
     /// Work of the forces: sums over pairs, or fits.
     fn momentum_work(&self, pairs: f64, particles: f64) -> f64 {
-        let Discretization::Dcpse(support) = self.parts.discretization else { return pairs };
-        let cutoff = support.radius / self.parts.spacing;
+        let Discretization::Dcpse(support) = self.config.discretization else { return pairs };
+        let cutoff = support.radius / self.config.spacing;
         let nodes = if D == 2 { 3.1 } else { 4.2 } * cutoff.powi(D as i32);
         let terms = term_count::<D>(support.degree) as f64;
         particles * nodes * (40.0 + 0.25 * terms * terms)
@@ -334,19 +333,19 @@ impl<const D: usize> DropletScene<D> {
     /// Signed distances from the surface of points that came from elsewhere.
     fn levels_of_points(&self, context: &BuildContext, positions: &[Vector<D>]) -> Result<Vec<f64>, Violation> {
         let (points, level) = cloud::points_with_levels::<D>(&context.clouds, "/shape")?;
-        if let Some(found) = cloud::check_spacing(&points, self.parts.spacing) {
+        if let Some(found) = cloud::check_spacing(&points, self.config.spacing) {
             return Err(found);
         }
         let domain = domain_of(&self.low, &self.lengths());
         let points: Vec<Vector<D>> = points.iter().map(|x| domain.wrap(*x)).collect();
-        let method = match &self.parts.geometry {
+        let method = match &self.config.geometry {
             Geometry::Pcp { method, .. } => method.clone(),
             Geometry::ColorField => {
                 let context = PcpContext { pointer: "/geometry", dimension: D, default_ratio: RATIO };
                 PcpSpec::default().plan(context)?.0
             }
         };
-        let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.parts.spacing)));
+        let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.config.spacing)));
         let never = Interrupt::default();
         let fitted =
             surface.detect(&points, &level, &never).and_then(|()| surface.fit_samples(&points, &level, None, &never));
@@ -380,12 +379,12 @@ impl<const D: usize> Scene for DropletScene<D> {
     }
 
     fn view(&self) -> View {
-        let has_distance = self.parts.has_tension() && matches!(self.parts.geometry, Geometry::Pcp { .. });
+        let has_distance = self.config.has_tension() && matches!(self.config.geometry, Geometry::Pcp { .. });
         if has_distance { View::DISTANCE } else { View::Nothing }
     }
 
     fn fields(&self) -> Vec<&'static Quantity> {
-        weakly_compressible_sph::quantities::fields(&self.parts)
+        weakly_compressible_sph::quantities::fields(&self.config)
     }
 
     fn clouds(&self) -> Vec<CloudReference> {
@@ -406,19 +405,19 @@ impl<const D: usize> Scene for DropletScene<D> {
     }
 
     fn family(&self) -> String {
-        let geometry = match &self.parts.geometry {
+        let geometry = match &self.config.geometry {
             Geometry::Pcp { method, .. } => work_estimate::method_name(method),
             Geometry::ColorField => "colorfield".to_owned(),
         };
-        let flow = if let Discretization::Dcpse(_) = self.parts.discretization { "/dcpse" } else { "" };
+        let flow = if let Discretization::Dcpse(_) = self.config.discretization { "/dcpse" } else { "" };
         format!("droplet/{D}/{geometry}{flow}")
     }
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
         let (particles, steps_done) = (particles as f64, steps as f64);
-        let evaluations = steps_done * if self.parts.integrator == Integrator::KickDriftKick { 1.0 } else { 2.0 };
-        let support = self.parts.kernel.support() * self.parts.smoothing_length / self.parts.spacing;
+        let evaluations = steps_done * if self.config.integrator == Integrator::KickDriftKick { 1.0 } else { 2.0 };
+        let support = self.config.kernel.support() * self.config.smoothing_length / self.config.spacing;
         let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
         let pairs = particles * ball * support.powi(D as i32) * evaluations;
         let mut work = vec![
@@ -428,22 +427,22 @@ impl<const D: usize> Scene for DropletScene<D> {
             PhaseWork::every_step("sph/tension", particles * evaluations),
             PhaseWork::every_step("neighbors", particles * steps_done),
         ];
-        if self.parts.density == DensityMethod::Summation {
+        if self.config.density == DensityMethod::Summation {
             work.push(PhaseWork::every_step("sph/density", pairs));
         }
-        if self.parts.is_shifted {
+        if self.config.is_shifted {
             work.push(PhaseWork::every_step("sph/shifting", pairs));
         }
         // Steps that are measured for both reasons count twice: they are few.
         let measurements =
             steps_done / plan.series_every_steps.max(1) as f64 + steps_done / measurement_interval(steps) as f64;
         let measured = |weight: f64| PhaseWork::every_step("measure", (measurements + 2.0) * weight);
-        if self.parts.has_tension() {
+        if self.config.has_tension() {
             work.push(PhaseWork::every_step("droplets", particles * steps_done));
-            match &self.parts.geometry {
+            match &self.config.geometry {
                 Geometry::Pcp { method, half_band } => {
                     let band = self.near(2.0 * half_band);
-                    let reach_h = half_band / self.parts.spacing;
+                    let reach_h = half_band / self.config.spacing;
                     work.extend(work_estimate::redistancing::<D>(
                         method,
                         band,
@@ -478,7 +477,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         };
         let cell = lengths.product() / self.count() as f64;
         let drop = Drop { positions, level, measure };
-        let system = SphSystem::new(self.parts.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
+        let system = SphSystem::new(self.config.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
             vec![Violation::new("/domain", "range", error.to_string(), self.spec.domain.to_json(), error.least)]
         })?;
         let (plan, clock) = (context.plan, context.cpu_clock);
@@ -498,6 +497,6 @@ impl<const D: usize> DropletScene<D> {
         } else {
             (36.0 * std::f64::consts::PI).cbrt() * measure.powf(2.0 / 3.0)
         };
-        (area * width / self.parts.spacing.powi(D as i32)).min(self.count() as f64)
+        (area * width / self.config.spacing.powi(D as i32)).min(self.count() as f64)
     }
 }

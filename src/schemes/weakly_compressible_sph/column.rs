@@ -1,13 +1,13 @@
-//! Numbers by place. Loops over pairs read and write the same place of up to a dozen columns; large vectors all begin at
-//! the same offset of a page, so that these would compete for the few cache lines of one set. Each column begins at an
-//! offset of its own.
+//! Columns of numbers by place. Loops over pairs read and write the same place of up to a dozen columns. Large vectors all
+//! begin at the same offset of a page, so that their lines would compete for the few entries of one cache set. Each column
+//! therefore begins at an offset of its own.
 
 use std::ops::{Deref, DerefMut};
 
-/// From one column's offset to the next, in numbers: four cache lines, so that sixteen columns share a page.
+/// Distance between the offsets of two columns, in numbers: four cache lines, so that sixteen columns share a page.
 const STAGGER: usize = 32;
 
-/// A column with some unused numbers before it.
+/// A column with some unused numbers in front.
 #[derive(Debug)]
 pub(super) struct Column {
     numbers: Vec<f64>,
@@ -15,19 +15,19 @@ pub(super) struct Column {
 }
 
 impl Column {
-    /// The column of a number, with nothing in it.
+    /// An empty column; `number` counts the columns and decides the offset.
     pub fn new(number: usize) -> Self {
         let lead = number * STAGGER;
         Self { numbers: vec![0.0; lead], lead }
     }
 
-    /// Puts other values in.
+    /// Replaces the values.
     pub fn refill(&mut self, values: impl Iterator<Item = f64>) {
         self.numbers.truncate(self.lead);
         self.numbers.extend(values);
     }
 
-    /// Makes it so long.
+    /// Changes the length; new values are 0.
     pub fn resize(&mut self, length: usize) {
         self.numbers.resize(self.lead + length, 0.0);
     }

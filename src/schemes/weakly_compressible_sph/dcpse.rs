@@ -1,29 +1,35 @@
-//! The flow by DC-PSE instead of sums over kernels (PCP section 4.3): gradients of pressure and velocity and the Laplacian of the
-//! velocity from fits about every particle, renewed at every evaluation, since particles move.
+//! The flow by DC-PSE instead of sums over kernels (PCP section 4.3). Gradients of pressure and velocity and their Laplacians
+//! come from fits around every particle, renewed at every evaluation, since particles move.
+//!
+//! du_i/dt = (η Δu − ∇P)/ρ_i, dρ_i/dt = ξ̂ ε/c ΔP − ρ_i ∇·u
+//!
+//! The diffusion damps what the gradient does not see, as that of PCP eq. B.12 does, with ΔP = c² Δρ.
 
+use super::flow_state::{FlowState, Rates};
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::CellList;
 use crate::operators::{Evaluation, FlatChart, Functional, Support, SupportDiagnostics};
 use crate::parallel::{Interrupt, Interrupted};
 
-/// Fits and their fields.
+/// Fits, the fields that they are made of and what they found.
 pub(super) struct DcpseFlow<const D: usize> {
     support: Support,
     cells: CellList<D>,
     evaluation: Evaluation<D>,
     velocity: [Vec<f64>; D],
-    /// Of a particle: ∂_a of the velocities and the pressure, axis by axis, then their Laplacians.
+    /// For each particle ∂_a of the velocities and the pressure, axis by axis, then their Laplacians.
     found: Vec<f64>,
+    /// Counts of fits that needed a rescue.
     pub fit_diagnostics: SupportDiagnostics,
 }
 
-/// What is found at a particle.
+/// Derivatives of the flow at a particle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FlowDerivatives<const D: usize> {
-    pub pressure_gradient: Vector<D>,
-    pub velocity_laplacian: Vector<D>,
-    pub divergence: f64,
-    pub pressure_laplacian: f64,
+struct FlowDerivatives<const D: usize> {
+    pressure_gradient: Vector<D>,
+    velocity_laplacian: Vector<D>,
+    divergence: f64,
+    pressure_laplacian: f64,
 }
 
 impl<const D: usize> DcpseFlow<D> {
@@ -41,8 +47,28 @@ impl<const D: usize> DcpseFlow<D> {
         }
     }
 
-    /// Everything at all particles.
-    pub fn find(
+    /// Sets accelerations and rates of density. `spread` is ξ̂ ε.
+    pub fn find_rates(
+        &mut self,
+        positions: &[Vector<D>],
+        flow: &FlowState<D>,
+        spread: f64,
+        rates: &mut Rates<D>,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        self.find(positions, &flow.predicted, &flow.pressure, interrupt)?;
+        for (i, acceleration) in rates.acceleration.iter_mut().enumerate() {
+            let found = self.at(i);
+            let (fluid, density) = (flow.fluid(i), flow.density[i]);
+            *acceleration = (found.velocity_laplacian * fluid.viscosity - found.pressure_gradient) / density;
+            let diffusion = spread / fluid.sound_speed * found.pressure_laplacian;
+            rates.density[i] = diffusion - density * found.divergence;
+        }
+        Ok(())
+    }
+
+    /// Fits all derivatives at all particles.
+    fn find(
         &mut self,
         positions: &[Vector<D>],
         velocity: &[Vector<D>],
@@ -63,16 +89,16 @@ impl<const D: usize> DcpseFlow<D> {
         Ok(())
     }
 
-    /// What was found at a particle.
-    pub fn at(&self, i: usize) -> FlowDerivatives<D> {
+    /// The derivatives at a particle.
+    fn at(&self, i: usize) -> FlowDerivatives<D> {
         let numbers = self.evaluation.numbers(D + 1);
         let own = &self.found[i * numbers..(i + 1) * numbers];
-        let of = |functional: usize, field: usize| own[functional * (D + 1) + field];
+        let derivative = |functional: usize, field: usize| own[functional * (D + 1) + field];
         FlowDerivatives {
-            pressure_gradient: Vector::<D>::from_fn(|a, _| of(a, D)),
-            velocity_laplacian: Vector::<D>::from_fn(|d, _| of(D, d)),
-            divergence: (0..D).map(|a| of(a, a)).sum(),
-            pressure_laplacian: of(D, D),
+            pressure_gradient: Vector::<D>::from_fn(|a, _| derivative(a, D)),
+            velocity_laplacian: Vector::<D>::from_fn(|d, _| derivative(D, d)),
+            divergence: (0..D).map(|a| derivative(a, a)).sum(),
+            pressure_laplacian: derivative(D, D),
         }
     }
 }

@@ -1,6 +1,6 @@
-//! The two fluids and their equation of state.
+//! The constants of a fluid and its equation of state.
 
-/// A fluid: ρ₀, η, c and γ.
+/// A fluid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fluid {
     /// Reference density ρ₀.
@@ -9,12 +9,12 @@ pub struct Fluid {
     pub viscosity: f64,
     /// Speed of sound c.
     pub sound_speed: f64,
-    /// Exponent γ.
+    /// Exponent γ of the equation of state.
     pub polytropic: f64,
 }
 
 impl Fluid {
-    /// P = c² ρ₀/γ ((ρ/ρ₀)^γ − 1) (PCP eq. 27).
+    /// The pressure at a density, P = c² ρ₀/γ ((ρ/ρ₀)^γ − 1) (PCP eq. 27).
     #[must_use]
     pub fn pressure(&self, density: f64) -> f64 {
         let ratio = density / self.density;
@@ -28,7 +28,7 @@ impl Fluid {
         self.sound_speed * self.sound_speed * self.density / self.polytropic * (power - 1.0)
     }
 
-    /// ν = η/ρ₀.
+    /// The kinematic viscosity ν = η/ρ₀.
     #[must_use]
     pub fn kinematic_viscosity(&self) -> f64 {
         self.viscosity / self.density

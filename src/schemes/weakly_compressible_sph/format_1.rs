@@ -31,12 +31,15 @@ pub(super) fn translate<const D: usize>(
         section.put_count("parts_of_step", parts_of_step);
     });
     let mut droplets = Section::default();
-    copy(arrays, &["candidate", "droplet", "ball_curvatures"], &mut droplets)?;
+    copy(arrays, &["droplet", "ball_curvatures"], &mut droplets)?;
     droplets.put_optional("initial_measure", known(initial_measure));
     state.put("droplets", Entry::Section(droplets));
     if has_interface {
-        state.put("redistancing", soundness(arrays.counts("rescues")?, condition)?);
-        state.put_count("bounded_curvatures", bounded);
+        let mut interface = Section::default();
+        interface.put("redistancing", soundness(arrays.counts("rescues")?, condition)?);
+        interface.put_count("bounded_curvatures", bounded);
+        copy(arrays, &["candidate"], &mut interface)?;
+        state.put("interface", Entry::Section(interface));
     }
     if has_flow_fits {
         let [least_pivot] = numbers("flow_pivot", arrays.reals("flow_pivot")?)?;

@@ -1,4 +1,4 @@
-//! Which kernel: chosen by name, a type of its own inside the loops.
+//! The smoothing kernel: chosen by name, a type of its own inside the loops.
 
 use crate::smoothing_kernels::RadialKernel;
 use crate::smoothing_kernels::radial::{CubicSplineRadial, QuinticSplineRadial, WendlandC2Radial, WendlandC4Radial};
@@ -16,24 +16,24 @@ pub enum KernelChoice {
     QuinticSpline,
 }
 
-/// Calls an expression with `K` standing for the type of a chosen kernel.
+/// Evaluates an expression in which `K` stands for the type of a chosen kernel.
 macro_rules! with_kernel {
     ($choice:expr, $kernel:ident => $value:expr) => {
         match $choice {
-            KernelChoice::WendlandC2 => {
-                type $kernel = crate::smoothing_kernels::radial::WendlandC2Radial;
+            $crate::schemes::weakly_compressible_sph::KernelChoice::WendlandC2 => {
+                type $kernel = $crate::smoothing_kernels::radial::WendlandC2Radial;
                 $value
             }
-            KernelChoice::WendlandC4 => {
-                type $kernel = crate::smoothing_kernels::radial::WendlandC4Radial;
+            $crate::schemes::weakly_compressible_sph::KernelChoice::WendlandC4 => {
+                type $kernel = $crate::smoothing_kernels::radial::WendlandC4Radial;
                 $value
             }
-            KernelChoice::CubicSpline => {
-                type $kernel = crate::smoothing_kernels::radial::CubicSplineRadial;
+            $crate::schemes::weakly_compressible_sph::KernelChoice::CubicSpline => {
+                type $kernel = $crate::smoothing_kernels::radial::CubicSplineRadial;
                 $value
             }
-            KernelChoice::QuinticSpline => {
-                type $kernel = crate::smoothing_kernels::radial::QuinticSplineRadial;
+            $crate::schemes::weakly_compressible_sph::KernelChoice::QuinticSpline => {
+                type $kernel = $crate::smoothing_kernels::radial::QuinticSplineRadial;
                 $value
             }
         }
@@ -42,7 +42,7 @@ macro_rules! with_kernel {
 pub(super) use with_kernel;
 
 impl KernelChoice {
-    /// Where it ends, in ε.
+    /// The ratio r/ε at which the kernel vanishes.
     #[must_use]
     pub fn support(self) -> f64 {
         match self {
@@ -53,19 +53,38 @@ impl KernelChoice {
         }
     }
 
-    /// σ_D.
+    /// The factor σ_D that makes the integral of the kernel 1 in `dimension` dimensions.
     #[must_use]
     pub fn normalization(self, dimension: usize) -> f64 {
         with_kernel!(self, K => K::normalization(dimension))
     }
+}
 
-    /// The factor of its slopes.
-    pub(super) fn slope(self) -> f64 {
-        with_kernel!(self, K => K::SLOPE)
+/// A kernel of a smoothing length, W(r) = σ_D/ε^D w(r/ε). Loops over pairs compute with w alone; what they sum is scaled
+/// afterwards.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ScaledKernel {
+    /// The shape w.
+    pub choice: KernelChoice,
+    /// The smoothing length ε.
+    pub smoothing_length: f64,
+    /// The factor σ_D/ε^D of values.
+    pub normalization: f64,
+}
+
+impl ScaledKernel {
+    pub fn new(choice: KernelChoice, smoothing_length: f64, dimension: usize) -> Self {
+        let normalization = choice.normalization(dimension) / smoothing_length.powi(dimension as i32);
+        Self { choice, smoothing_length, normalization }
     }
 
     /// w(q).
-    pub(super) fn value(self, q: f64) -> f64 {
-        with_kernel!(self, K => K::value(q))
+    pub fn value(&self, q: f64) -> f64 {
+        with_kernel!(self.choice, K => K::value(q))
+    }
+
+    /// The constant factor of w'(q)/q that loops over pairs leave out.
+    pub fn slope(&self) -> f64 {
+        with_kernel!(self.choice, K => K::SLOPE)
     }
 }

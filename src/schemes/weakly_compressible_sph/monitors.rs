@@ -1,6 +1,7 @@
 //! What a series shows of two fluids, and what a report makes of it.
 
 use super::quantities;
+use super::species::Species;
 use super::system::SphSystem;
 use crate::closest_point::enclosed_moments::{EnclosedMoments, enclosed_moments};
 use crate::geometry::Vector;
@@ -59,42 +60,41 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 }
 
 impl<const D: usize> SphSystem<D> {
-    /// The largest speed.
-    pub(super) fn largest_speed(&self) -> f64 {
-        self.velocity.iter().map(Vector::<D>::norm_squared).fold(0.0, f64::max).sqrt()
-    }
-
     /// Mean and standard deviation of the curvature over the particles that feel the tension: |φ| < 2 ε, or those of the
     /// colour field's interface.
     fn curvature_spread(&self) -> (f64, f64) {
         let curvature = self.particles.scalar(self.columns.curvature);
         let band = self.particles.flag(self.columns.in_band);
         let phi = self.particles.scalar(self.columns.phi);
-        let width = if self.interface.is_some() { 2.0 * self.parts.smoothing_length } else { f64::INFINITY };
+        let width =
+            if self.interface.level_set().is_some() { 2.0 * self.config.smoothing_length } else { f64::INFINITY };
         spread((0..band.len()).filter(|i| band[*i] == 1 && phi[*i].abs() < width).map(|i| curvature[i]))
     }
 
     /// Means of the pressure well inside and well outside: by the equation of state, and with what the balanced force has
     /// absorbed inside.
     fn mean_pressures(&self) -> [(f64, f64); 2] {
-        let far = 2.0 * self.parts.smoothing_length;
+        let far = 2.0 * self.config.smoothing_length;
         let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
-        let mut sums = [[0.0; 3]; 2];
+        let mut sums = [[0.0; 3]; Species::ALL.len()];
         for i in 0..phi.len() {
             if band[i] == 1 && phi[i].abs() <= far {
                 continue;
             }
-            let sum = &mut sums[usize::from(self.phase[i])];
+            let sum = &mut sums[usize::from(self.flow.species[i].code())];
             sum[0] += 1.0;
-            sum[1] += self.pressure[i];
-            sum[2] += self.pressure[i] + self.absorbed_pressure(i);
+            sum[1] += self.flow.pressure[i];
+            sum[2] += self.flow.pressure[i] + self.absorbed_pressure(i);
         }
-        [1, 0].map(|side: usize| (sums[side][1] / sums[side][0], sums[side][2] / sums[side][0]))
+        [Species::Inside, Species::Outside].map(|species| {
+            let [count, pressure, full] = sums[usize::from(species.code())];
+            (pressure / count, full / count)
+        })
     }
 
     /// Area or volume, centre and second moments of the inside, by quadrature on the fits; None without an interface.
     pub(super) fn moments(&self) -> Result<Option<EnclosedMoments<D>>, Interrupted> {
-        let Some(interface) = &self.interface else { return Ok(None) };
+        let Some(interface) = self.interface.level_set() else { return Ok(None) };
         let centre = self.circular_centre(&interface.surface.sample_points());
         let unwrap = |x: &Vector<D>| centre + self.domain.displacement(&centre, x);
         enclosed_moments(&interface.surface, unwrap, &self.interrupt).map(Some)
@@ -120,7 +120,7 @@ impl<const D: usize> SphSystem<D> {
     fn least_distance(&self) -> f64 {
         let positions = self.particles.positions();
         let mut cells = CellList::new(self.domain.clone());
-        let reach = self.parts.spacing;
+        let reach = self.config.spacing;
         cells.rebuild(positions.iter().copied(), reach);
         let mut least = reach * reach;
         for (i, x) in positions.iter().enumerate() {
@@ -130,15 +130,15 @@ impl<const D: usize> SphSystem<D> {
                 }
             });
         }
-        least.sqrt() / self.parts.spacing
+        least.sqrt() / self.config.spacing
     }
 
     /// Everything a row of the series shows.
     pub(super) fn row(&self, time_step: f64, moments: Option<&EnclosedMoments<D>>) -> Row {
         let mut energy = 0.0;
         let mut momentum = Vector::<D>::zeros();
-        for (i, u) in self.velocity.iter().enumerate() {
-            let mass = self.mass(i);
+        for (i, u) in self.flow.velocity.iter().enumerate() {
+            let mass = self.flow.mass(i);
             energy += 0.5 * mass * u.norm_squared();
             momentum += u * mass;
         }
@@ -152,11 +152,11 @@ impl<const D: usize> SphSystem<D> {
         row.extend(moments.map_or(nothing, |m| m.high - m.low).iter());
         row.push(moments.map_or(f64::NAN, deformation));
         let [(inside, inside_full), (outside, _)] = self.mean_pressures();
-        let droplets = if self.parts.has_tension() { self.ball_curvatures.len() as f64 } else { f64::NAN };
-        let speed = self.largest_speed();
-        let sound = self.parts.inside.sound_speed.min(self.parts.outside.sound_speed);
+        let droplets = if self.config.has_tension() { self.droplets.number() as f64 } else { f64::NAN };
+        let speed = self.flow.largest_speed();
+        let sound = self.config.fluids.least_sound_speed();
         row.extend([inside_full, outside, inside - outside, droplets, speed / sound]);
-        row.extend([speed * time_step / self.parts.spacing, self.least_distance()]);
+        row.extend([speed * time_step / self.config.spacing, self.least_distance()]);
         row
     }
 }

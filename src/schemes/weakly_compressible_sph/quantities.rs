@@ -1,6 +1,6 @@
 //! What frames, series and reports of two fluids show.
 
-use super::parts::{Geometry, SphParts};
+use super::config::{Geometry, SphConfig};
 use crate::schemes::measured_errors;
 use crate::simulation::Quantity;
 use crate::simulation::fields::{COMMON_FIELDS, CURVATURE, NORMAL, SURFACE_FIELDS};
@@ -98,16 +98,16 @@ pub fn all_fields() -> Vec<&'static Quantity> {
 
 /// Fields of frames.
 #[must_use]
-pub fn fields<const D: usize>(parts: &SphParts<D>) -> Vec<&'static Quantity> {
+pub fn fields<const D: usize>(config: &SphConfig<D>) -> Vec<&'static Quantity> {
     let mut fields: Vec<&'static Quantity> = Vec::new();
-    if parts.has_tension() {
-        match parts.geometry {
+    if config.has_tension() {
+        match config.geometry {
             Geometry::Pcp { .. } => fields.extend(SURFACE_FIELDS),
             Geometry::ColorField => fields.extend([&NORMAL, &CURVATURE]),
         }
     }
     fields.extend([&VELOCITY, &DENSITY, &PRESSURE, &PHASE]);
-    if !parts.has_one_mass() {
+    if !config.fluids.have_one_mass() {
         fields.push(&MASS);
     }
     fields.extend(COMMON_FIELDS);

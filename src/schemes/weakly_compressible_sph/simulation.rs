@@ -1,12 +1,15 @@
 //! Two fluids step by step.
 
-use super::components::ball_curvature;
+use super::droplets::ball_curvature;
 use super::format_1;
+use super::interface::LevelSet;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::quantities::{DENSITY, MASS, PHASE, PRESSURE, TIME, TIME_STEP, VELOCITY};
+use super::species::Species;
+use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, SphSystem};
-use super::time_step::longest_step;
+use super::time_step::{REFERENCE_SPEED, StepLimit, longest_step};
 use crate::closest_point::FitDiagnostics;
 use crate::operators::SupportDiagnostics;
 use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, support_diagnostics};
@@ -24,6 +27,7 @@ use std::collections::BTreeMap;
 /// Two fluids as a simulation.
 pub struct WeaklyCompressibleSph<const D: usize> {
     system: SphSystem<D>,
+    stepper: Stepper<D>,
     plan: OutputPlan,
     end_time: f64,
     /// Parts that the last step was cut into.
@@ -73,6 +77,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let pace = Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 });
         let mut this = Self {
             failure: None,
+            stepper: Stepper::new(&system.config, system.flow.count()),
             system,
             plan,
             end_time,
@@ -92,21 +97,21 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         // A row of the right length, whatever happens.
         self.row = vec![f64::NAN; names(D).len()];
         self.system.evaluate(0.0, false, &mut self.course.phases).map_err(|error| failed(error, start))?;
-        if self.system.initial_measure.is_nan()
+        if self.system.droplets.initial_measure.is_nan()
             && let Some(moments) = self.system.moments()?
         {
             // Of a drop that is known by its particles alone, the first quadrature says what is to be kept.
-            self.system.initial_measure = moments.area_or_volume;
-            self.system.renew_ball_curvatures();
+            self.system.droplets.initial_measure = moments.area_or_volume;
+            self.system.droplets.renew_ball_curvatures();
             self.system.evaluate(0.0, false, &mut self.course.phases).map_err(|error| failed(error, start))?;
         }
-        self.summary.droplets = self.system.ball_curvatures.len() as f64;
+        self.summary.droplets = self.system.droplets.number() as f64;
         self.take_row()
     }
 
     /// κ₀ of one droplet that holds everything.
     fn whole_curvature(&self) -> f64 {
-        ball_curvature::<D>(self.system.initial_measure)
+        ball_curvature::<D>(self.system.droplets.initial_measure)
     }
 
     fn time_of_part(&self) -> f64 {
@@ -143,11 +148,11 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
 
     /// How many parts a step must be cut into, for the present speed.
     fn parts_needed(&self, next: Clock) -> Result<u64, StepError> {
-        if !self.system.parts.is_adaptive {
+        if !self.system.config.is_adaptive {
             return Ok(1);
         }
-        let speed = self.system.largest_speed();
-        let (limit, _) = longest_step(&self.system.parts, speed);
+        let speed = self.system.flow.largest_speed();
+        let StepLimit { length: limit, .. } = longest_step(&self.system.config, speed);
         let parts = (self.course.pace.time_step / limit - 1e-9).ceil().max(1.0);
         if parts <= MOST_PARTS {
             return Ok(parts as u64);
@@ -158,19 +163,19 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
 
     fn check(&mut self, next: Clock) -> Result<(), StepError> {
         let system = &self.system;
-        check_finite_vectors("velocity", &system.velocity, next)?;
-        check_finite("density", &system.density, next)?;
+        check_finite_vectors("velocity", &system.flow.velocity, next)?;
+        check_finite("density", &system.flow.density, next)?;
         first_broken(system.columns.find_broken(&system.particles), next)?;
         let Fastest { particle, speed, sound_speed } = fastest(system);
-        self.max_cfl = self.max_cfl.max(speed * self.time_of_part() / system.parts.spacing);
+        self.max_cfl = self.max_cfl.max(speed * self.time_of_part() / system.config.spacing);
         if speed > sound_speed {
             // What would have held at the speeds that a sound run has.
-            let (stable, bound) = longest_step(&system.parts, super::time_step::REFERENCE_SPEED);
+            let StepLimit { length: stable, cause: bound } = longest_step(&system.config, REFERENCE_SPEED);
             let time_step = self.time_of_part();
             let Clock { step, time } = next;
             return Err(StepError::TooFast { particle, speed, sound_speed, time_step, stable, bound, step, time });
         }
-        self.resting = match system.parts.rest_below {
+        self.resting = match system.config.rest_below {
             Some(limit) if speed < limit => self.resting + 1,
             _ => 0,
         };
@@ -192,20 +197,20 @@ struct Fastest {
 
 fn fastest<const D: usize>(system: &SphSystem<D>) -> Fastest {
     let mut fastest = (0, 0.0);
-    for (i, u) in system.velocity.iter().enumerate() {
+    for (i, u) in system.flow.velocity.iter().enumerate() {
         let square = u.norm_squared();
         if square > fastest.1 {
             fastest = (i, square);
         }
     }
     let (particle, speed) = (fastest.0, fastest.1.sqrt());
-    Fastest { particle, speed, sound_speed: system.parts.fluid(system.phase[particle] == 1).sound_speed }
+    Fastest { particle, speed, sound_speed: system.flow.fluid(particle).sound_speed }
 }
 
 fn failed(error: EvaluationError, at: Clock) -> StepError {
     match error {
         EvaluationError::Interrupted => StepError::Interrupted,
-        EvaluationError::InterfaceLost => StepError::InterfaceLost { step: at.step, time: at.time },
+        EvaluationError::Lost => StepError::InterfaceLost { step: at.step, time: at.time },
     }
 }
 
@@ -232,8 +237,10 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let part = self.time_of_part();
         for k in 0..self.parts_of_step {
             let time = start.time + k as f64 * part;
-            let changed =
-                self.system.advance(time, part, &mut self.course.phases).map_err(|error| failed(error, next))?;
+            let changed = self
+                .stepper
+                .advance(&mut self.system, time, part, &mut self.course.phases)
+                .map_err(|error| failed(error, next))?;
             if let Some(droplets) = changed {
                 let code = if droplets as f64 > self.summary.droplets { "split" } else { "merged" };
                 let message = format!("there are {droplets} droplets now");
@@ -259,8 +266,8 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
         let system = &self.system;
         let mut fields = Fields::new(system.particles.positions(), selection);
-        if system.parts.has_tension() {
-            if system.interface.is_some() {
+        if system.config.has_tension() {
+            if system.interface.level_set().is_some() {
                 fields.surface(&system.particles, &system.columns, true);
             } else {
                 let band = system.particles.flag(system.columns.in_band);
@@ -271,13 +278,13 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
                 fields.scalar(&CURVATURE, || curvature.iter().enumerate().map(|(i, c)| known(i, *c)).collect());
             }
         }
-        fields.vector(&VELOCITY, || system.velocity.iter().copied());
-        fields.scalar(&DENSITY, || system.density.clone());
-        let pressures = system.pressure.iter().enumerate();
+        fields.vector(&VELOCITY, || system.flow.velocity.iter().copied());
+        fields.scalar(&DENSITY, || system.flow.density.clone());
+        let pressures = system.flow.pressure.iter().enumerate();
         fields.scalar(&PRESSURE, || pressures.map(|(i, p)| p + system.absorbed_pressure(i)).collect());
-        fields.scalar(&PHASE, || system.phase.iter().map(|phase| f64::from(*phase)).collect());
-        if !system.parts.has_one_mass() {
-            fields.scalar(&MASS, || (0..system.phase.len()).map(|i| system.mass(i)).collect());
+        fields.scalar(&PHASE, || system.flow.species.iter().map(|species| f64::from(species.code())).collect());
+        if !system.config.fluids.have_one_mass() {
+            fields.scalar(&MASS, || (0..system.flow.count()).map(|i| system.flow.mass(i)).collect());
         }
         fields.particle_id();
         fields
@@ -293,24 +300,26 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         });
         state.put_section("particles", |section| {
             save_particles(&system.particles, section);
-            section.put_flags("phase", &system.phase);
-            section.put_vectors("velocity", &system.velocity);
-            section.put_vectors("acceleration", &system.acceleration);
-            section.put_vectors("reference", &system.reference);
-            section.put_reals("density", &system.density);
-            section.put_reals("density_rate", &system.density_rate);
+            section.put_counts("phase", system.flow.species.iter().map(|species| u64::from(species.code())));
+            section.put_vectors("velocity", &system.flow.velocity);
+            section.put_vectors("acceleration", &system.rates.acceleration);
+            section.put_vectors("reference", &system.pairs.lists.reference);
+            section.put_reals("density", &system.flow.density);
+            section.put_reals("density_rate", &system.rates.density);
         });
         state.put_section("droplets", |section| {
-            section.put_flags("candidate", &system.candidate);
-            section.put_flags("droplet", &system.droplet);
-            section.put_reals("ball_curvatures", &system.ball_curvatures);
-            section.put_optional("initial_measure", known(system.initial_measure));
+            section.put_flags("droplet", &system.droplets.label);
+            section.put_reals("ball_curvatures", &system.droplets.ball_curvatures);
+            section.put_optional("initial_measure", known(system.droplets.initial_measure));
         });
-        if let Some(interface) = &system.interface {
-            state.put_component("redistancing", interface.surface.fit_diagnostics());
-            state.put_count("bounded_curvatures", interface.bounded);
+        if let Some(level_set) = system.interface.level_set() {
+            state.put_section("interface", |section| {
+                section.put_component("redistancing", level_set.surface.fit_diagnostics());
+                section.put_count("bounded_curvatures", level_set.bounded);
+                section.put_flags("candidate", &level_set.is_candidate);
+            });
         }
-        if let Some(flow) = &system.dcpse {
+        if let Some(flow) = system.equations.fits() {
             state.put_component("flow_fits", &flow.fit_diagnostics);
         }
         state.put_count("absorbed_strays", system.strays.absorbed);
@@ -333,14 +342,15 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         if clock.step > pace.last {
             return Err(LoadError::Beyond { step: clock.step, last: pace.last });
         }
-        let interface: Option<(FitDiagnostics, u64)> = match &self.system.interface {
-            Some(_) => Some((state.component("redistancing")?, state.count("bounded_curvatures")?)),
+        let interface = match self.system.interface.level_set() {
+            Some(level_set) => Some(state.section("interface", |section| load_interface(level_set, section))?),
             None => None,
         };
-        let flow_fits: Option<SupportDiagnostics> = match &self.system.dcpse {
+        let flow_fits: Option<SupportDiagnostics> = match self.system.equations.fits() {
             Some(_) => Some(state.component("flow_fits")?),
             None => None,
         };
+        let species = state.section("particles", species_of)?;
         let (absorbed, max_cfl) = (state.count("absorbed_strays")?, state.real("max_cfl")?);
         let (resting, row) = (state.count("resting_steps")?, state.section("row", load_row::<D>)?);
         let summary: Summary = state.component("summary")?;
@@ -350,11 +360,15 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         state.section("particles", |section| load_columns(&mut self.system, section))?;
         state.section("droplets", |section| load_droplets(&mut self.system, section))?;
         let system = &mut self.system;
-        if let (Some((soundness, bounded)), Some(interface)) = (interface, &mut system.interface) {
-            *interface.surface.fit_diagnostics_mut() = soundness;
-            interface.bounded = bounded;
+        system.flow.species = species;
+        if let (Some((diagnostics, bounded, candidates)), Some(level_set)) =
+            (interface, system.interface.level_set_mut())
+        {
+            *level_set.surface.fit_diagnostics_mut() = diagnostics;
+            level_set.bounded = bounded;
+            copy_flags(candidates, &mut level_set.is_candidate);
         }
-        if let (Some(soundness), Some(flow)) = (flow_fits, &mut system.dcpse) {
+        if let (Some(soundness), Some(flow)) = (flow_fits, system.equations.fits_mut()) {
             flow.fit_diagnostics = soundness;
         }
         system.strays.absorbed = absorbed;
@@ -370,13 +384,13 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
-        let has = (self.system.interface.is_some(), self.system.dcpse.is_some());
+        let has = (self.system.interface.level_set().is_some(), self.system.equations.fits().is_some());
         format_1::translate(arrays, &self.system.particles, has)
     }
 
     fn report(&self) -> Report {
         let whole = self.whole_curvature();
-        let expected = (self.system.parts.tension * whole, whole, self.system.initial_measure);
+        let expected = (self.system.config.tension * whole, whole, self.system.droplets.initial_measure);
         Report {
             errors: self.summary.entries(D, self.clock().time, expected),
             health: self.health(),
@@ -386,14 +400,15 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn health(&self) -> Health {
-        let volume_drift = self.summary.last_measure().map(|measure| measure / self.system.initial_measure - 1.0);
+        let volume_drift =
+            self.summary.last_measure().map(|measure| measure / self.system.droplets.initial_measure - 1.0);
         let Fastest { speed, sound_speed, .. } = fastest(&self.system);
         let mut checks = vec![Check::at_most("mach", Some(speed / sound_speed), 1.0, "")];
-        if self.system.interface.is_some() {
+        if self.system.interface.level_set().is_some() {
             checks.push(Check::watched(if D == 2 { "area_drift" } else { "volume_drift" }, volume_drift, ""));
             checks.push(Check::watched("absorbed_strays", Some(self.system.strays.absorbed as f64), "particles"));
         }
-        let finite = self.system.velocity.iter().all(is_finite);
+        let finite = self.system.flow.velocity.iter().all(is_finite);
         Health { finite, max_cfl: self.max_cfl, volume_drift, checks }
     }
 
@@ -405,12 +420,12 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 impl<const D: usize> WeaklyCompressibleSph<D> {
     fn diagnostics(&self) -> Vec<Diagnostic> {
         let mut diagnostics = Vec::new();
-        if let Some(interface) = &self.system.interface {
+        if let Some(interface) = self.system.interface.level_set() {
             diagnostics.extend(closest_point_diagnostics(interface.surface.fit_diagnostics()));
             let doc = "Curvatures that were bounded to what the spacing resolves.";
             diagnostics.push(Diagnostic::count("curvature.clipped", interface.bounded, doc));
         }
-        if let Some(flow) = &self.system.dcpse {
+        if let Some(flow) = self.system.equations.fits() {
             diagnostics.extend(support_diagnostics(FLOW_FITS, &flow.fit_diagnostics));
         }
         let doc = "Particles without a neighbor of their own fluid that took the side of their neighbors.";
@@ -419,45 +434,57 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
     }
 }
 
+/// The soundness of fits, the bounded curvatures and the candidates of a state.
+fn load_interface<'a, const D: usize>(
+    level_set: &LevelSet<D>,
+    section: &'a Section,
+) -> Result<(FitDiagnostics, u64, &'a [u64]), LoadError> {
+    let candidates = section.counts_of("candidate", level_set.is_candidate.len())?;
+    Ok((section.component("redistancing")?, section.count("bounded_curvatures")?, candidates))
+}
+
+/// The species of all particles.
+fn species_of(section: &Section) -> Result<Vec<Species>, LoadError> {
+    let unknown = || LoadError::Kind { name: "phase".to_owned(), expected: "0 or 1 everywhere" };
+    section.counts("phase")?.iter().map(|code| Species::from_code(*code).ok_or_else(unknown)).collect()
+}
+
 /// Checks the columns of particles against this scene.
 fn check_columns<const D: usize>(system: &SphSystem<D>, section: &Section) -> Result<(), LoadError> {
-    let count = system.phase.len();
+    let count = system.flow.count();
     check_particles(&system.particles, section)?;
     section.counts_of("phase", count)?;
     for name in ["velocity", "acceleration", "reference"] {
         section.reals_of(name, count * D)?;
     }
     section.reals_of("density", count)?;
-    section.reals_of("density_rate", system.density_rate.len())?;
+    section.reals_of("density_rate", system.rates.density.len())?;
     Ok(())
 }
 
 /// Loads the columns of particles, as they were checked.
 fn load_columns<const D: usize>(system: &mut SphSystem<D>, section: &Section) -> Result<(), LoadError> {
     load_particles(&mut system.particles, section)?;
-    copy_flags(section.counts("phase")?, &mut system.phase);
-    copy_vectors(section.reals("velocity")?, &mut system.velocity);
-    copy_vectors(section.reals("acceleration")?, &mut system.acceleration);
-    copy_vectors(section.reals("reference")?, &mut system.reference);
-    system.density.copy_from_slice(section.reals("density")?);
-    system.density_rate.copy_from_slice(section.reals("density_rate")?);
+    copy_vectors(section.reals("velocity")?, &mut system.flow.velocity);
+    copy_vectors(section.reals("acceleration")?, &mut system.rates.acceleration);
+    copy_vectors(section.reals("reference")?, &mut system.pairs.lists.reference);
+    system.flow.density.copy_from_slice(section.reals("density")?);
+    system.rates.density.copy_from_slice(section.reals("density_rate")?);
     Ok(())
 }
 
 /// Checks which particle belongs to which droplet.
 fn check_droplets<const D: usize>(system: &SphSystem<D>, section: &Section) -> Result<(), LoadError> {
-    section.counts_of("candidate", system.candidate.len())?;
-    section.counts_of("droplet", system.droplet.len())?;
+    section.counts_of("droplet", system.droplets.label.len())?;
     section.reals("ball_curvatures")?;
     section.optional("initial_measure").map(|_| ())
 }
 
 /// Loads which particle belongs to which droplet, as it was checked.
 fn load_droplets<const D: usize>(system: &mut SphSystem<D>, section: &Section) -> Result<(), LoadError> {
-    copy_flags(section.counts("candidate")?, &mut system.candidate);
-    copy_flags(section.counts("droplet")?, &mut system.droplet);
-    system.ball_curvatures = section.reals("ball_curvatures")?.to_vec();
-    system.initial_measure = section.optional("initial_measure")?.unwrap_or(f64::NAN);
+    copy_flags(section.counts("droplet")?, &mut system.droplets.label);
+    system.droplets.ball_curvatures = section.reals("ball_curvatures")?.to_vec();
+    system.droplets.initial_measure = section.optional("initial_measure")?.unwrap_or(f64::NAN);
     Ok(())
 }
 

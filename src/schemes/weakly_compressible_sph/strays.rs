@@ -1,21 +1,24 @@
-//! Particles that have nobody of their own fluid next to them, of either fluid: what is left of a neck that has parted. Fits take
-//! them for droplets of a spacing's size that never come back. Where the fluids are one and the same but for the interface
-//! between them, such particles take the side of their neighbours. Threads of several particles are left alone: tension draws
-//! them in (measured: to absorb rows as well costs up to a third of a drop at h = 1/32).
+//! Strays: particles that are left without a neighbor of their own species when a neck has parted. Fits take them for droplets
+//! of a spacing's size that never vanish. Where the fluids are the same but for the interface between them, such particles
+//! take the species of their neighbors.
+//!
+//! Threads of several particles are left alone, since tension draws them in (measured: to absorb rows as well costs up to a
+//! third of a drop at h = 1/32).
 
+use super::species::Species;
 use crate::geometry::Domain;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::particles::{Particles, ScalarKey};
 
-/// Who is next to a particle, in h: on a lattice eight are in the plane.
-const REACH_H: f64 = 1.5;
+/// Distance in h up to which another particle is a neighbor here: on a lattice the eight next particles in the plane.
+const NEIGHBORHOOD_H: f64 = 1.5;
 
-/// Storage for finding them.
+/// Storage for finding strays.
 #[derive(Debug)]
 pub(super) struct Strays<const D: usize> {
     cells: CellList<D>,
     found: Vec<usize>,
-    /// Particles that have changed side up to now.
+    /// Particles that have changed their species up to now.
     pub absorbed: u64,
 }
 
@@ -24,23 +27,24 @@ impl<const D: usize> Strays<D> {
         Self { cells: CellList::new(domain), found: Vec::new(), absorbed: 0 }
     }
 
-    /// Turns those who stand alone among `near`, all of them judged by what was before.
+    /// Changes species and level of the particles among `near` that have no neighbor of their own species. All particles are
+    /// judged by the species before the change.
     pub fn absorb(
         &mut self,
         particles: &mut Particles<D>,
         phi: ScalarKey,
         near: &[usize],
         spacing: f64,
-        phase: &mut [u8],
+        species: &mut [Species],
     ) {
         let (positions, level) = (particles.positions(), particles.scalar(phi));
-        let reach = REACH_H * spacing;
-        self.cells.rebuild(near.iter().map(|i| positions[*i]), reach);
+        let cutoff = NEIGHBORHOOD_H * spacing;
+        self.cells.rebuild(near.iter().map(|i| positions[*i]), cutoff);
         self.found.clear();
         for (k, i) in near.iter().enumerate().filter(|(_, i)| level[**i].abs() < spacing) {
             let mut is_alone = true;
-            self.cells.for_each_within(&positions[*i], reach, |other, _, _| {
-                is_alone &= other == k || phase[near[other]] != phase[*i];
+            self.cells.for_each_within(&positions[*i], cutoff, |other, _, _| {
+                is_alone &= other == k || species[near[other]] != species[*i];
             });
             if is_alone {
                 self.found.push(*i);
@@ -48,7 +52,7 @@ impl<const D: usize> Strays<D> {
         }
         let level = particles.scalar_mut(phi);
         for i in &self.found {
-            phase[*i] = 1 - phase[*i];
+            species[*i] = species[*i].across_interface();
             level[*i] = -level[*i];
         }
         self.absorbed += self.found.len() as u64;
@@ -57,30 +61,31 @@ impl<const D: usize> Strays<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::Strays;
+    use super::{Species, Strays};
     use crate::geometry::{Domain, Vector};
     use crate::particles::Particles;
 
     #[test]
-    fn who_stands_alone_changes_side_and_a_row_does_not() {
+    fn a_particle_alone_changes_its_species_and_a_row_does_not() {
         let positions: Vec<Vector<2>> =
             (0..400).map(|k| Vector::<2>::new(f64::from(k % 20) - 10.0, f64::from(k / 20) - 10.0)).collect();
-        let everybody: Vec<usize> = (0..positions.len()).collect();
+        let all: Vec<usize> = (0..positions.len()).collect();
         let at = |x: &Vector<2>, place: [f64; 2]| (x - Vector::<2>::from(place)).norm() < 0.1;
-        // The lower half, a row in the upper one, one that stands alone in each.
+        // The lower half, a row in the upper half, and one particle alone in each half.
         let stays = |x: &Vector<2>| x[1] < 0.0 || (x[1] - 5.0).abs() < 0.1;
         let is_inside = |x: &Vector<2>| stays(x) != (at(x, [2.0, 2.0]) || at(x, [3.0, -4.0]));
-        let mut phase: Vec<u8> = positions.iter().map(|x| u8::from(is_inside(x))).collect();
+        let by_side = |inside| if inside { Species::Inside } else { Species::Outside };
+        let mut species: Vec<Species> = positions.iter().map(|x| by_side(is_inside(x))).collect();
         let mut particles = Particles::new(positions);
         let phi = particles.add_scalar("phi", 0.5);
-        for (level, phase) in particles.scalar_mut(phi).iter_mut().zip(&phase) {
-            *level -= f64::from(*phase);
+        for (level, species) in particles.scalar_mut(phi).iter_mut().zip(&species) {
+            *level -= species.color();
         }
         let mut strays = Strays::new(Domain::unbounded());
-        strays.absorb(&mut particles, phi, &everybody, 1.0, &mut phase);
-        for (x, (phase, level)) in particles.positions().iter().zip(phase.iter().zip(particles.scalar(phi))) {
-            assert_eq!(*phase == 1, stays(x), "{x}");
-            assert_eq!(*level < 0.0, *phase == 1);
+        strays.absorb(&mut particles, phi, &all, 1.0, &mut species);
+        for (x, (species, level)) in particles.positions().iter().zip(species.iter().zip(particles.scalar(phi))) {
+            assert_eq!(*species, by_side(stays(x)), "{x}");
+            assert_eq!(*species, Species::from_level(*level));
         }
         assert_eq!(strays.absorbed, 2);
     }

@@ -1,12 +1,15 @@
-//! The particles of two fluids and everything that is found at a moment: one evaluation from positions to accelerations.
+//! The particles of the fluids, and one evaluation: from positions to rates of change.
 
-use super::components::{Components, FRAGMENT, ball_curvature};
-use super::dcpse::DcpseFlow;
-use super::hydrodynamics::Hydrodynamics;
-use super::interface::Interface;
-use super::parts::{DensityMethod, Discretization, Geometry, Integrator, SphParts, TensionForce};
-use super::shifting::{displacement, part_along};
-use super::stepping::Start;
+use super::config::{Geometry, SphConfig};
+use super::droplets::{Droplets, Searched};
+use super::equations::FlowEquations;
+use super::flow_state::{FlowState, Rates};
+use super::interactions::surface_tension::SurfaceTension;
+use super::interactions::{Moment, ParticleForce, density_summation, shifting};
+use super::interface::{ColorField, Interface, InterfaceError, LevelSet};
+use super::kernel_choice::ScaledKernel;
+use super::neighbor_lists::NeighborLists;
+use super::pair_workspace::PairWorkspace;
 use super::strays::Strays;
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::{Domain, Vector};
@@ -18,72 +21,38 @@ use crate::simulation::Phases;
 /// Particles at time 0.
 #[derive(Debug, Clone)]
 pub struct Drop<const D: usize> {
-    /// Where they are, in the box.
+    /// Positions in the box.
     pub positions: Vec<Vector<D>>,
-    /// Signed distance from the interface; its sign is the phase.
+    /// Signed distances from the interface; their sign decides the species.
     pub level: Vec<f64>,
-    /// The enclosed measure, where it is known.
+    /// The enclosed area or volume; NaN where it is not known.
     pub measure: f64,
 }
 
 /// Two fluids.
+///
+/// Within an evaluation data flows one way: positions → neighbor lists → interface → densities and pressures → rates.
 pub struct SphSystem<const D: usize> {
-    pub(super) parts: SphParts<D>,
+    pub(super) config: SphConfig<D>,
     pub(super) domain: Domain<D>,
-    /// The volume of a particle at rest.
-    pub(super) cell: f64,
-    /// Positions, and what is known of the interface; φ is the level that particles carry.
+    /// Positions, and what particles know of the interface; φ is the level that they carry.
     pub(super) particles: Particles<D>,
     pub(super) columns: SurfaceColumns,
-    pub(super) velocity: Vec<Vector<D>>,
-    pub(super) acceleration: Vec<Vector<D>>,
-    pub(super) density: Vec<f64>,
-    /// Of continuity alone.
-    pub(super) density_rate: Vec<f64>,
-    /// Where everybody was when neighbours were listed.
-    pub(super) reference: Vec<Vector<D>>,
-    /// 1 inside.
-    pub(super) phase: Vec<u8>,
-    /// 1 near the interface.
-    pub(super) candidate: Vec<u8>,
-    /// Whose κ₀ a particle takes, where there are several droplets.
-    pub(super) droplet: Vec<u8>,
-    /// κ₀ of each droplet.
-    pub(super) ball_curvatures: Vec<f64>,
-    /// Particles of each droplet when they were last counted anew.
-    sizes: Vec<usize>,
-    /// The measure that was enclosed at the start.
-    pub(super) initial_measure: f64,
-    pub(super) hydrodynamics: Hydrodynamics<D>,
-    pub(super) interface: Option<Interface<D>>,
-    pub(super) dcpse: Option<DcpseFlow<D>>,
-    components: Components<D>,
+    pub(super) flow: FlowState<D>,
+    pub(super) pairs: PairWorkspace<D>,
+    pub(super) interface: Interface<D>,
+    pub(super) droplets: Droplets<D>,
     pub(super) strays: Strays<D>,
-    volume: Vec<f64>,
-    pub(super) pressure: Vec<f64>,
-    /// n̂ of a colour field, with its unit normals and curvatures.
-    gradient: Vec<Vector<D>>,
-    normal: Vec<Vector<D>>,
-    curvature: Vec<f64>,
-    /// Velocities that viscosity reckons with.
-    pub(super) predicted: Vec<Vector<D>>,
-    /// What the present step started from.
-    pub(super) start: Start<D>,
+    pub(super) equations: FlowEquations<D>,
+    tension: Option<SurfaceTension>,
+    /// Forces on particles, added in this order.
+    forces: Vec<Box<dyn ParticleForce<D>>>,
+    pub(super) rates: Rates<D>,
     pub(super) interrupt: Interrupt,
 }
 
-/// What kept an evaluation from its end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum EvaluationError {
-    Interrupted,
-    InterfaceLost,
-}
-
-impl From<Interrupted> for EvaluationError {
-    fn from(_: Interrupted) -> Self {
-        Self::Interrupted
-    }
-}
+/// The reason why an evaluation did not end.
+pub(super) type EvaluationError = InterfaceError;
 
 impl<const D: usize> SphSystem<D> {
     /// Fluids at rest. `cell` is the volume of a particle.
@@ -91,78 +60,51 @@ impl<const D: usize> SphSystem<D> {
     /// # Errors
     /// [`BoxTooSmall`].
     pub fn new(
-        parts: SphParts<D>,
+        config: SphConfig<D>,
         domain: Domain<D>,
         cell: f64,
         drop: Drop<D>,
         interrupt: Interrupt,
     ) -> Result<Self, BoxTooSmall> {
-        let hydrodynamics = Hydrodynamics::new(&parts, &domain, cell)?;
         let count = drop.positions.len();
+        let lists = NeighborLists::new(&domain, config.cutoff(), config.skin(), count)?;
+        let kernel = ScaledKernel::new(config.kernel, config.smoothing_length, D);
         let mut particles = Particles::new(drop.positions);
         let columns = SurfaceColumns::add(&mut particles);
         particles.scalar_mut(columns.phi).copy_from_slice(&drop.level);
-        let interface = match &parts.geometry {
-            Geometry::Pcp { method, half_band } if parts.has_tension() => {
-                Some(Interface::new(method.clone(), &domain, parts.spacing, *half_band))
-            }
-            _ => None,
-        };
-        let zeros = || vec![Vector::<D>::zeros(); count];
-        let colors = if parts.geometry == Geometry::ColorField && parts.has_tension() { count } else { 0 };
-        let is_integrated = parts.density != DensityMethod::Summation;
+        let tension = config.has_tension().then(|| config.surface_tension());
+        let mut forces: Vec<Box<dyn ParticleForce<D>>> = Vec::new();
+        if let Some(tension) = tension {
+            forces.push(Box::new(tension));
+        }
+        if let Some(force) = config.body_force {
+            forces.push(Box::new(force));
+        }
         Ok(Self {
-            columns,
-            velocity: zeros(),
-            acceleration: zeros(),
-            density: drop.level.iter().map(|level| parts.fluid(*level < 0.0).density).collect(),
-            density_rate: vec![0.0; if is_integrated { count } else { 0 }],
-            reference: zeros(),
-            phase: drop.level.iter().map(|level| u8::from(*level < 0.0)).collect(),
-            candidate: vec![0; count],
-            droplet: vec![FRAGMENT; count],
-            ball_curvatures: Vec::new(),
-            sizes: Vec::new(),
-            initial_measure: drop.measure,
-            components: Components::new(domain.clone()),
+            flow: FlowState::at_rest(config.fluids, cell, &drop.level),
+            pairs: PairWorkspace::new(lists, kernel, cell, interrupt.clone()),
+            interface: new_interface(&config, &domain, count),
+            droplets: Droplets::new(domain.clone(), count, drop.measure),
             strays: Strays::new(domain.clone()),
-            hydrodynamics,
-            interface,
-            dcpse: match parts.discretization {
-                Discretization::Kernels => None,
-                Discretization::Dcpse(support) => Some(DcpseFlow::new(support, domain.clone(), count)),
-            },
-            volume: vec![cell; count],
-            pressure: vec![0.0; count],
-            gradient: vec![Vector::<D>::zeros(); colors],
-            normal: vec![Vector::<D>::zeros(); colors],
-            curvature: vec![0.0; colors],
-            predicted: zeros(),
-            start: Start {
-                positions: room(count, parts.integrator),
-                velocity: room(count, parts.integrator),
-                density: Vec::new(),
-            },
+            equations: FlowEquations::new(&config, &domain, count),
+            rates: Rates::none(count, config.is_density_integrated()),
             particles,
-            parts,
+            columns,
+            tension,
+            forces,
+            config,
             domain,
-            cell,
             interrupt,
         })
     }
 
-    /// The mass of a particle.
-    pub(super) fn mass(&self, i: usize) -> f64 {
-        self.parts.fluid(self.phase[i] == 1).density * self.cell
-    }
-
-    /// One evaluation: from positions, and the velocities in `predicted`, to accelerations. Returns how many droplets there
-    /// are where that changed.
+    /// One evaluation: from positions, and the velocities in `predicted`, to rates. Returns the number of droplets where it
+    /// changed.
     ///
-    /// 1. Neighbours, listed anew where somebody has moved too far.
-    /// 2. Fits about the interface; particles shifted where the scene says so; closest points where they are then.
+    /// 1. Neighbors, listed anew where a particle has moved too far.
+    /// 2. Fits around the interface; particles shifted where the scene says so; closest points at their new positions.
     /// 3. Volumes or densities, pressures.
-    /// 4. Forces between particles, surface tension, force from outside.
+    /// 4. Interactions between particles, then forces on particles.
     pub(super) fn evaluate(
         &mut self,
         time: f64,
@@ -170,273 +112,205 @@ impl<const D: usize> SphSystem<D> {
         phases: &mut Phases,
     ) -> Result<Option<usize>, EvaluationError> {
         let is_listed = self.list_where_stale(phases)?;
-        phases.measure("sph/gather", || self.gather_positions());
-        if let Some(interface) = &mut self.interface {
-            interface.rebuild(&self.particles, &self.columns, &self.interrupt, phases)?;
-            if interface.surface.is_lost() {
-                return Err(EvaluationError::InterfaceLost);
-            }
-        }
-        if self.parts.is_shifted && may_shift {
-            phases.measure("sph/shifting", || self.shift())?;
-        }
-        if let Some(interface) = &mut self.interface {
-            let (particles, candidate) = (&mut self.particles, &mut self.candidate);
-            interface.answer(particles, &self.columns, candidate, is_listed, &self.interrupt, phases)?;
-        }
-        let is_due = is_listed && self.parts.has_tension();
-        let changed = if is_due { phases.measure("droplets", || self.count_droplets()) } else { None };
-        if self.parts.density == DensityMethod::Summation {
-            phases.measure("sph/density", || self.sum_densities())?;
+        phases.measure("sph/gather", || self.pairs.gather_positions(self.particles.positions()));
+        let changed = self.find_interface(is_listed, may_shift, phases)?;
+        if self.config.is_density_integrated() {
+            self.flow.derive_volumes();
         } else {
-            self.derive_volumes();
+            phases.measure("sph/density", || self.sum_densities())?;
         }
-        self.derive_pressures();
-        if !self.gradient.is_empty() {
-            phases.measure("sph/color", || self.take_color_geometry())?;
+        self.flow.derive_pressures();
+        if let Interface::ColorField(color) = &mut self.interface {
+            phases.measure("sph/color", || {
+                let found = color.find(&self.flow, &mut self.pairs);
+                color.store(&mut self.particles, &self.columns);
+                found
+            })?;
         }
-        phases.measure("sph/momentum", || self.sum_accelerations())?;
-        phases.measure("sph/tension", || {
-            self.add_tension();
-            self.add_body_force(time);
-        });
+        phases.measure("sph/momentum", || {
+            let Self { equations, particles, flow, pairs, rates, interrupt, .. } = self;
+            equations.find_rates(particles.positions(), flow, pairs, rates, interrupt)
+        })?;
+        phases.measure("sph/tension", || self.add_forces(time));
         Ok(changed)
     }
 
     fn list_where_stale(&mut self, phases: &mut Phases) -> Result<bool, Interrupted> {
-        let positions = self.particles.positions();
-        let is_stale = !self.hydrodynamics.is_listed() || self.hydrodynamics.is_stale(positions, &self.reference);
-        if is_stale {
-            self.reference.copy_from_slice(positions);
-            phases.measure("neighbors", || self.hydrodynamics.list(&self.reference, &self.interrupt))?;
-            let Self { interface, candidate, particles, columns, phase, strays, parts, .. } = self;
-            if let Some(interface) = interface {
-                phases.measure("redistancing/detection", || interface.select(particles, columns, candidate));
-                if parts.is_shifted && parts.inside == parts.outside {
-                    phases.measure("droplets", || {
-                        strays.absorb(particles, columns.phi, interface.candidates(), parts.spacing, phase);
-                    });
-                }
+        let Self { pairs, interface, particles, columns, strays, flow, config, .. } = self;
+        if !pairs.lists.are_stale(particles.positions()) {
+            return Ok(false);
+        }
+        phases.measure("neighbors", || pairs.list(particles.positions()))?;
+        if let Interface::LevelSet(level_set) = interface {
+            phases.measure("redistancing/detection", || level_set.select(particles, columns));
+            if config.is_shifted && config.fluids.are_equal() {
+                let (phi, near) = (columns.phi, level_set.candidates());
+                phases.measure("droplets", || {
+                    strays.absorb(particles, phi, near, config.spacing, &mut flow.species);
+                });
             }
         }
-        Ok(is_stale)
+        Ok(true)
     }
 
-    /// Everything that is derived from columns and not found again at every evaluation.
-    pub(super) fn derive(&mut self) -> Result<(), Interrupted> {
-        self.hydrodynamics.list(&self.reference, &self.interrupt)?;
-        if let Some(interface) = &mut self.interface {
-            interface.take(&self.candidate);
+    /// The interface, with particles shifted between the fits and the closest points, and the count of droplets.
+    fn find_interface(
+        &mut self,
+        is_listed: bool,
+        may_shift: bool,
+        phases: &mut Phases,
+    ) -> Result<Option<usize>, EvaluationError> {
+        if let Interface::LevelSet(level_set) = &mut self.interface {
+            level_set.rebuild(&self.particles, &self.columns, &self.interrupt, phases)?;
         }
-        self.derive_pressures();
+        if self.config.is_shifted && may_shift {
+            phases.measure("sph/shifting", || self.shift())?;
+        }
+        if let Interface::LevelSet(level_set) = &mut self.interface {
+            level_set.answer(&mut self.particles, &self.columns, is_listed, &self.interrupt, phases)?;
+        }
+        let is_due = is_listed && self.tension.is_some();
+        Ok(if is_due { phases.measure("droplets", || self.count_droplets()) } else { None })
+    }
+
+    /// Everything that is derived from columns and not found again at every evaluation, as a restart needs it.
+    pub(super) fn derive(&mut self) -> Result<(), Interrupted> {
+        self.pairs.list_reference()?;
+        if let Some(level_set) = self.interface.level_set_mut() {
+            level_set.list_candidates();
+        }
+        self.flow.derive_pressures();
         Ok(())
     }
 
-    /// The volumes of the present densities: what a state needs not hold.
-    fn derive_volumes(&mut self) {
-        for i in 0..self.volume.len() {
-            self.volume[i] = self.mass(i) / self.density[i];
-        }
-    }
-
-    fn gather_positions(&mut self) {
-        self.hydrodynamics.take_positions(self.particles.positions(), &self.reference);
-    }
-
-    /// Moves particles towards evenness (B.16), those at the interface along it, so that it stays where it is and nobody
-    /// changes side.
+    /// Moves particles towards an even distribution (PCP eq. B.16). Particles at the interface are moved along it, so that it
+    /// keeps its place and no particle changes side.
     fn shift(&mut self) -> Result<(), Interrupted> {
-        self.derive_volumes();
-        let Self { hydrodynamics, particles, columns, interface, parts, volume, domain, interrupt, .. } = self;
-        let has_interface = interface.is_some();
-        hydrodynamics.concentration(
-            |i| volume[i],
-            parts.spacing,
-            interrupt,
-            |i, gradient| {
-                let mut shift = displacement(gradient, parts.smoothing_length);
-                if has_interface {
-                    let (phi, normal) = (particles.scalar(columns.phi)[i], particles.vector(columns.normal)[i]);
-                    shift -= normal * (normal.dot(&shift) * part_along(phi / parts.spacing));
-                }
-                let x = &mut particles.positions_mut()[i];
-                *x = domain.wrap(*x + shift);
-            },
-        )?;
-        self.gather_positions();
+        self.flow.derive_volumes();
+        let Self { pairs, particles, columns, interface, config, flow, domain, .. } = self;
+        let has_level_set = interface.level_set().is_some();
+        shifting::concentration(pairs, &flow.volume, config.spacing, |i, gradient| {
+            let mut shift = shifting::displacement(gradient, config.smoothing_length);
+            if has_level_set {
+                let (phi, normal) = (particles.scalar(columns.phi)[i], particles.vector(columns.normal)[i]);
+                shift -= normal * (normal.dot(&shift) * shifting::share_left_out(phi / config.spacing));
+            }
+            let x = &mut particles.positions_mut()[i];
+            *x = domain.wrap(*x + shift);
+        })?;
+        pairs.gather_positions(particles.positions());
         Ok(())
     }
 
     fn sum_densities(&mut self) -> Result<(), Interrupted> {
-        self.hydrodynamics.volumes(&mut self.volume, &self.interrupt)?;
-        for i in 0..self.volume.len() {
-            self.density[i] = self.mass(i) / self.volume[i];
-        }
+        density_summation::sum_volumes(&mut self.pairs, &mut self.flow.volume)?;
+        self.flow.derive_densities();
         Ok(())
     }
 
-    /// Pressures of the present densities.
-    pub(super) fn derive_pressures(&mut self) {
-        let states = self.pressure.iter_mut().zip(&self.density).zip(&self.phase);
-        for ((pressure, density), phase) in states {
-            *pressure = self.parts.fluid(*phase == 1).pressure(*density);
+    fn add_forces(&mut self, time: f64) {
+        let Self { particles, columns, flow, interface, droplets, forces, rates, .. } = self;
+        let moment = Moment { time, particles, columns, flow, interface, droplets };
+        for force in forces.iter() {
+            force.add_to(&mut rates.acceleration, &moment);
         }
     }
 
-    fn take_color_geometry(&mut self) -> Result<(), Interrupted> {
-        let Self { hydrodynamics, phase, volume, gradient, normal, curvature, interrupt, .. } = self;
-        hydrodynamics.color_geometry(phase, volume, gradient, normal, curvature, interrupt)?;
-        let band = self.particles.flag_mut(self.columns.in_band);
-        for (band, normal) in band.iter_mut().zip(&self.normal) {
-            *band = u8::from(normal.norm_squared() > 0.0);
-        }
-        self.particles.vector_mut(self.columns.normal).copy_from_slice(&self.normal);
-        self.particles.scalar_mut(self.columns.curvature).copy_from_slice(&self.curvature);
-        Ok(())
-    }
-
-    /// −∇p/ρ + (η/ρ) Δu, and −ρ ∇·u + ξ̂ ε c Δρ with Δp = c² Δρ, which damps what the gradient does not see (as B.12 does).
-    fn fit_accelerations(&mut self) -> Result<(), Interrupted> {
-        let Self { dcpse: Some(flow), particles, predicted, pressure, density, phase, parts, .. } = self else {
-            return Ok(());
-        };
-        let diffusion = if let DensityMethod::Continuity { diffusion } = parts.density { diffusion } else { 0.0 };
-        flow.find(particles.positions(), predicted, pressure, &self.interrupt)?;
-        for (i, acceleration) in self.acceleration.iter_mut().enumerate() {
-            let found = flow.at(i);
-            let fluid = parts.fluid(phase[i] == 1);
-            *acceleration = (found.velocity_laplacian * fluid.viscosity - found.pressure_gradient) / density[i];
-            let spread = diffusion * parts.smoothing_length / fluid.sound_speed * found.pressure_laplacian;
-            self.density_rate[i] = spread - density[i] * found.divergence;
-        }
-        Ok(())
-    }
-
-    fn sum_accelerations(&mut self) -> Result<(), Interrupted> {
-        if self.dcpse.is_some() {
-            return self.fit_accelerations();
-        }
-        let Self { hydrodynamics, parts, volume, pressure, density, predicted, acceleration, interrupt, .. } = self;
-        let (parts, phase, cell) = (&*parts, &self.phase, self.cell);
-        let mass = |i: usize| parts.fluid(phase[i] == 1).density * cell;
-        match parts.density {
-            DensityMethod::Summation => {
-                hydrodynamics.forces(parts, phase, volume, pressure, predicted, acceleration, interrupt)?;
-                for (i, acceleration) in acceleration.iter_mut().enumerate() {
-                    *acceleration /= mass(i);
-                }
-            }
-            DensityMethod::Continuity { diffusion } => {
-                let rates = &mut self.density_rate;
-                hydrodynamics.rates(
-                    parts,
-                    diffusion,
-                    phase,
-                    mass,
-                    density,
-                    pressure,
-                    predicted,
-                    acceleration,
-                    rates,
-                    interrupt,
-                )?;
-            }
-        }
-        Ok(())
-    }
-
-    /// κ₀ of the droplet that a particle belongs to.
-    pub(super) fn ball_curvature(&self, i: usize) -> f64 {
-        match self.ball_curvatures.as_slice() {
-            [only] => *only,
-            several => several.get(self.droplet[i] as usize).copied().unwrap_or(0.0),
-        }
-    }
-
-    /// The part of the pressure that the balanced force has absorbed: τκ₀ inside.
+    /// The part of the pressure that the balanced force has absorbed, at a particle.
     pub(super) fn absorbed_pressure(&self, i: usize) -> f64 {
-        if self.phase[i] == 1 && self.parts.has_tension() { self.parts.tension * self.absorbed(i) } else { 0.0 }
+        let absorbed = |tension: &SurfaceTension| tension.absorbed_pressure(self.flow.species[i], &self.droplets, i);
+        self.tension.as_ref().map_or(0.0, absorbed)
     }
 
-    /// What is taken from the curvature before it becomes a force.
-    fn absorbed(&self, i: usize) -> f64 {
-        if self.parts.tension_force == TensionForce::Balanced { self.ball_curvature(i) } else { 0.0 }
-    }
-
-    /// −(τ/ρ) (κ − κ₀) n δ (B.4, B.10).
-    fn add_tension(&mut self) {
-        if let Some(interface) = &self.interface {
-            let (phi, curvature) =
-                (self.particles.scalar(self.columns.phi), self.particles.scalar(self.columns.curvature));
-            let (normal, band) =
-                (self.particles.vector(self.columns.normal), self.particles.flag(self.columns.in_band));
-            for i in interface.candidates().iter().copied().filter(|i| band[*i] == 1) {
-                let delta = smoothed_delta(phi[i], self.parts.smoothing_length);
-                if delta > 0.0 {
-                    let strength = -self.parts.tension / self.density[i] * (curvature[i] - self.absorbed(i)) * delta;
-                    self.acceleration[i] += normal[i] * strength;
-                }
-            }
-        }
-        for i in 0..self.gradient.len() {
-            let strength = -self.parts.tension / self.density[i] * (self.curvature[i] - self.absorbed(i));
-            let force = self.gradient[i] * strength;
-            self.acceleration[i] += force;
-        }
-    }
-
-    fn add_body_force(&mut self, time: f64) {
-        let Some(force) = &self.parts.body_force else { return };
-        for ((acceleration, x), phase) in self.acceleration.iter_mut().zip(self.particles.positions()).zip(&self.phase)
-        {
-            *acceleration += force.acceleration(x, time, *phase == 1);
-        }
-    }
-
-    /// Finds the droplets; where their number changed, each gets the curvature of a ball of its share of the measure that was
-    /// enclosed at the start.
     fn count_droplets(&mut self) -> Option<usize> {
-        let Self { components, particles, phase, droplet, parts, .. } = self;
-        let reach = self.interface.as_ref().map_or(0.0, Interface::keep);
-        let asked = self.interface.as_ref().map_or(&[][..], |interface| interface.candidates());
-        let sizes = components.find(particles.positions(), phase, asked.iter().copied(), parts.spacing, reach, droplet);
-        if sizes.len() == self.ball_curvatures.len() {
-            return None;
+        let Self { droplets, particles, flow, config, interface, .. } = self;
+        droplets.count(&Searched {
+            positions: particles.positions(),
+            species: &flow.species,
+            near: interface.candidates(),
+            spacing: config.spacing,
+            cutoff: interface.level_set().map_or(0.0, LevelSet::keep),
+        })
+    }
+}
+
+fn new_interface<const D: usize>(config: &SphConfig<D>, domain: &Domain<D>, count: usize) -> Interface<D> {
+    if !config.has_tension() {
+        return Interface::Absent;
+    }
+    match &config.geometry {
+        Geometry::Pcp { method, half_band } => {
+            Interface::LevelSet(Box::new(LevelSet::new(method.clone(), domain, config.spacing, *half_band, count)))
         }
-        self.sizes.clear();
-        self.sizes.extend_from_slice(sizes);
-        self.renew_ball_curvatures();
-        Some(self.ball_curvatures.len())
+        Geometry::ColorField => Interface::ColorField(ColorField::new(count)),
     }
-
-    /// κ₀ of each droplet for its share of the measure that was enclosed at the start.
-    pub(super) fn renew_ball_curvatures(&mut self) {
-        let all = self.sizes.iter().sum::<usize>().max(1) as f64;
-        self.ball_curvatures.clear();
-        let share = |size: &usize| ball_curvature::<D>(self.initial_measure * *size as f64 / all);
-        self.ball_curvatures.extend(self.sizes.iter().map(share));
-    }
-}
-
-/// Room for what only the predictor–corrector keeps.
-fn room<const D: usize>(count: usize, integrator: Integrator) -> Vec<Vector<D>> {
-    vec![Vector::<D>::zeros(); if integrator == Integrator::PredictorCorrector { count } else { 0 }]
-}
-
-/// δ of a signed distance: Wendland's C² kernel of one dimension (B.3), of support 2 ε.
-pub(super) fn smoothed_delta(distance: f64, smoothing_length: f64) -> f64 {
-    let q = distance.abs() / smoothing_length;
-    let rest = (1.0 - 0.5 * q).max(0.0);
-    0.625 / smoothing_length * rest * rest * rest * (1.5 * q + 1.0)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::smoothed_delta;
+    use super::{Drop, Interface, SphSystem};
+    use crate::geometry::Vector;
+    use crate::parallel::Interrupt;
+    use crate::schemes::weakly_compressible_sph::test_setting::{Setting, setting};
+    use crate::schemes::weakly_compressible_sph::{
+        BodyForce, DensityMethod, KernelChoice, Species, SphConfig, TensionForce,
+    };
+    use crate::simulation::{CpuClock, Phases};
+
+    fn evaluated(this: &Setting<2>, config: SphConfig<2>, level: Vec<f64>) -> SphSystem<2> {
+        let drop = Drop { positions: this.positions.clone(), level, measure: 2.0 };
+        let mut system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
+        system.flow.predicted.clone_from(&this.velocity);
+        system.evaluate(0.0, false, &mut Phases::new(CpuClock::still())).unwrap();
+        system
+    }
+
+    /// Σ m a by Σ m |a|.
+    fn net_force(system: &SphSystem<2>) -> f64 {
+        let forces = system.rates.acceleration.iter().enumerate().map(|(i, a)| a * system.flow.mass(i));
+        let (all, sizes) = forces.fold((Vector::<2>::zeros(), 0.0), |(all, sizes), f| (all + f, sizes + f.norm()));
+        all.norm() / sizes
+    }
 
     #[test]
-    fn the_smoothed_delta_integrates_to_one() {
-        let sum: f64 = (0..4000).map(|k| smoothed_delta(f64::from(k - 2000) * 1e-3 + 5e-4, 0.4) * 1e-3).sum();
-        assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+    fn interactions_between_particles_keep_momentum_and_a_body_force_adds_its_own() {
+        let this = setting::<2>(KernelChoice::WendlandC2, 3.0);
+        for density in [DensityMethod::Summation, DensityMethod::Continuity { diffusion: 0.1 }] {
+            let config = SphConfig { tension: 0.0, density, ..this.config.clone() };
+            let free = evaluated(&this, config.clone(), this.level.clone());
+            assert!(net_force(&free) < 1e-13, "{}", net_force(&free));
+            let gravity = Vector::<2>::new(0.0, -9.0);
+            let config = SphConfig { body_force: Some(BodyForce::Constant(gravity)), ..config };
+            let falling = evaluated(&this, config, this.level.clone());
+            for (a, b) in falling.rates.acceleration.iter().zip(&free.rates.acceleration) {
+                assert!((a - b - gravity).norm() < 1e-9 * b.norm().max(1.0));
+            }
+        }
+    }
+
+    #[test]
+    fn the_balanced_force_moves_the_pressure_of_the_droplet_into_the_pressure() {
+        let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
+        let center = Vector::<2>::new(0.6, 0.6);
+        let level: Vec<f64> =
+            this.positions.iter().map(|x| this.domain.displacement(&center, x).norm() - 0.8).collect();
+        let config = SphConfig { tension: 3.0, tension_force: TensionForce::Balanced, ..this.config.clone() };
+        let balanced = evaluated(&this, config.clone(), level.clone());
+        assert!(matches!(balanced.interface, Interface::ColorField(_)));
+        assert_eq!(balanced.droplets.number(), 1);
+        // κ₀ of the measure 2 that was given, times τ.
+        let expected = 3.0 * (std::f64::consts::PI / 2.0).sqrt();
+        let csf = evaluated(&this, SphConfig { tension_force: TensionForce::Csf, ..config }, level);
+        for i in this.probes() {
+            let absorbed = if balanced.flow.species[i] == Species::Inside { expected } else { 0.0 };
+            assert!((balanced.absorbed_pressure(i) - absorbed).abs() < 1e-14);
+            assert_eq!(csf.absorbed_pressure(i), 0.0);
+        }
+        // The two forces differ by τ κ₀ n δ/ρ.
+        let Interface::ColorField(color) = &balanced.interface else { panic!("no color field") };
+        for (i, (a, b)) in balanced.rates.acceleration.iter().zip(&csf.rates.acceleration).enumerate() {
+            let difference = color.gradient[i] * (expected / balanced.flow.density[i]);
+            assert!((a - b - difference).norm() < 1e-9 * a.norm().max(1.0));
+        }
     }
 }

@@ -1,0 +1,120 @@
+//! The configuration of a run: choices as values.
+
+use super::interactions::surface_tension::SurfaceTension;
+use super::interactions::{BodyForce, TensionForce};
+use super::kernel_choice::KernelChoice;
+use super::species::Fluids;
+use crate::closest_point::PcpMethod;
+use crate::operators::Support;
+
+/// Distance in spacings h that the neighbor lists reach beyond the kernel's support. A wider skin means longer loops over
+/// pairs, a thinner one lists that are made more often.
+const SKIN_H: f64 = 0.3;
+
+/// Where normals and curvatures of the interface come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Geometry {
+    /// Particle closest points in a band around the interface.
+    Pcp {
+        /// The closest-point method.
+        method: PcpMethod,
+        /// Half the width of the band.
+        half_band: f64,
+    },
+    /// The smoothed color of the species (PCP eqs. B.5 to B.10).
+    ColorField,
+}
+
+/// How densities are found, and with them the form of the pressure force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DensityMethod {
+    /// Summation (PCP eq. B.1) with the volume form of the forces (B.2).
+    Summation,
+    /// The continuity equation with diffusion (B.12) and the mass form of the forces (B.13, B.14).
+    Continuity {
+        /// Coefficient ξ̂ of the diffusion, without dimension.
+        diffusion: f64,
+    },
+}
+
+/// How the derivatives of the flow are discretized.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Discretization {
+    /// Sums over kernels.
+    Kernels,
+    /// Polynomial fits around every particle (DC-PSE); densities by continuity.
+    Dcpse(Support),
+}
+
+/// The time integrator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Integrator {
+    /// Kick, drift, kick with a predicted velocity for viscosity: one evaluation a step.
+    KickDriftKick,
+    /// Half a step ahead, then the whole step with the rates found there (the paper's): two evaluations a step.
+    PredictorCorrector,
+}
+
+/// The configuration of a run, its particles aside.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SphConfig<const D: usize> {
+    /// Distance h of neighboring particles at the start.
+    pub spacing: f64,
+    /// Smoothing length ε.
+    pub smoothing_length: f64,
+    /// Smoothing kernel W.
+    pub kernel: KernelChoice,
+    /// The fluid of each species.
+    pub fluids: Fluids,
+    /// Surface tension τ; with 0 no interface is computed.
+    pub tension: f64,
+    /// Form of the surface tension's force.
+    pub tension_force: TensionForce,
+    /// Method for normals and curvatures.
+    pub geometry: Geometry,
+    /// Method for the derivatives of the flow.
+    pub discretization: Discretization,
+    /// Method for densities.
+    pub density: DensityMethod,
+    /// Whether particles are shifted towards an even distribution (PCP eqs. B.15, B.16).
+    pub is_shifted: bool,
+    /// A force from outside.
+    pub body_force: Option<BodyForce<D>>,
+    /// The time integrator.
+    pub integrator: Integrator,
+    /// Whether a step beyond the stability limits is cut into parts; false where the user gave the time step.
+    pub is_adaptive: bool,
+    /// The run ends when all particles are slower than this speed.
+    pub rest_below: Option<f64>,
+}
+
+impl<const D: usize> SphConfig<D> {
+    /// Neighbors are listed anew when a particle has moved by half of this length.
+    #[must_use]
+    pub fn skin(&self) -> f64 {
+        SKIN_H * self.spacing
+    }
+
+    /// Distance up to which particles are listed as neighbors.
+    #[must_use]
+    pub fn cutoff(&self) -> f64 {
+        self.kernel.support() * self.smoothing_length + self.skin()
+    }
+
+    /// Whether there is an interface to compute.
+    #[must_use]
+    pub fn has_tension(&self) -> bool {
+        self.tension != 0.0
+    }
+
+    /// The interaction of surface tension; its coefficient is 0 where there is no interface to compute.
+    pub(super) fn surface_tension(&self) -> SurfaceTension {
+        SurfaceTension::new(self.tension, self.tension_force, self.smoothing_length)
+    }
+
+    /// Whether densities are integrated in time, not found anew at every evaluation.
+    #[must_use]
+    pub fn is_density_integrated(&self) -> bool {
+        self.density != DensityMethod::Summation
+    }
+}

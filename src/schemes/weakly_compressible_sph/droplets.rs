@@ -1,0 +1,230 @@
+//! Droplets: the connected components of the fluid inside, and the curvature that each would have as a ball.
+
+use super::species::Species;
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
+use std::f64::consts::PI;
+
+/// Constants of the count.
+struct Tuning {
+    /// Particles of the fluid inside at most this distance apart, in h, belong to one droplet: on a lattice the eight next
+    /// particles in the plane.
+    link: f64,
+    /// Particles of the smallest droplet in the plane and in space. Smaller components are fragments.
+    smallest: [usize; 2],
+    /// The most droplets that are told apart, since a label is one byte; further components count as fragments.
+    most: usize,
+}
+
+const TUNING: Tuning = Tuning { link: 1.5, smallest: [12, 40], most: 250 };
+
+/// The label of particles that belong to no droplet: fragments, and particles far from any droplet.
+pub(super) const FRAGMENT: u8 = u8::MAX;
+
+/// The droplets, by particle and by droplet.
+#[derive(Debug)]
+pub(super) struct Droplets<const D: usize> {
+    components: Components<D>,
+    /// The droplet of each particle, where there are several.
+    pub label: Vec<u8>,
+    /// The curvature κ₀ of each droplet as a ball.
+    pub ball_curvatures: Vec<f64>,
+    /// Particles of each droplet when their number last changed.
+    sizes: Vec<usize>,
+    /// The area or volume that was enclosed at the start.
+    pub initial_measure: f64,
+}
+
+/// Particles to look for droplets in.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Searched<'a, const D: usize> {
+    pub positions: &'a [Vector<D>],
+    pub species: &'a [Species],
+    /// Particles that take the label of the nearest droplet.
+    pub near: &'a [usize],
+    /// The spacing h.
+    pub spacing: f64,
+    /// Distance up to which a particle takes the label of a droplet.
+    pub cutoff: f64,
+}
+
+impl<const D: usize> Droplets<D> {
+    /// No droplets counted yet, among `count` particles.
+    pub fn new(domain: Domain<D>, count: usize, initial_measure: f64) -> Self {
+        Self {
+            components: Components::new(domain),
+            label: vec![FRAGMENT; count],
+            ball_curvatures: Vec::new(),
+            sizes: Vec::new(),
+            initial_measure,
+        }
+    }
+
+    /// The number of droplets.
+    pub fn number(&self) -> usize {
+        self.ball_curvatures.len()
+    }
+
+    /// Counts the droplets. Returns their number where it changed; each then gets the curvature of a ball of its share of the
+    /// measure that was enclosed at the start.
+    pub fn count(&mut self, searched: &Searched<'_, D>) -> Option<usize> {
+        let sizes = self.components.find(searched, &mut self.label);
+        if sizes.len() == self.ball_curvatures.len() {
+            return None;
+        }
+        self.sizes.clear();
+        self.sizes.extend_from_slice(sizes);
+        self.renew_ball_curvatures();
+        Some(self.number())
+    }
+
+    /// Sets κ₀ of each droplet to that of its share of the measure that was enclosed at the start.
+    pub fn renew_ball_curvatures(&mut self) {
+        let all = self.sizes.iter().sum::<usize>().max(1) as f64;
+        self.ball_curvatures.clear();
+        let share = |size: &usize| ball_curvature::<D>(self.initial_measure * *size as f64 / all);
+        self.ball_curvatures.extend(self.sizes.iter().map(share));
+    }
+
+    /// The curvature κ₀ of the droplet that a particle belongs to.
+    pub fn ball_curvature(&self, i: usize) -> f64 {
+        match self.ball_curvatures.as_slice() {
+            [only] => *only,
+            several => several.get(self.label[i] as usize).copied().unwrap_or(0.0),
+        }
+    }
+}
+
+/// Storage for finding connected components.
+#[derive(Debug)]
+struct Components<const D: usize> {
+    cells: CellList<D>,
+    inside: Vec<usize>,
+    component: Vec<usize>,
+    stack: Vec<usize>,
+    sizes: Vec<usize>,
+    ranks: Vec<usize>,
+}
+
+impl<const D: usize> Components<D> {
+    fn new(domain: Domain<D>) -> Self {
+        Self {
+            cells: CellList::new(domain),
+            inside: Vec::new(),
+            component: Vec::new(),
+            stack: Vec::new(),
+            sizes: Vec::new(),
+            ranks: Vec::new(),
+        }
+    }
+
+    /// Labels the particles of the fluid inside and, of the others, those near a droplet. Droplets count from 0 by their first
+    /// particle. Returns the number of particles of each droplet.
+    fn find(&mut self, searched: &Searched<'_, D>, label: &mut [u8]) -> &[usize] {
+        self.inside.clear();
+        let species = searched.species;
+        self.inside.extend((0..searched.positions.len()).filter(|i| species[*i] == Species::Inside));
+        self.connect(searched);
+        let droplets = self.rank();
+        label.fill(FRAGMENT);
+        for (k, i) in self.inside.iter().enumerate() {
+            label[*i] = self.ranks[self.component[k]] as u8;
+        }
+        if droplets > 1 {
+            for i in searched.near.iter().copied().filter(|i| species[*i] != Species::Inside) {
+                if let Some((k, _)) = self.cells.nearest(&searched.positions[i], searched.cutoff) {
+                    label[i] = self.ranks[self.component[k]] as u8;
+                }
+            }
+        }
+        let mut rank = self.ranks.iter();
+        self.sizes.retain(|_| rank.next().is_some_and(|rank| *rank != usize::from(FRAGMENT)));
+        &self.sizes
+    }
+
+    /// Numbers the connected components of the fluid inside and counts their particles.
+    fn connect(&mut self, searched: &Searched<'_, D>) {
+        let (positions, link) = (searched.positions, TUNING.link * searched.spacing);
+        self.cells.rebuild(self.inside.iter().map(|i| positions[*i]), link);
+        self.component.clear();
+        self.component.resize(self.inside.len(), usize::MAX);
+        self.sizes.clear();
+        for seed in 0..self.inside.len() {
+            if self.component[seed] != usize::MAX {
+                continue;
+            }
+            let name = self.sizes.len();
+            let mut size = 0;
+            self.component[seed] = name;
+            self.stack.push(seed);
+            while let Some(k) = self.stack.pop() {
+                size += 1;
+                let (component, stack) = (&mut self.component, &mut self.stack);
+                self.cells.for_each_within(&positions[self.inside[k]], link, |other, _, _| {
+                    if component[other] == usize::MAX {
+                        component[other] = name;
+                        stack.push(other);
+                    }
+                });
+            }
+            self.sizes.push(size);
+        }
+    }
+
+    /// Tells droplets from fragments. Returns the number of droplets.
+    fn rank(&mut self) -> usize {
+        let smallest = TUNING.smallest[usize::from(D != 2)];
+        self.ranks.clear();
+        let mut droplets = 0;
+        for size in &self.sizes {
+            let is_droplet = *size >= smallest && droplets < TUNING.most;
+            self.ranks.push(if is_droplet { droplets } else { usize::from(FRAGMENT) });
+            droplets += usize::from(is_droplet);
+        }
+        droplets
+    }
+}
+
+/// The curvature of a ball of a given area or volume: √(π/A), 2 (4π/3V)^⅓.
+#[must_use]
+pub(super) fn ball_curvature<const D: usize>(measure: f64) -> f64 {
+    if D == 2 { (PI / measure).sqrt() } else { 2.0 * (4.0 * PI / (3.0 * measure)).cbrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Domain, Droplets, FRAGMENT, Searched, Species, Vector, ball_curvature};
+    use crate::geometry::domain::Axis;
+
+    #[test]
+    fn droplets_across_the_edge_are_one_and_fragments_are_none() {
+        let domain = Domain::new([Axis::Periodic { start: 0.0, length: 20.0 }; 2]);
+        let positions: Vec<Vector<2>> =
+            (0..400).map(|k| Vector::<2>::new(f64::from(k % 20) + 0.5, f64::from(k / 20) + 0.5)).collect();
+        let near = |x: &Vector<2>, c: [f64; 2], r: f64| domain.displacement(&Vector::<2>::from(c), x).norm() < r;
+        let is_inside =
+            |x: &Vector<2>| near(x, [0.0, 10.0], 4.0) || near(x, [10.0, 10.0], 3.0) || near(x, [10.5, 2.5], 0.9);
+        let species: Vec<Species> =
+            positions.iter().map(|x| if is_inside(x) { Species::Inside } else { Species::Outside }).collect();
+        let all: Vec<usize> = (0..400).collect();
+        let mut droplets = Droplets::new(domain.clone(), 400, 30.0);
+        let searched = Searched { positions: &positions, species: &species, near: &all, spacing: 1.0, cutoff: 3.0 };
+        assert_eq!(droplets.count(&searched), Some(2));
+        assert_eq!(droplets.count(&searched), None, "their number has not changed");
+        let at = |x: usize, y: usize| droplets.label[x + 20 * y];
+        assert_eq!(at(0, 10), at(19, 10));
+        assert_ne!(at(0, 10), at(10, 10));
+        assert_eq!(at(10, 2), FRAGMENT);
+        assert_eq!(at(13, 10), at(10, 10));
+        // Each has the curvature of its share of the measure.
+        let shares: f64 = droplets.ball_curvatures.iter().map(|kappa| std::f64::consts::PI / (kappa * kappa)).sum();
+        assert!((shares - 30.0).abs() < 1e-12);
+        assert!(droplets.ball_curvature(200) < droplets.ball_curvature(210), "the larger droplet is less curved");
+    }
+
+    #[test]
+    fn balls_have_their_curvature() {
+        assert!((ball_curvature::<2>(std::f64::consts::PI * 0.25) - 2.0).abs() < 1e-14);
+        assert!((ball_curvature::<3>(4.0 / 3.0 * std::f64::consts::PI * 0.125) - 4.0).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,123 @@
+//! The flow that particles carry, and its rates of change.
+
+use super::fluids::Fluid;
+use super::species::{Fluids, Species};
+use crate::geometry::Vector;
+
+/// Columns of the flow, one entry a particle.
+#[derive(Debug)]
+pub(super) struct FlowState<const D: usize> {
+    /// The fluid of each species.
+    pub fluids: Fluids,
+    /// The volume of a particle at rest.
+    pub cell: f64,
+    pub species: Vec<Species>,
+    pub velocity: Vec<Vector<D>>,
+    /// Velocities that viscosity and continuity use: those of the end of the step as an integrator predicts them.
+    pub predicted: Vec<Vector<D>>,
+    pub density: Vec<f64>,
+    /// Derived from densities, or summed.
+    pub volume: Vec<f64>,
+    /// Derived from densities.
+    pub pressure: Vec<f64>,
+}
+
+/// Rates of change, one entry a particle.
+#[derive(Debug)]
+pub(super) struct Rates<const D: usize> {
+    pub acceleration: Vec<Vector<D>>,
+    /// Rates of density; empty where densities are not integrated.
+    pub density: Vec<f64>,
+}
+
+impl<const D: usize> FlowState<D> {
+    /// Fluids at rest, with the species of the signed distances in `level`.
+    pub fn at_rest(fluids: Fluids, cell: f64, level: &[f64]) -> Self {
+        let species: Vec<Species> = level.iter().map(|level| Species::from_level(*level)).collect();
+        let count = species.len();
+        Self {
+            density: species.iter().map(|species| fluids[*species].density).collect(),
+            velocity: vec![Vector::<D>::zeros(); count],
+            predicted: vec![Vector::<D>::zeros(); count],
+            volume: vec![cell; count],
+            pressure: vec![0.0; count],
+            fluids,
+            cell,
+            species,
+        }
+    }
+
+    /// The number of particles.
+    pub fn count(&self) -> usize {
+        self.species.len()
+    }
+
+    /// The fluid of a particle.
+    pub fn fluid(&self, i: usize) -> &Fluid {
+        &self.fluids[self.species[i]]
+    }
+
+    /// The mass of a particle.
+    pub fn mass(&self, i: usize) -> f64 {
+        self.fluid(i).density * self.cell
+    }
+
+    /// Sets volumes to those of the present densities.
+    pub fn derive_volumes(&mut self) {
+        for i in 0..self.count() {
+            self.volume[i] = self.mass(i) / self.density[i];
+        }
+    }
+
+    /// Sets densities to those of the present volumes.
+    pub fn derive_densities(&mut self) {
+        for i in 0..self.count() {
+            self.density[i] = self.mass(i) / self.volume[i];
+        }
+    }
+
+    /// Sets pressures to those of the present densities.
+    pub fn derive_pressures(&mut self) {
+        let states = self.pressure.iter_mut().zip(&self.density).zip(&self.species);
+        for ((pressure, density), species) in states {
+            *pressure = self.fluids[*species].pressure(*density);
+        }
+    }
+
+    /// The largest speed.
+    pub fn largest_speed(&self) -> f64 {
+        self.velocity.iter().map(Vector::<D>::norm_squared).fold(0.0, f64::max).sqrt()
+    }
+}
+
+impl<const D: usize> Rates<D> {
+    /// Rates of zero.
+    pub fn none(count: usize, is_density_integrated: bool) -> Self {
+        Self {
+            acceleration: vec![Vector::<D>::zeros(); count],
+            density: vec![0.0; if is_density_integrated { count } else { 0 }],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FlowState, Fluid, Fluids, Species};
+
+    #[test]
+    fn fluids_at_rest_have_no_pressure_and_volumes_and_densities_lead_back_to_each_other() {
+        let fluid = |density| Fluid { density, viscosity: 0.5, sound_speed: 20.0, polytropic: 7.0 };
+        let mut flow = FlowState::<2>::at_rest(Fluids { inside: fluid(3.0), outside: fluid(1.0) }, 0.25, &[-1.0, 1.0]);
+        assert_eq!(flow.species, [Species::Inside, Species::Outside]);
+        assert_eq!((flow.mass(0), flow.mass(1)), (0.75, 0.25));
+        flow.derive_pressures();
+        assert_eq!(flow.pressure, [0.0, 0.0]);
+        flow.volume = vec![0.2, 0.3];
+        flow.derive_densities();
+        flow.derive_pressures();
+        assert!(flow.pressure[0] > 0.0 && flow.pressure[1] < 0.0, "{:?}", flow.pressure);
+        flow.volume = vec![0.0, 0.0];
+        flow.derive_volumes();
+        assert!((flow.volume[0] - 0.2).abs() < 1e-15 && (flow.volume[1] - 0.3).abs() < 1e-15);
+    }
+}

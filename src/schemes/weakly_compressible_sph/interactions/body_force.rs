@@ -1,0 +1,94 @@
+//! Body forces: accelerations from outside.
+
+use super::{LimitContext, LimitsStep, Moment, ParticleForce, StepLimit};
+use crate::geometry::Vector;
+use crate::schemes::weakly_compressible_sph::fluids::Fluid;
+use crate::schemes::weakly_compressible_sph::species::Species;
+use std::f64::consts::PI;
+
+/// A force from outside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BodyForce<const D: usize> {
+    /// The same acceleration of every particle.
+    Constant(Vector<D>),
+    /// An acceleration along x of the fluid inside, F sin(π t/T) sin(π x/A) cos(π y/2B), in space times cos(π z/2C)
+    /// (PCP eqs. 29, 30).
+    Pulse {
+        /// The strength F.
+        coefficient: f64,
+        /// The duration T; the force is zero afterwards.
+        duration: f64,
+        /// The lengths A, B and, in space, C.
+        lengths: Vector<D>,
+    },
+}
+
+impl<const D: usize> BodyForce<D> {
+    /// The acceleration of a particle.
+    #[must_use]
+    pub fn acceleration(&self, x: &Vector<D>, time: f64, species: Species) -> Vector<D> {
+        match self {
+            Self::Constant(acceleration) => *acceleration,
+            Self::Pulse { coefficient, duration, lengths } => {
+                let mut acceleration = Vector::<D>::zeros();
+                if species == Species::Inside && time < *duration {
+                    let across: f64 = (1..D).map(|d| (0.5 * PI * x[d] / lengths[d]).cos()).product();
+                    let along = (PI * x[0] / lengths[0]).sin();
+                    acceleration[0] = coefficient * (PI * time / duration).sin() * along * across;
+                }
+                acceleration
+            }
+        }
+    }
+
+    /// The largest acceleration.
+    #[must_use]
+    pub fn strength(&self) -> f64 {
+        match self {
+            Self::Constant(acceleration) => acceleration.norm(),
+            Self::Pulse { coefficient, .. } => coefficient.abs(),
+        }
+    }
+}
+
+impl<const D: usize> ParticleForce<D> for BodyForce<D> {
+    fn add_to(&self, acceleration: &mut [Vector<D>], moment: &Moment<'_, D>) {
+        let particles = moment.particles.positions().iter().zip(&moment.flow.species);
+        for (acceleration, (x, species)) in acceleration.iter_mut().zip(particles) {
+            *acceleration += self.acceleration(x, moment.time, *species);
+        }
+    }
+}
+
+impl<const D: usize> LimitsStep for BodyForce<D> {
+    /// A factor of √(ε/a).
+    fn step_limit(&self, _fluid: &Fluid, context: &LimitContext) -> StepLimit {
+        let length = context.numbers.body_force * (context.smoothing_length / self.strength()).sqrt();
+        StepLimit { length, cause: "the force from outside" }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BodyForce, Species, Vector};
+
+    #[test]
+    fn a_pulse_drives_the_halves_of_the_inside_apart_until_it_ends() {
+        let pulse = BodyForce::<2>::Pulse { coefficient: 4.0, duration: 0.5, lengths: Vector::<2>::new(1.0, 1.0) };
+        let at = |x: f64, time, species| pulse.acceleration(&Vector::<2>::new(x, 0.0), time, species)[0];
+        assert!((at(0.5, 0.25, Species::Inside) - pulse.strength()).abs() < 1e-14);
+        assert_eq!(at(-0.5, 0.25, Species::Inside), -at(0.5, 0.25, Species::Inside));
+        assert_eq!(at(0.5, 0.25, Species::Outside), 0.0);
+        assert_eq!(at(0.5, 0.5, Species::Inside), 0.0);
+    }
+
+    #[test]
+    fn a_constant_force_is_the_same_for_all_species() {
+        let gravity = BodyForce::<3>::Constant(Vector::<3>::new(0.0, 3.0, -4.0));
+        let x = Vector::<3>::new(0.1, 0.2, 0.3);
+        assert_eq!(gravity.strength(), 5.0);
+        for species in Species::ALL {
+            assert_eq!(gravity.acceleration(&x, 1.0, species), Vector::<3>::new(0.0, 3.0, -4.0));
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Neighbor lists with a skin: they hold until a particle has moved by half of the skin.
+
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::Pencils;
+use crate::neighbors::pencils::BoxTooSmall;
+use crate::parallel::{Interrupt, Interrupted};
+
+/// The lists and the positions that they were made of.
+#[derive(Debug)]
+pub(super) struct NeighborLists<const D: usize> {
+    domain: Domain<D>,
+    pub pencils: Pencils<D>,
+    skin: f64,
+    /// Positions of the particles when the lists were made.
+    pub reference: Vec<Vector<D>>,
+}
+
+impl<const D: usize> NeighborLists<D> {
+    /// Empty lists for `count` particles. The lists cover `cutoff`, which includes the skin.
+    ///
+    /// # Errors
+    /// [`BoxTooSmall`].
+    pub fn new(domain: &Domain<D>, cutoff: f64, skin: f64, count: usize) -> Result<Self, BoxTooSmall> {
+        Ok(Self {
+            domain: domain.clone(),
+            pencils: Pencils::new(domain, cutoff)?,
+            skin,
+            reference: vec![Vector::<D>::zeros(); count],
+        })
+    }
+
+    /// Whether the lists may miss a neighbor: there are none, or a particle has moved by half of the skin.
+    pub fn are_stale(&self, positions: &[Vector<D>]) -> bool {
+        let most = 0.25 * self.skin * self.skin;
+        let has_moved = |(x, from)| self.domain.displacement(from, x).norm_squared() > most;
+        self.pencils.slot_count() == 0 || positions.iter().zip(&self.reference).any(has_moved)
+    }
+
+    /// Makes the lists of new positions.
+    pub fn rebuild(&mut self, positions: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
+        self.reference.copy_from_slice(positions);
+        self.rebuild_from_reference(interrupt)
+    }
+
+    /// Makes the lists of the present reference positions, as a restart does.
+    pub fn rebuild_from_reference(&mut self, interrupt: &Interrupt) -> Result<(), Interrupted> {
+        self.pencils.rebuild(&self.reference, interrupt)
+    }
+
+    /// The position of a particle at the period of its reference position, whatever period it has been wrapped to since.
+    pub fn unwrapped(&self, i: usize, position: &Vector<D>) -> Vector<D> {
+        let from = &self.reference[i];
+        from + self.domain.displacement(from, position)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::Vector;
+    use crate::parallel::Interrupt;
+    use crate::schemes::weakly_compressible_sph::KernelChoice;
+    use crate::schemes::weakly_compressible_sph::test_setting::setting;
+
+    #[test]
+    fn lists_become_stale_when_a_particle_has_moved_by_half_of_the_skin() {
+        let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
+        let mut lists = this.lists();
+        assert!(lists.are_stale(&this.positions), "there are no lists yet");
+        lists.rebuild(&this.positions, &Interrupt::default()).unwrap();
+        assert!(!lists.are_stale(&this.positions));
+        for (share, is_stale) in [(0.49, false), (0.51, true)] {
+            let mut moved = this.positions.clone();
+            moved[7] = this.domain.wrap(moved[7] - Vector::<2>::new(share * this.config.skin(), 0.0));
+            assert_eq!(lists.are_stale(&moved), is_stale);
+            let unwrapped = lists.unwrapped(7, &moved[7]);
+            assert!((unwrapped - lists.reference[7]).norm() < this.config.skin());
+        }
+    }
+}

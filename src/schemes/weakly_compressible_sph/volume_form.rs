@@ -1,0 +1,124 @@
+//! The momentum equation in the volume form, for densities by summation (PCP eq. B.2):
+//!
+//! m_i du_i/dt = Σ_j (V_i² + V_j²) w'/r · (η_ij u_ij − P̄_ij x_ij)
+//!
+//! | term | item |
+//! | --- | --- |
+//! | viscosity η_ij u_ij | [`UniformViscosity`] or [`SpeciesViscosity`] |
+//! | pressure −P̄_ij x_ij | [`VolumePressure`] |
+//!
+//! Forces of a pair are opposite, so that momentum is kept to round-off.
+
+use super::flow_state::FlowState;
+use super::interactions::PairTerm;
+use super::interactions::pressure::VolumePressure;
+use super::interactions::viscosity::{SpeciesViscosity, UniformViscosity};
+use super::interactions::volume_pair::{STRESS, VISCOSITY, VOLUME};
+use super::kernel_choice::with_kernel;
+use super::pair_sums::{Pair, Shares};
+use super::pair_workspace::PairWorkspace;
+use crate::geometry::Vector;
+use crate::linear_algebra::number::{Lanes, Number};
+use crate::parallel::Interrupted;
+use crate::smoothing_kernels::RadialKernel;
+
+/// Sets accelerations to those of the pair forces.
+pub(super) fn accelerate<const D: usize>(
+    flow: &FlowState<D>,
+    pairs: &mut PairWorkspace<D>,
+    acceleration: &mut [Vector<D>],
+) -> Result<(), Interrupted> {
+    let (by_cell, inverse) = (1.0 / pairs.cell, pairs.inverse_smoothing());
+    pairs.gather(VOLUME, 1.0, |i| flow.volume[i] * by_cell);
+    pairs.gather(STRESS, 0.0, |i| flow.volume[i] * by_cell * flow.pressure[i]);
+    let is_uniform = flow.fluids.have_one_viscosity();
+    if is_uniform {
+        pairs.gather_vectors(flow.fluids.inside.viscosity * inverse, |i| flow.predicted[i]);
+    } else {
+        pairs.gather(VISCOSITY, 1.0, |i| flow.fluid(i).viscosity);
+        pairs.gather_vectors(inverse, |i| flow.predicted[i]);
+    }
+    with_kernel!(pairs.kernel.choice, K => if is_uniform {
+        sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure))
+    } else {
+        sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure))
+    })?;
+    // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
+    let kernel = &pairs.kernel;
+    let factor = pairs.cell * pairs.cell * kernel.normalization * kernel.slope() / kernel.smoothing_length;
+    for (place, i) in pairs.occupied() {
+        acceleration[i] = pairs.vector_sum(place) * factor / flow.mass(i);
+    }
+    Ok(())
+}
+
+/// Sums (V_i² + V_j²) w'/r times the terms over all pairs.
+fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
+    pairs: &mut PairWorkspace<D>,
+    terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]>,
+) -> Result<(), Interrupted> {
+    pairs.sum_pairs::<2, S, D>(|pair| {
+        let slope: Lanes = K::slope_over_q(pair.q());
+        let (volume, other_volume) = pair.scalar(VOLUME);
+        let common = slope * Number::mul_add(other_volume, other_volume, volume * volume);
+        // −0 is the sum of no terms: adding it changes no number, and costs nothing.
+        let force = terms.add_to([Lanes::splat(-0.0); D], pair);
+        Shares::opposite(force.map(|part| common * part))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::accelerate;
+    use crate::geometry::Vector;
+    use crate::schemes::weakly_compressible_sph::KernelChoice;
+    use crate::schemes::weakly_compressible_sph::interactions::density_summation::sum_volumes;
+    use crate::schemes::weakly_compressible_sph::test_setting::{KERNELS, near, setting};
+
+    fn check<const D: usize>(kernel: KernelChoice, ratio: f64) {
+        let this = setting::<D>(kernel, ratio);
+        let (mut pairs, mut flow) = (this.gathered(), this.flow());
+        sum_volumes(&mut pairs, &mut flow.volume).unwrap();
+        flow.derive_densities();
+        flow.derive_pressures();
+        let mut acceleration = vec![Vector::<D>::zeros(); flow.count()];
+        accelerate(&flow, &mut pairs, &mut acceleration).unwrap();
+        let (volume, density, pressure, velocity) = (&flow.volume, &flow.density, &flow.pressure, &flow.predicted);
+        let forces: Vec<Vector<D>> = acceleration.iter().enumerate().map(|(i, a)| a * flow.mass(i)).collect();
+        for i in this.probes() {
+            let mut force = Vector::<D>::zeros();
+            let mut scale = 0.0;
+            this.each(i, |j, dx, r| {
+                let squares = volume[i] * volume[i] + volume[j] * volume[j];
+                // By volumes; of one mass, as the paper has it, by densities.
+                let mean = (volume[i] * pressure[i] + volume[j] * pressure[j]) / (volume[i] + volume[j]);
+                if ratio == 1.0 {
+                    let papers = (density[i] * pressure[j] + density[j] * pressure[i]) / (density[i] + density[j]);
+                    near(mean, papers, 1.0, "mean pressure");
+                }
+                let (own, other) = (flow.fluid(i).viscosity, flow.fluid(j).viscosity);
+                let eta = 2.0 * own * other / (own + other);
+                let slope = this.slope(r);
+                let along = dx * (-squares * mean * slope / r);
+                force += along + (velocity[i] - velocity[j]) * (eta * squares * slope / r);
+                scale += along.norm();
+            });
+            for d in 0..D {
+                near(forces[i][d], force[d], scale.max(1.0), "force");
+            }
+        }
+        let all: Vector<D> = forces.iter().sum();
+        let norms: f64 = forces.iter().map(Vector::<D>::norm).sum();
+        assert!(all.norm() < 1e-14 * norms, "{} of {norms}", all.norm());
+    }
+
+    #[test]
+    fn forces_are_those_of_the_paper_and_keep_momentum() {
+        for kernel in KERNELS {
+            check::<2>(kernel, 1.0);
+            check::<2>(kernel, 10.0);
+        }
+        check::<3>(KernelChoice::WendlandC2, 1.0);
+        check::<3>(KernelChoice::CubicSpline, 3.0);
+    }
+}
