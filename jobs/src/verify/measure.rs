@@ -90,9 +90,37 @@ pub fn error(report: &RunReport, of: &Quantity) -> Option<f64> {
 /// The length to which errors are compared: the spacing h, or for N points N^(−1/2) on a surface and 1/N on a circle.
 #[must_use]
 pub fn spacing(scene: &Value) -> Option<f64> {
-    let is_curve = [&scene["surface"], &scene["surface"]["type"]].iter().any(|surface| **surface == "circle");
+    let size = SceneSize::deserialize(scene).ok()?;
+    let is_curve = size.surface.is_some_and(|surface| surface.name() == "circle");
     let apart = |count: f64| if is_curve { 1.0 / count } else { 1.0 / count.sqrt() };
-    scene["spacing"].as_f64().or_else(|| scene["count"].as_f64().map(apart))
+    size.spacing.or_else(|| size.count.map(apart))
+}
+
+/// What a scene says of its size.
+#[derive(Deserialize)]
+struct SceneSize {
+    spacing: Option<f64>,
+    count: Option<f64>,
+    surface: Option<SurfaceName>,
+}
+
+/// A surface, by its bare name or with parameters.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum SurfaceName {
+    Bare(String),
+    Chosen {
+        #[serde(rename = "type")]
+        name: String,
+    },
+}
+
+impl SurfaceName {
+    fn name(&self) -> &str {
+        match self {
+            Self::Bare(name) | Self::Chosen { name } => name,
+        }
+    }
 }
 
 /// CPU seconds in cost spans whose names begin with `prefix`; with an empty one in all but the computation of errors.

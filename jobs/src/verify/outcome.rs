@@ -1,6 +1,6 @@
 //! A target with its value, and how people read it.
 
-use super::case::{Bound, Case, Target, job_body};
+use super::case::{Bound, Case, Target, job_body, scene};
 use super::measure;
 use crate::spec::report::RunReport;
 use serde_json::Value;
@@ -44,7 +44,7 @@ impl Outcome {
             }
             bodies.push(body);
         }
-        let scenes: Vec<&Value> = bodies.iter().map(|body| &body["scene"]).collect();
+        let scenes: Vec<&Value> = bodies.iter().map(scene).collect();
         let found: Vec<&RunReport> = reports.iter().collect();
         let value = if failure.is_none() { measure::evaluate(&target.measure, &scenes, &found) } else { f64::NAN };
         Self {
