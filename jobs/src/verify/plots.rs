@@ -62,12 +62,12 @@ impl Workspace {
         lines: &[RunsLine],
     ) -> Result<speed_error::Lines, String> {
         let point = |scene: &Value| {
-            let report = self.report(&json!({"scene": scene}))?;
+            let run = self.finish(&json!({"scene": scene}))?;
             let found = || {
                 Some(speed_error::Point {
-                    spacing: measure::spacing(scene)?,
-                    seconds: measure::seconds(&report, spans),
-                    error: measure::error(&report, error).or_else(|| measure::error(&report, fallback?))?,
+                    spacing: run.spacing?,
+                    seconds: measure::seconds(&run.report, spans),
+                    error: measure::error(&run.report, error).or_else(|| measure::error(&run.report, fallback?))?,
                 })
             };
             found().ok_or_else(|| format!("{scene} reports no {} {}", error.quantity, error.norm))
@@ -99,8 +99,8 @@ impl Workspace {
     fn points(&self, line: &PointsLine, error: &Quantity) -> Result<Vec<(f64, f64)>, String> {
         let mut found = Vec::new();
         for point in &line.points {
-            let report = self.report(&json!({"scene": point.run}))?;
-            found.push((point.at, measure::error(&report, error).unwrap_or(f64::NAN)));
+            let run = self.finish(&json!({"scene": point.run}))?;
+            found.push((point.at, measure::error(&run.report, error).unwrap_or(f64::NAN)));
         }
         Ok(found)
     }
