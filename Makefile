@@ -10,6 +10,7 @@ export HDF5_DIR ?= $(firstword $(wildcard /usr/lib/*/hdf5/serial))
 endif
 
 PACKAGES := gcc pkg-config libhdf5-dev curl jq python3-venv ca-certificates
+TEST_PACKAGES := nodejs npm
 VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
@@ -34,15 +35,20 @@ build: setup
 demo: build
 	deploy/demo.sh $(TARGET)/release/meniscus
 
-$(VENV)/ready: tests/python/requirements.txt | setup
+# What the tests use of Python's and of Node's packages.
+$(VENV)/ready: tests/python/requirements.txt tests/node/package.json | setup
+	deploy/setup.sh $(TEST_PACKAGES)
 	python3 -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r tests/python/requirements.txt
+	mkdir -p $(VENV)/node && cp tests/node/package.json $(VENV)/node/
+	npm install --prefix $(VENV)/node --silent --no-audit --no-fund
 	touch $@
 
 # The binary under test has debug assertions, like the tests.
 test: setup $(VENV)/ready
 	cargo build --profile test --locked -p meniscus-api
-	export MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)"; \
+	export MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)" \
+	MENISCUS_NODE_TOOLS="$(abspath $(VENV)/node/node_modules/.bin)"; \
 	if cargo nextest --version > /dev/null 2>&1; then cargo nextest run --locked --workspace --no-fail-fast; \
 	else cargo test --locked --workspace --no-fail-fast; fi
 

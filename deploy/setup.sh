@@ -12,6 +12,8 @@ for package in "$@"; do
         # What else provides these will do.
         gcc) command -v cc > /dev/null || missing+=("$package") ;;
         curl | jq | pkg-config) command -v "$package" > /dev/null || missing+=("$package") ;;
+        nodejs) command -v node > /dev/null || missing+=("$package") ;;
+        npm) command -v npm > /dev/null || missing+=("$package") ;;
         python3-venv) python3 -c 'import ensurepip, venv' 2> /dev/null || missing+=("$package") ;;
         libhdf5-dev) pkg-config --exists hdf5 2> /dev/null || pkg-config --exists hdf5-serial 2> /dev/null || missing+=("$package") ;;
         ca-certificates) [ -e /etc/ssl/certs/ca-certificates.crt ] || missing+=("$package") ;;

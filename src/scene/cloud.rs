@@ -1,7 +1,7 @@
 //! Points that a scene takes from outside: a shape made of particles with their level, a surface with its normals, or
 //! places to ask about.
 //!
-//! The engine opens nothing. A scene says by pointer what it needs, whoever builds it hands over the arrays.
+//! The engine opens no file. A scene says by pointer what it needs; the caller that builds it hands over the arrays.
 
 use crate::geometry::Vector;
 use crate::spec::Violation;

@@ -8,6 +8,7 @@ mod support;
 mod files;
 mod jobs;
 mod access;
+mod clients;
 mod contract;
 mod estimates;
 mod readers;

@@ -106,6 +106,22 @@ fn add_schemas(document: &mut Value) {
     schemas["StudySpec"] = Value::Object(group::schema(&StudySpec::declarations()));
     schemas["StudySpec"]["properties"]["base"] = json!({"$ref": reference("JobSpec")});
     schemas["StudySpec"]["required"] = json!(["base", "sweep"]);
+    move_defaults(schemas);
+}
+
+/// Generators of clients take defaults that are words or numbers. Others stand beside them, as `x-default`.
+fn move_defaults(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            if map.get("default").is_some_and(|default| default.is_object() || default.is_array()) {
+                let default = map.shift_remove("default").unwrap_or_default();
+                map.insert("x-default".to_owned(), default);
+            }
+            map.values_mut().for_each(move_defaults);
+        }
+        Value::Array(list) => list.iter_mut().for_each(move_defaults),
+        _ => {}
+    }
 }
 
 /// The example of each kind of scene.

@@ -260,15 +260,39 @@ pub(super) fn in_space(
         return with_edges(*bump, count, reach);
     }
     let Some(surface) = shape.in_space() else { return SurfaceCloud::default() };
+    let points = sample(shape, surface, (count, sampling, seed), interrupt);
+    let mut cloud = SurfaceCloud { rows: points.len(), ..SurfaceCloud::default() };
+    for x in &points {
+        let (normal, curvature, gauss) = exact_geometry(shape, x);
+        cloud.normals.push(normal);
+        cloud.curvatures.push(curvature);
+        cloud.gauss.push(gauss);
+    }
+    let is_even = sampling == Sampling::Fibonacci
+        && match shape {
+            Shape::Ellipsoid(ellipsoid) => ellipsoid.semi_axes.max() == ellipsoid.semi_axes.min(),
+            _ => true,
+        };
+    cloud.areas = is_even.then(|| vec![shape.measure() / count as f64; count as usize]);
+    cloud.points = points;
+    cloud
+}
+
+/// Points on a surface, as they are to be spread.
+fn sample(
+    shape: &Shape,
+    surface: &dyn Surface<3>,
+    (count, sampling, seed): (u64, Sampling, u64),
+    interrupt: &Interrupt,
+) -> Vec<Vector<3>> {
     let number = count as usize;
-    let spacing = shape.spacing(count);
-    let points = match (sampling, shape) {
+    match (sampling, shape) {
         (Sampling::Random { is_relaxed }, _) => {
             let (low, high) = surface.bounding_box();
             // A shell as thin as the drawing of points allows.
             let mut points = relaxation::random_points(surface, number, 0.02 * (high - low).min(), seed, interrupt);
             if is_relaxed {
-                relaxation::relax(&mut points, spacing, |x| surface.nearest(x).point, interrupt);
+                relaxation::relax(&mut points, shape.spacing(count), |x| surface.nearest(x).point, interrupt);
             }
             points
         }
@@ -282,32 +306,22 @@ pub(super) fn in_space(
             fibonacci::sphere(number).into_iter().map(|u| u.component_mul(&ellipsoid.semi_axes)).collect()
         }
         _ => Vec::new(),
-    };
-    let mut cloud = SurfaceCloud { rows: points.len(), ..SurfaceCloud::default() };
-    for x in &points {
-        let (normal, curvature, gauss) = match shape {
-            Shape::Ellipsoid(ellipsoid) => {
-                let (normal, curvature) = ellipsoid.normal_and_curvature(x);
-                (normal, curvature, ellipsoid.gauss_curvature(x))
-            }
-            Shape::Torus(torus) => {
-                let nearest = torus.nearest(x);
-                (nearest.normal.unwrap_or_default(), nearest.curvature.unwrap_or(f64::NAN), torus.gauss_curvature(x))
-            }
-            _ => (Vector::<3>::zeros(), f64::NAN, f64::NAN),
-        };
-        cloud.normals.push(normal);
-        cloud.curvatures.push(curvature);
-        cloud.gauss.push(gauss);
     }
-    let is_even = sampling == Sampling::Fibonacci
-        && match shape {
-            Shape::Ellipsoid(ellipsoid) => ellipsoid.semi_axes.max() == ellipsoid.semi_axes.min(),
-            _ => true,
-        };
-    cloud.areas = is_even.then(|| vec![shape.measure() / count as f64; number]);
-    cloud.points = points;
-    cloud
+}
+
+/// Outward normal, mean and Gauss curvature of a surface at one of its points; NaN where they are not known exactly.
+fn exact_geometry(shape: &Shape, x: &Vector<3>) -> (Vector<3>, f64, f64) {
+    match shape {
+        Shape::Ellipsoid(ellipsoid) => {
+            let (normal, curvature) = ellipsoid.normal_and_curvature(x);
+            (normal, curvature, ellipsoid.gauss_curvature(x))
+        }
+        Shape::Torus(torus) => {
+            let nearest = torus.nearest(x);
+            (nearest.normal.unwrap_or_default(), nearest.curvature.unwrap_or(f64::NAN), torus.gauss_curvature(x))
+        }
+        _ => (Vector::<3>::zeros(), f64::NAN, f64::NAN),
+    }
 }
 
 /// A bump with the images of what lies within reach of its edges.

@@ -183,7 +183,7 @@ impl<const D: usize> AdvectedSystem<D> {
     }
 }
 
-/// Rebuilds a surface from ψ and asks it about everybody within w/2 of it (PCP 3.4). Branches are told apart by the normals
+/// Rebuilds a surface from ψ and queries every particle within w/2 of it (PCP 3.4). Branches are told apart by the normals
 /// of the last redistancing, where a schedule keeps them fresh.
 #[expect(clippy::too_many_arguments, reason = "parts of a system, of which a copy replaces some")]
 fn ask<const D: usize>(

@@ -122,7 +122,7 @@ impl<const D: usize> Remeshing<D> {
     /// Interpolates the particles' level to the nodes.
     ///
     /// # Errors
-    /// [`Interrupted`] when somebody asked to stop.
+    /// [`Interrupted`] when a stop was requested.
     pub fn interpolate(
         &mut self,
         positions: &[Vector<D>],

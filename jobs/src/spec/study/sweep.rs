@@ -175,7 +175,7 @@ impl Parameter for Axes {
     }
 
     fn schema((): ()) -> Object {
-        let list = json!({"type": "array", "minItems": 1});
+        let list = json!({"type": "array", "minItems": 1, "items": {}});
         Map::from_iter([
             ("type".to_owned(), json!("object")),
             ("additionalProperties".to_owned(), list),

@@ -1,0 +1,78 @@
+//! The OpenAPI document as programs use it: it validates, and clients that are generated from it work.
+
+use crate::service;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The Python of the tests with the tools beside it; None where tests run without `make test`.
+fn python() -> Option<PathBuf> {
+    let python = std::env::var_os("MENISCUS_PYTHON").map(PathBuf::from);
+    let is_required = std::env::var_os("CI").is_some() || std::env::var_os("MENISCUS_BIN").is_some();
+    assert!(python.is_some() || !is_required, "MENISCUS_PYTHON is not set");
+    python
+}
+
+fn run(command: &mut Command) {
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(output.status.success(), "{command:?}: {}{}", text(&output.stdout), text(&output.stderr));
+}
+
+#[test]
+fn a_generated_python_client_submits_a_job_and_reads_its_report() {
+    let Some(python) = python() else { return };
+    let (_directory, service) = service(&["--slots", "1"]);
+    let folder = service.data.join("client");
+    std::fs::create_dir(&folder).unwrap();
+    let document = folder.join("openapi.json");
+    std::fs::write(&document, service.get("/openapi.json").bytes).unwrap();
+    run(Command::new(&python).args(["-m", "openapi_spec_validator"]).arg(&document));
+    // The generator has no type of its own for files, pictures and streams.
+    let overrides = "content_type_overrides:\n  application/x-hdf5: application/octet-stream\n  \
+        application/x-tar: application/octet-stream\n  image/svg+xml: application/octet-stream\n  \
+        text/event-stream: text/plain\n  text/csv: text/plain\n";
+    std::fs::write(folder.join("overrides.yml"), overrides).unwrap();
+    run(Command::new(python.with_file_name("openapi-python-client"))
+        .args(["generate", "--meta", "none", "--output-path", "meniscus_client", "--fail-on-warning"])
+        .args(["--config", "overrides.yml", "--path"])
+        .arg(&document)
+        // It formats what it writes with ruff.
+        .env("PATH", path_with(python.parent().unwrap()))
+        .current_dir(&folder));
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/generated_client.py");
+    run(Command::new(&python).arg(script).arg(&service.url).arg(&folder));
+}
+
+#[test]
+fn types_for_typescript_are_generated_and_compile() {
+    let Some(tools) = std::env::var_os("MENISCUS_NODE_TOOLS").map(PathBuf::from) else {
+        assert!(std::env::var_os("CI").is_none(), "MENISCUS_NODE_TOOLS is not set");
+        return;
+    };
+    let (_directory, service) = service(&["--slots", "1"]);
+    let folder = service.data.join("types");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(folder.join("openapi.json"), service.get("/openapi.json").bytes).unwrap();
+    run(Command::new(tools.join("openapi-typescript"))
+        // Fields with a default may be left out of requests.
+        .args(["openapi.json", "--default-non-nullable=false", "--output", "meniscus.ts"])
+        .current_dir(&folder));
+    let program = r#"import type { components, paths } from "./meniscus";
+const job: components["schemas"]["JobSpec"] = {
+  scene: { kind: "redistance", spacing: 0.1, shape: { type: "circle", radius: 0.5 } },
+};
+type Report = paths["/v1/jobs/{id}/report"]["get"]["responses"]["200"]["content"]["application/json"];
+const largest = (report: Report): number => Math.max(...report.errors.map((entry) => entry.value ?? 0));
+console.log(job, largest);
+"#;
+    std::fs::write(folder.join("use.ts"), program).unwrap();
+    run(Command::new(tools.join("tsc"))
+        .args(["--noEmit", "--strict", "--skipLibCheck", "--lib", "es2022,dom", "use.ts"])
+        .current_dir(&folder));
+}
+
+/// The search path with a folder before it.
+fn path_with(first: &Path) -> std::ffi::OsString {
+    let rest = std::env::var_os("PATH").unwrap_or_default();
+    std::env::join_paths(std::iter::once(first.to_owned()).chain(std::env::split_paths(&rest))).unwrap()
+}
