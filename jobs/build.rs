@@ -1,5 +1,4 @@
 //! Lists the verification cases of `tests/validation/cases` with their text, so that the program has them without a repository.
-#![expect(clippy::print_stdout, reason = "cargo reads instructions from the standard output of a build script")]
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

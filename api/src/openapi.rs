@@ -23,6 +23,10 @@ const ANYWHERE: [(&str, &str); 6] = [
     ("503", "The service is starting or stopping."),
 ];
 
+mod completion;
+
+pub use completion::complete;
+
 /// Completes the document that the routes describe. The wildcard `{*path}` of the router becomes the parameter `{path}`,
 /// problems get their own media type, and every operation gets the problems that any request can lead to.
 #[must_use]

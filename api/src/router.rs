@@ -62,7 +62,7 @@ fn documented() -> OpenApiRouter<AppState> {
 pub fn router(state: AppState) -> Router {
     let (routes, document) = documented().split_for_parts();
     // Serialized once, since every request would clone the document.
-    let document = Bytes::from(openapi::publish(document).to_json().unwrap_or_default());
+    let document = Bytes::from(openapi::complete(openapi::publish(document)).to_string());
     let document = ([(header::CONTENT_TYPE, "application/json")], document);
     routes
         .route("/openapi.json", axum::routing::get(move || async move { document }))
@@ -80,12 +80,29 @@ pub fn router(state: AppState) -> Router {
 #[cfg(test)]
 mod tests {
     use super::documented;
-    use crate::openapi::publish;
+    use crate::openapi::{complete, publish};
+    use serde_json::Value;
+    use std::collections::HashSet;
+
+    fn document() -> Value {
+        complete(publish(documented().split_for_parts().1))
+    }
+
+    fn operations(document: &Value) -> Vec<(String, &Value)> {
+        let paths = document["paths"].as_object().unwrap();
+        let of = |(path, item): (&String, &'_ Value)| (path.clone(), item.as_object().unwrap().len());
+        assert!(paths.iter().map(of).all(|(_, methods)| methods > 0));
+        paths
+            .iter()
+            .flat_map(|(path, item)| {
+                item.as_object().unwrap().iter().map(move |(method, operation)| (format!("{method} {path}"), operation))
+            })
+            .collect()
+    }
 
     #[test]
     fn the_document_is_openapi_31_and_names_every_schema_it_uses() {
-        let (_, document) = documented().split_for_parts();
-        let json = serde_json::to_value(publish(document)).unwrap();
+        let json = document();
         assert!(json["paths"]["/v1/jobs/{id}/files/{path}"]["get"].is_object());
         assert!(json["openapi"].as_str().unwrap().starts_with("3.1"));
         let text = json.to_string();
@@ -94,5 +111,39 @@ mod tests {
             assert!(json["components"]["schemas"].get(name).is_some(), "{name}");
         }
         assert!(json["paths"]["/v1/jobs"]["post"]["responses"]["422"].is_object());
+    }
+    #[test]
+    fn every_operation_has_an_id_of_its_own_and_describes_its_responses() {
+        let document = document();
+        let mut ids = HashSet::new();
+        for (name, operation) in operations(&document) {
+            assert!(ids.insert(operation["operationId"].as_str().unwrap()), "{name}");
+            for (status, response) in operation["responses"].as_object().unwrap() {
+                assert!(!response["description"].as_str().unwrap().is_empty(), "{name} {status}");
+            }
+        }
+    }
+
+    #[test]
+    fn bodies_are_the_schemas_of_the_scenes() {
+        let document = document();
+        let body = |path: &str| document["paths"][path]["post"]["requestBody"]["content"]["application/json"].clone();
+        assert_eq!(body("/v1/jobs")["schema"]["$ref"], "#/components/schemas/JobSpec");
+        assert_eq!(body("/v1/studies")["schema"]["$ref"], "#/components/schemas/StudySpec");
+        assert!(body("/v1/jobs")["examples"]["vortex"]["value"]["scene"]["kind"] == "vortex");
+        let kinds = document["components"]["schemas"]["Scene"]["oneOf"].as_array().unwrap();
+        assert_eq!(kinds.len(), meniscus::scenes::SCENES.len());
+        let vortex = &document["components"]["schemas"]["VortexScene"]["properties"];
+        assert_eq!((&vortex["kind"]["const"], &vortex["spacing"]["default"]), (&"vortex".into(), &0.015_625.into()));
+    }
+
+    #[test]
+    fn streams_files_and_tokens_are_described() {
+        let document = document();
+        let content = |path: &str| document["paths"][path]["get"]["responses"]["200"]["content"].clone();
+        assert!(content("/v1/jobs/{id}/events")["text/event-stream"].is_object());
+        assert!(content("/v1/jobs/{id}/files.tar")["application/x-tar"].is_object());
+        assert!(content("/v1/checkpoints/{id}/content")["application/x-hdf5"].is_object());
+        assert_eq!(document["components"]["securitySchemes"]["token"]["scheme"], "bearer");
     }
 }

@@ -84,7 +84,7 @@ pub fn verify(request: &Request, mut show: impl FnMut(&Outcome) -> io::Result<()
             let name = format!("{}/{name}", cases.kind);
             let mut of_case = Vec::new();
             for target in case.targets.iter().filter(|target| request.full || !target.is_long) {
-                let outcome = Outcome::of_target(&name, case, target, |_, body| workspace.report(body));
+                let outcome = Outcome::of_target(&name, case, target, |_, body| workspace.finish(body));
                 all_met &= outcome.is_met;
                 show(&outcome)?;
                 of_case.push(outcome);

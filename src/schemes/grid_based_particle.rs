@@ -14,13 +14,13 @@
 //! | `reconstruction`, `reconstructor` | the closest point of a front to one place; to many places |
 //! | `local_graph`, `local_shape`, `support` | polynomials over a tangent plane; their curvatures; extent of their particles |
 //! | `segments`, `topology`, `sweep` | how segments are told apart; what happens where they meet; which particles are swept |
-//! | `exact_front`, `exact`, `coverage` | exact motions, one file a motion; errors; gaps |
+//! | `exact_front`, `errors`, `coverage` | exact motions, one file a motion; errors; gaps along chains |
 
 mod config;
 mod corners;
 pub mod curvature_stability;
 mod coverage;
-mod exact;
+mod errors;
 mod exact_front;
 #[cfg(test)]
 mod fixtures;

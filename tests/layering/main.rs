@@ -117,6 +117,36 @@ fn no_circle_of_files() {
     compare("circles of files", &found, &known, |circle| format!("&{circle:?}"));
 }
 
+/// Files that may look into JSON by strings: the machinery of specs, the readers of formats, and the writer of the document.
+const READERS_OF_JSON: [&str; 5] =
+    ["src/spec/", "src/scene.rs", "src/scenes.rs", "jobs/src/verify/case.rs", "api/src/openapi/completion.rs"];
+
+/// Look-ups in JSON by strings: `value["name"]`, `value.get("name")`, `value.pointer(…)`. Columns of SQL rows are none.
+fn json_lookups(text: &str) -> usize {
+    let production = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let follows_value = |at: usize| production[..at].ends_with(|c: char| c.is_alphanumeric() || c == ')' || c == ']');
+    let is_name = |at: usize| production[at..].starts_with(|c: char| c.is_ascii_lowercase());
+    let indexed = production.match_indices("[\"").filter(|(at, _)| follows_value(*at) && is_name(*at + 2)).count();
+    let gets = production
+        .match_indices(".get(\"")
+        .filter(|(at, _)| is_name(*at + 6) && !production[..*at].ends_with("row"))
+        .count();
+    indexed + gets + production.matches(".pointer(").count()
+}
+
+#[test]
+fn nothing_below_the_specs_looks_into_json_by_strings() {
+    let mut found = String::new();
+    for (path, text) in all_sources() {
+        let is_reader = READERS_OF_JSON.iter().any(|reader| path.starts_with(reader)) || path.ends_with("tests.rs");
+        let count = json_lookups(&text);
+        if !is_reader && count > 0 {
+            found.push_str(&format!("\n    {path}: {count}"));
+        }
+    }
+    assert!(found.is_empty(), "look-ups in JSON by strings in:{found}");
+}
+
 /// Words for people. Particles, cells, files and processes are called by their nouns.
 const BANNED_WORDS: [&str; 5] = ["who", "whoever", "nobody", "somebody", "everybody"];
 

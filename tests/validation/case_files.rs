@@ -2,6 +2,7 @@
 
 use meniscus_jobs::spec::body::{self, Allowance, NoSources};
 use meniscus_jobs::verify::case::job_body;
+use meniscus_jobs::verify::measure::Measure;
 use meniscus_jobs::verify::{Catalog, catalog};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -89,6 +90,43 @@ fn every_target_names_its_source() {
                 let is_paper = papers.iter().any(|paper| source.starts_with(&format!("{paper} ")));
                 assert!(is_paper || others.iter().any(|other| source.starts_with(other)), "{place}: {source}");
                 assert!(!is_paper || source.contains("section "), "{place}: a paper without section: {source}");
+            }
+        }
+    }
+}
+
+/// The norm of the error that a measure reads.
+fn norm_of(measure: &Measure) -> Option<&str> {
+    match measure {
+        Measure::Error(of) | Measure::LargestErrorInSpacings(of) | Measure::Ratio(of) | Measure::Difference(of) => {
+            Some(&of.norm)
+        }
+        Measure::Order { norm, .. } => Some(norm),
+        Measure::Memory {}
+        | Measure::SecondsPerStep { .. }
+        | Measure::Seconds { .. }
+        | Measure::SecondsRatio { .. }
+        | Measure::Diagnostic { .. } => None,
+    }
+}
+
+#[test]
+fn every_norm_is_one_that_the_kind_of_the_run_declares() {
+    for kind in &Catalog::built_in().unwrap().kinds {
+        for (name, case) in &kind.cases {
+            for target in &case.targets {
+                let Some(norm) = norm_of(&target.measure) else { continue };
+                for (run, written) in case.runs_of(target) {
+                    let body = job_body(written);
+                    let scene_kind = meniscus::scenes::find(body["scene"]["kind"].as_str().unwrap()).unwrap();
+                    let norms = (scene_kind.quantities)().norms;
+                    let is_declared = norms.iter().any(|declared| declared.name == norm);
+                    assert!(
+                        is_declared,
+                        "{}/{name}, run {run}: {} declares no norm {norm}",
+                        kind.kind, scene_kind.kind
+                    );
+                }
             }
         }
     }

@@ -3,6 +3,7 @@
 use super::{RunError, exit_code, resolve, start};
 use meniscus_jobs::spec::report::RunReport;
 use meniscus_jobs::verify::case::job_body;
+use meniscus_jobs::verify::measure::FinishedRun;
 use meniscus_jobs::verify::{Case, Outcome};
 use std::fs;
 use std::io::{self, Write};
@@ -37,7 +38,8 @@ pub(super) fn run(file: &Path, text: &[u8], out: &Path, threads: Option<usize>) 
     writeln!(output, "\n{:<62} {:>20}  {:>18} {:>10}", "target", "paper", "to reach", "measured")?;
     let mut all_met = true;
     for target in &case.targets {
-        let outcome = Outcome::of_target("", &case, target, |run, _| read_report(&out.join(run)));
+        let outcome =
+            Outcome::of_target("", &case, target, |run, body| FinishedRun::new(body, read_report(&out.join(run))?));
         all_met &= outcome.is_met;
         writeln!(output, "{}", outcome.line())?;
     }

@@ -16,7 +16,7 @@ use meniscus_jobs::spec::attempt_files::attempt_directory;
 use meniscus_jobs::spec::states::State as JobState;
 
 /// Verified checkpoints of a job, newest first.
-#[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints", operation_id = "list_checkpoints", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 200, body = CheckpointList), (status = 404, body = Problem)))]
 pub async fn list(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<CheckpointList>, ApiError> {
     let views = checkpoints_of(&state, id).await?.into_iter().map(CheckpointView::from).collect();
@@ -24,7 +24,7 @@ pub async fn list(State(state): State<AppState>, Path(id): Path<String>) -> Resu
 }
 
 /// Requests a checkpoint at the end of the current step.
-#[utoipa::path(post, path = "/v1/jobs/{id}/checkpoints", tag = "checkpoints", params(("id" = String, Path)),
+#[utoipa::path(post, path = "/v1/jobs/{id}/checkpoints", operation_id = "request_checkpoint", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn request(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     let row = resource::find::<JobRow>(&state, id).await?;
@@ -37,7 +37,7 @@ pub async fn request(State(state): State<AppState>, Path(id): Path<String>) -> R
 }
 
 /// Redirects to the content of the newest checkpoint.
-#[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints/latest/content", tag = "checkpoints", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/jobs/{id}/checkpoints/latest/content", operation_id = "latest_checkpoint", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 307), (status = 404, body = Problem)))]
 pub async fn latest(State(state): State<AppState>, Path(id): Path<String>) -> Result<Redirect, ApiError> {
     let rows = checkpoints_of(&state, id).await?;
@@ -79,21 +79,21 @@ impl Resource for CheckpointRow {
 }
 
 /// One checkpoint.
-#[utoipa::path(get, path = "/v1/checkpoints/{id}", tag = "checkpoints", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/checkpoints/{id}", operation_id = "get_checkpoint", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 200, body = CheckpointView), (status = 404, body = Problem)))]
 pub async fn get(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<CheckpointView>, ApiError> {
     resource::get::<CheckpointRow>(&state, id).await
 }
 
 /// Deletes a checkpoint of a job that has ended, unless an unfinished job restarts from it.
-#[utoipa::path(delete, path = "/v1/checkpoints/{id}", tag = "checkpoints", params(("id" = String, Path)),
+#[utoipa::path(delete, path = "/v1/checkpoints/{id}", operation_id = "delete_checkpoint", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
     resource::delete::<CheckpointRow>(&state, id).await
 }
 
 /// The file of a checkpoint, or a part of it.
-#[utoipa::path(get, path = "/v1/checkpoints/{id}/content", tag = "checkpoints",
+#[utoipa::path(get, path = "/v1/checkpoints/{id}/content", operation_id = "download_checkpoint", tag = "checkpoints",
     params(("id" = String, Path), ("Range" = Option<String>, Header)),
     responses((status = 200, content_type = "application/x-hdf5"), (status = 206), (status = 304),
         (status = 404, body = Problem), (status = 416, body = Problem)))]

@@ -12,8 +12,8 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 
 /// Checks the body of a job and estimates its particles, steps, memory, disk space and time. Creates nothing.
-#[utoipa::path(post, path = "/v1/estimates", tag = "jobs",
-    request_body(content = Object, description = "a job body, as for POST /v1/jobs"),
+#[utoipa::path(post, path = "/v1/estimates", operation_id = "estimate_job", tag = "jobs",
+    request_body(content = Object, description = "a job"),
     responses((status = 200, body = EstimateView), (status = 400, body = Problem), (status = 413, body = Problem),
         (status = 422, body = Problem)))]
 pub async fn estimate(

@@ -75,7 +75,7 @@ pub struct EventQuery {
 }
 
 /// Events of a job after a number: a page of JSON, or with `Accept: text/event-stream` a stream until the job ends.
-#[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "events",
+#[utoipa::path(get, path = "/v1/jobs/{id}/events", operation_id = "job_events", tag = "events",
     params(("id" = String, Path), EventQuery,
         ("Last-Event-ID" = Option<u64>, Header)),
     responses((status = 200, body = EventList), (status = 204, description = "a stream with nothing more to come"),
@@ -90,7 +90,7 @@ pub async fn events(
 }
 
 /// Events of all jobs of a study, numbered from 1 within the study. A stream ends when all jobs have ended.
-#[utoipa::path(get, path = "/v1/studies/{id}/events", tag = "studies",
+#[utoipa::path(get, path = "/v1/studies/{id}/events", operation_id = "study_events", tag = "studies",
     params(("id" = String, Path), EventQuery,
         ("Last-Event-ID" = Option<u64>, Header)),
     responses((status = 200, body = EventList), (status = 204, description = "a stream with nothing more to come"),

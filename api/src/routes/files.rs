@@ -20,7 +20,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 /// All published files of a job.
-#[utoipa::path(get, path = "/v1/jobs/{id}/files", tag = "files", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/jobs/{id}/files", operation_id = "list_files", tag = "files", params(("id" = String, Path)),
     responses((status = 200, body = FileList), (status = 404, body = Problem)))]
 pub async fn list(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<FileList>, ApiError> {
     let views = files_of(&state, &id).await?.into_iter().map(FileView::from).collect();
@@ -53,7 +53,7 @@ fn location(state: &AppState, job: &str, file: &FileRow) -> PathBuf {
 }
 
 /// A file, or a part of it. The entity tag is its SHA-256.
-#[utoipa::path(get, path = "/v1/jobs/{id}/files/{*path}", tag = "files",
+#[utoipa::path(get, path = "/v1/jobs/{id}/files/{*path}", operation_id = "download_file", tag = "files",
     params(("id" = String, Path), ("path" = String, Path, description = "a path of the list"),
         ("Range" = Option<String>, Header), ("If-Range" = Option<String>, Header), ("If-None-Match" = Option<String>, Header)),
     responses((status = 200, content_type = "application/octet-stream"), (status = 206), (status = 304),
@@ -67,7 +67,7 @@ pub async fn get(
 }
 
 /// All published files of a job as one archive.
-#[utoipa::path(get, path = "/v1/jobs/{id}/files.tar", tag = "files", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/jobs/{id}/files.tar", operation_id = "download_all_files", tag = "files", params(("id" = String, Path)),
     responses((status = 200, content_type = "application/x-tar"), (status = 404, body = Problem)))]
 pub async fn tar(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     let files = files_of(&state, &id).await?;

@@ -30,8 +30,8 @@ pub const BODY_LIMIT: usize = 1 << 20;
 const LONGEST_WAIT: u64 = 60;
 
 /// Submits a job. An answer 201 is durable: the job survives a crash of the service and of the machine.
-#[utoipa::path(post, path = "/v1/jobs", tag = "jobs", params(("Idempotency-Key" = Option<String>, Header)),
-    request_body(content = Object, description = "a job body: {\"scene\": {\"kind\": …}} at least; see /v1/scenes"),
+#[utoipa::path(post, path = "/v1/jobs", operation_id = "submit_job", tag = "jobs", params(("Idempotency-Key" = Option<String>, Header)),
+    request_body(content = Object, description = "a job"),
     responses((status = 201, body = JobView, headers(("Location" = String))), (status = 400, body = Problem),
         (status = 413, body = Problem), (status = 422, body = Problem), (status = 429, body = Problem),
         (status = 503, body = Problem), (status = 507, body = Problem)))]
@@ -185,7 +185,7 @@ impl From<JobQuery> for JobFilter {
 }
 
 /// A page of jobs. New jobs never shift pages.
-#[utoipa::path(get, path = "/v1/jobs", tag = "jobs", params(JobQuery),
+#[utoipa::path(get, path = "/v1/jobs", operation_id = "list_jobs", tag = "jobs", params(JobQuery),
     responses((status = 200, body = JobList, headers(("Link" = String))), (status = 422, body = Problem)))]
 pub async fn list(
     State(state): State<AppState>,
@@ -222,7 +222,7 @@ fn tag_revision(tag: &str) -> Option<i64> {
 
 /// A job. With `If-None-Match` the answer is 304 if nothing has changed. With `Prefer: wait=N` as well, the answer comes
 /// as soon as the revision differs, or after N seconds with the current job.
-#[utoipa::path(get, path = "/v1/jobs/{id}", tag = "jobs",
+#[utoipa::path(get, path = "/v1/jobs/{id}", operation_id = "get_job", tag = "jobs",
     params(("id" = String, Path), ("If-None-Match" = Option<String>, Header), ("Prefer" = Option<String>, Header)),
     responses((status = 200, body = JobView, headers(("ETag" = String))), (status = 304), (status = 404, body = Problem)))]
 pub async fn get(
@@ -268,7 +268,7 @@ fn serialized(version: Version, bytes: Bytes) -> Response {
 }
 
 /// Deletes a job that has ended, with its files. Never cancels.
-#[utoipa::path(delete, path = "/v1/jobs/{id}", tag = "jobs", params(("id" = String, Path)),
+#[utoipa::path(delete, path = "/v1/jobs/{id}", operation_id = "delete_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
     resource::delete::<JobRow>(&state, id).await
@@ -300,7 +300,7 @@ async fn request(
 }
 
 /// Cancels a job. Repeating the request changes nothing.
-#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", tag = "jobs", params(("id" = String, Path)),
+#[utoipa::path(post, path = "/v1/jobs/{id}/cancel", operation_id = "cancel_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn cancel(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     let already = &[JobState::Canceling, JobState::Canceled];
@@ -308,7 +308,7 @@ pub async fn cancel(State(state): State<AppState>, Path(id): Path<String>) -> Re
 }
 
 /// Pauses a job after a checkpoint at the end of its step. Repeating the request changes nothing.
-#[utoipa::path(post, path = "/v1/jobs/{id}/pause", tag = "jobs", params(("id" = String, Path)),
+#[utoipa::path(post, path = "/v1/jobs/{id}/pause", operation_id = "pause_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn pause(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     let already = &[JobState::Pausing, JobState::Paused];
@@ -316,7 +316,7 @@ pub async fn pause(State(state): State<AppState>, Path(id): Path<String>) -> Res
 }
 
 /// Returns a paused job to the queue. Repeating the request changes nothing.
-#[utoipa::path(post, path = "/v1/jobs/{id}/resume", tag = "jobs", params(("id" = String, Path)),
+#[utoipa::path(post, path = "/v1/jobs/{id}/resume", operation_id = "resume_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn resume(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     request(&state, id, Trigger::Resume, None, &[JobState::Queued, JobState::Running]).await

@@ -10,7 +10,7 @@ use meniscus_jobs::system::process;
 use metrics::gauge;
 
 /// Counters and gauges as Prometheus text.
-#[utoipa::path(get, path = "/metrics", tag = "service",
+#[utoipa::path(get, path = "/metrics", operation_id = "metrics", tag = "service",
     responses((status = 200, content_type = "text/plain"), (status = 503, body = Problem)))]
 pub async fn metrics(State(state): State<AppState>) -> Result<Response, ApiError> {
     let statistics = state.with_store(|store| Ok::<_, ApiError>(store.statistics()?)).await?;

@@ -34,7 +34,7 @@ fn read_attempts(store: &Store, row: &JobRow, name: &str) -> Vec<Vec<u8>> {
 }
 
 /// The log of all attempts of a job.
-#[utoipa::path(get, path = "/v1/jobs/{id}/log", tag = "results",
+#[utoipa::path(get, path = "/v1/jobs/{id}/log", operation_id = "job_log", tag = "results",
     params(("id" = String, Path), LogQuery, ("Range" = Option<String>, Header)),
     responses((status = 200, content_type = "text/plain"), (status = 206), (status = 404, body = Problem), (status = 422, body = Problem)))]
 pub async fn log(
@@ -59,7 +59,7 @@ pub async fn log(
 }
 
 /// Observables over time, as CSV or as JSON by `Accept`.
-#[utoipa::path(get, path = "/v1/jobs/{id}/series", tag = "results",
+#[utoipa::path(get, path = "/v1/jobs/{id}/series", operation_id = "job_series", tag = "results",
     params(("id" = String, Path), ("Accept" = Option<String>, Header)),
     responses((status = 200, content_type = "text/csv"), (status = 404, body = Problem)))]
 pub async fn series(
@@ -82,7 +82,7 @@ pub async fn series(
 }
 
 /// Errors, cost, health and diagnostics of a finished job.
-#[utoipa::path(get, path = "/v1/jobs/{id}/report", tag = "results", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/jobs/{id}/report", operation_id = "job_report", tag = "results", params(("id" = String, Path)),
     responses((status = 200, body = ReportView), (status = 404, body = Problem)))]
 pub async fn report(
     State(state): State<AppState>,

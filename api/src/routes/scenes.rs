@@ -26,13 +26,13 @@ fn view(kind: &SceneKind) -> SceneKindView {
 }
 
 /// All kinds of scenes with their schemas.
-#[utoipa::path(get, path = "/v1/scenes", tag = "scenes", responses((status = 200, body = SceneKindList)))]
+#[utoipa::path(get, path = "/v1/scenes", operation_id = "list_scenes", tag = "scenes", responses((status = 200, body = SceneKindList)))]
 pub async fn list() -> Json<SceneKindList> {
     Json(SceneKindList::from((SCENES.iter().map(|kind| view(kind)).collect(), None)))
 }
 
 /// One kind of scene with its schema.
-#[utoipa::path(get, path = "/v1/scenes/{kind}", tag = "scenes", params(("kind" = String, Path)),
+#[utoipa::path(get, path = "/v1/scenes/{kind}", operation_id = "get_scene", tag = "scenes", params(("kind" = String, Path)),
     responses((status = 200, body = SceneKindView), (status = 404, body = Problem)))]
 pub async fn get(Path(kind): Path<String>) -> Result<Json<SceneKindView>, ApiError> {
     find(&kind).map(|kind| Json(view(kind))).ok_or(ApiError::NotFound("kind of scene"))

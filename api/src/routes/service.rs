@@ -11,7 +11,7 @@ use meniscus_jobs::system::build;
 use std::collections::BTreeMap;
 
 /// Version and limits of the service, and links to all lists.
-#[utoipa::path(get, path = "/v1", tag = "service", responses((status = 200, body = ServiceView)))]
+#[utoipa::path(get, path = "/v1", operation_id = "service_index", tag = "service", responses((status = 200, body = ServiceView)))]
 pub async fn index(State(state): State<AppState>) -> Json<ServiceView> {
     let allowance = state.config.allowance();
     Json(ServiceView {
@@ -39,13 +39,13 @@ pub async fn index(State(state): State<AppState>) -> Json<ServiceView> {
 }
 
 /// The process is alive.
-#[utoipa::path(get, path = "/healthz", tag = "service", responses((status = 200, body = StatusView)))]
+#[utoipa::path(get, path = "/healthz", operation_id = "service_health", tag = "service", responses((status = 200, body = StatusView)))]
 pub async fn health() -> Json<StatusView> {
     Json(StatusView { status: "ok" })
 }
 
 /// The service has recovered its jobs and accepts requests.
-#[utoipa::path(get, path = "/readyz", tag = "service",
+#[utoipa::path(get, path = "/readyz", operation_id = "service_readiness", tag = "service",
     responses((status = 200, body = StatusView), (status = 503, body = Problem)))]
 pub async fn ready(State(state): State<AppState>) -> Result<Json<StatusView>, ApiError> {
     if state.phase.is_ready() { Ok(Json(StatusView { status: "ok" })) } else { Err(ApiError::NotReady) }

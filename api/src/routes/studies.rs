@@ -39,9 +39,9 @@ pub struct SubmitQuery {
 }
 
 /// Creates a study with all its jobs. If anything is wrong, nothing is created and all errors are listed.
-#[utoipa::path(post, path = "/v1/studies", tag = "studies",
+#[utoipa::path(post, path = "/v1/studies", operation_id = "submit_study", tag = "studies",
     params(SubmitQuery, ("Idempotency-Key" = Option<String>, Header)),
-    request_body(content = Object, description = "{\"base\": a job body, \"sweep\": {\"mode\": \"grid\" | \"zip\" | \"list\", …}, \"max_parallel\", \"on_failure\"}"),
+    request_body(content = Object, description = "a study"),
     responses((status = 201, body = StudyView, headers(("Location" = String))), (status = 200, body = DryRunView, description = "a dry run"),
         (status = 400, body = Problem), (status = 413, body = Problem), (status = 422, body = Problem), (status = 429, body = Problem),
         (status = 503, body = Problem), (status = 507, body = Problem)))]
@@ -99,7 +99,7 @@ impl Resource for StudyRow {
 }
 
 /// A page of studies, newest first. New studies never shift pages.
-#[utoipa::path(get, path = "/v1/studies", tag = "studies", params(PageQuery),
+#[utoipa::path(get, path = "/v1/studies", operation_id = "list_studies", tag = "studies", params(PageQuery),
     responses((status = 200, body = StudyList, headers(("Link" = String))), (status = 422, body = Problem)))]
 pub async fn list(
     State(state): State<AppState>,
@@ -111,21 +111,21 @@ pub async fn list(
 }
 
 /// A study: its body, and its points by state.
-#[utoipa::path(get, path = "/v1/studies/{id}", tag = "studies", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/studies/{id}", operation_id = "get_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 200, body = StudyView), (status = 404, body = Problem)))]
 pub async fn get(State(state): State<AppState>, Path(id): Path<String>) -> Result<Json<StudyView>, ApiError> {
     resource::get::<StudyRow>(&state, id).await
 }
 
 /// Deletes a study whose jobs have all ended, with those jobs and their files. Never cancels.
-#[utoipa::path(delete, path = "/v1/studies/{id}", tag = "studies", params(("id" = String, Path)),
+#[utoipa::path(delete, path = "/v1/studies/{id}", operation_id = "delete_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
     resource::delete::<StudyRow>(&state, id).await
 }
 
 /// A page of the jobs of a study, including repeated ones. Filters and pages are those of `GET /v1/jobs`.
-#[utoipa::path(get, path = "/v1/studies/{id}/jobs", tag = "studies", params(("id" = String, Path), JobQuery),
+#[utoipa::path(get, path = "/v1/studies/{id}/jobs", operation_id = "study_jobs", tag = "studies", params(("id" = String, Path), JobQuery),
     responses((status = 200, body = JobList, headers(("Link" = String))), (status = 404, body = Problem), (status = 422, body = Problem)))]
 pub async fn jobs_of(
     State(state): State<AppState>,
@@ -149,7 +149,7 @@ pub struct TableQuery {
 }
 
 /// A table with one row for each point, as CSV or as JSON by `Accept`. It is current at any time.
-#[utoipa::path(get, path = "/v1/studies/{id}/table", tag = "studies",
+#[utoipa::path(get, path = "/v1/studies/{id}/table", operation_id = "study_table", tag = "studies",
     params(("id" = String, Path), TableQuery, ("Accept" = Option<String>, Header)),
     responses((status = 200, content_type = "text/csv"), (status = 404, body = Problem), (status = 422, body = Problem)))]
 pub async fn table(
@@ -181,7 +181,7 @@ pub struct ReportQuery {
 }
 
 /// Errors over spacing and over time with fitted orders, as JSON, or as a picture (SVG) by `Accept`.
-#[utoipa::path(get, path = "/v1/studies/{id}/report", tag = "studies",
+#[utoipa::path(get, path = "/v1/studies/{id}/report", operation_id = "study_report", tag = "studies",
     params(("id" = String, Path), ReportQuery, ("Accept" = Option<String>, Header)),
     responses((status = 200, content_type = "application/json"), (status = 404, body = Problem), (status = 422, body = Problem)))]
 pub async fn report(
@@ -217,21 +217,21 @@ async fn request(state: &AppState, id: String, trigger: Trigger, reason: Option<
 }
 
 /// Cancels every job of a study that has not ended. Repeating the request changes nothing.
-#[utoipa::path(post, path = "/v1/studies/{id}/cancel", tag = "studies", params(("id" = String, Path)),
+#[utoipa::path(post, path = "/v1/studies/{id}/cancel", operation_id = "cancel_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 202, body = StudyView), (status = 404, body = Problem)))]
 pub async fn cancel(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     request(&state, id, Trigger::Cancel, Some(Reason::UserCancel)).await
 }
 
 /// Pauses every queued or running job of a study. Repeating the request changes nothing.
-#[utoipa::path(post, path = "/v1/studies/{id}/pause", tag = "studies", params(("id" = String, Path)),
+#[utoipa::path(post, path = "/v1/studies/{id}/pause", operation_id = "pause_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 202, body = StudyView), (status = 404, body = Problem)))]
 pub async fn pause(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     request(&state, id, Trigger::Pause, Some(Reason::UserPause)).await
 }
 
 /// Returns every paused job of a study to the queue. Repeating the request changes nothing.
-#[utoipa::path(post, path = "/v1/studies/{id}/resume", tag = "studies", params(("id" = String, Path)),
+#[utoipa::path(post, path = "/v1/studies/{id}/resume", operation_id = "resume_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 202, body = StudyView), (status = 404, body = Problem)))]
 pub async fn resume(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     request(&state, id, Trigger::Resume, None).await
@@ -239,7 +239,7 @@ pub async fn resume(State(state): State<AppState>, Path(id): Path<String>) -> Re
 
 /// Creates new jobs for points that failed, and for points that were canceled because another point failed. A point whose
 /// new job has not failed is left as it is.
-#[utoipa::path(post, path = "/v1/studies/{id}/retry", tag = "studies",
+#[utoipa::path(post, path = "/v1/studies/{id}/retry", operation_id = "retry_study", tag = "studies",
     params(("id" = String, Path), ("Idempotency-Key" = Option<String>, Header)),
     responses((status = 202, body = StudyView), (status = 404, body = Problem), (status = 422, body = Problem),
         (status = 429, body = Problem), (status = 507, body = Problem)))]

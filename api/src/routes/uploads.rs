@@ -45,7 +45,7 @@ pub struct UploadQuery {
 }
 
 /// Receives a file. It is `quarantined` until a separate process has examined it, then `ready` or `rejected`.
-#[utoipa::path(post, path = "/v1/uploads", tag = "uploads",
+#[utoipa::path(post, path = "/v1/uploads", operation_id = "submit_upload", tag = "uploads",
     params(UploadQuery, ("Idempotency-Key" = Option<String>, Header)),
     request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "the file: HDF5; surfaces and queries also PLY, OBJ or XYZ"),
     responses((status = 201, body = UploadView, headers(("Location" = String))), (status = 413, body = Problem),
@@ -194,7 +194,7 @@ impl Resource for UploadRow {
 }
 
 /// A page of uploads, newest first.
-#[utoipa::path(get, path = "/v1/uploads", tag = "uploads", params(PageQuery),
+#[utoipa::path(get, path = "/v1/uploads", operation_id = "list_uploads", tag = "uploads", params(PageQuery),
     responses((status = 200, body = UploadList, headers(("Link" = String))), (status = 422, body = Problem)))]
 pub async fn list(
     State(state): State<AppState>,
@@ -206,14 +206,14 @@ pub async fn list(
 }
 
 /// An upload: its state, and what was found in the file.
-#[utoipa::path(get, path = "/v1/uploads/{id}", tag = "uploads", params(("id" = String, Path)),
+#[utoipa::path(get, path = "/v1/uploads/{id}", operation_id = "get_upload", tag = "uploads", params(("id" = String, Path)),
     responses((status = 200, body = UploadView), (status = 404, body = Problem)))]
 pub async fn get(State(state): State<AppState>, UrlPath(id): UrlPath<String>) -> Result<Json<UploadView>, ApiError> {
     resource::get::<UploadRow>(&state, id).await
 }
 
 /// Deletes an upload that no unfinished job uses.
-#[utoipa::path(delete, path = "/v1/uploads/{id}", tag = "uploads", params(("id" = String, Path)),
+#[utoipa::path(delete, path = "/v1/uploads/{id}", operation_id = "delete_upload", tag = "uploads", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn delete(State(state): State<AppState>, UrlPath(id): UrlPath<String>) -> Result<StatusCode, ApiError> {
     resource::delete::<UploadRow>(&state, id).await

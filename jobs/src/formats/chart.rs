@@ -12,7 +12,7 @@ use std::ops::Range;
 /// What is drawn.
 #[derive(Debug, Clone, Default)]
 pub struct Chart<'a> {
-    /// Heading.
+    /// Title above the chart.
     pub title: &'a str,
     /// Name of the abscissa.
     pub across: &'a str,

@@ -42,9 +42,9 @@ pub struct Meta {
     pub job: String,
     /// The job's resolved body.
     pub body: Value,
-    /// Step.
+    /// Step of the simulation.
     pub step: u64,
-    /// Scene time.
+    /// Scene time of that step.
     pub time: f64,
     /// What was written up to here.
     pub counters: Counters,
@@ -104,19 +104,19 @@ pub enum CheckpointError {
     NoSpace {
         /// Size of the file.
         needed: u64,
-        /// Space left.
+        /// Space that is free, in bytes.
         free: u64,
     },
     /// The file does not match its own or the expected digests.
     #[error("{what} does not match its digest")]
     Damaged {
-        /// Which part.
+        /// The part that does not match.
         what: String,
     },
     /// Written by another version of the layout.
     #[error("the format is {got}, this program reads formats 1 to {FORMAT}")]
     Format {
-        /// Its version.
+        /// Version of the file.
         got: u32,
     },
     /// The file is no whole HDF5 file, or none of ours.

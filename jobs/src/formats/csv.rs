@@ -18,22 +18,44 @@ pub fn row(values: &[f64]) -> String {
     line
 }
 
-/// A whole CSV text as `{"columns": […], "rows": [{…}]}`. A torn last line is left out.
+/// A series as it is read back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table<'a> {
+    /// Names of the columns.
+    pub columns: Vec<&'a str>,
+    /// Rows of numbers, NaN where there is none.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl<'a> Table<'a> {
+    /// The table of a CSV text. An incomplete last line is left out.
+    #[must_use]
+    pub fn from_text(text: &'a str) -> Self {
+        let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+        let mut lines = whole.lines();
+        let columns: Vec<&str> = lines.next().map(|line| line.split(',').collect()).unwrap_or_default();
+        let number = |word: &str| word.parse::<f64>().ok().filter(|v| v.is_finite()).unwrap_or(f64::NAN);
+        let row = |line: &str| line.split(',').take(columns.len()).map(number).collect();
+        Self { rows: lines.map(row).collect(), columns }
+    }
+
+    /// The numbers of a column, NaN where the table has none.
+    pub fn column(&self, name: &str) -> impl Iterator<Item = f64> {
+        let place = self.columns.iter().position(|column| *column == name);
+        self.rows.iter().map(move |row| place.and_then(|k| row.get(k)).copied().unwrap_or(f64::NAN))
+    }
+}
+
+/// A CSV text as `{"columns": […], "rows": [{…}]}`, null where there is no number.
 #[must_use]
 pub fn to_json(text: &str) -> Value {
-    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-    let mut lines = whole.lines();
-    let columns: Vec<&str> = lines.next().map(|line| line.split(',').collect()).unwrap_or_default();
-    let rows: Vec<Value> = lines
-        .map(|line| {
-            let pairs = columns.iter().zip(line.split(',')).map(|(name, number)| {
-                let value = number.parse::<f64>().ok().filter(|v| v.is_finite()).map_or(Value::Null, |v| json!(v));
-                ((*name).to_owned(), value)
-            });
-            Value::Object(pairs.collect::<Map<_, _>>())
-        })
-        .collect();
-    json!({"columns": columns, "rows": rows})
+    let table = Table::from_text(text);
+    let value = |number: &f64| if number.is_finite() { json!(number) } else { Value::Null };
+    let pairs = |row: &Vec<f64>| -> Map<String, Value> {
+        table.columns.iter().zip(row).map(|(name, number)| ((*name).to_owned(), value(number))).collect()
+    };
+    let rows: Vec<Value> = table.rows.iter().map(|row| Value::Object(pairs(row))).collect();
+    json!({"columns": table.columns, "rows": rows})
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use serde_json::json;
 
 /// Path among the job's files.
 pub const PATH: &str = "frames.vtkhdf.series";
-/// Media type.
+/// Media type of the index.
 pub const MEDIA_TYPE: &str = "application/json";
 
 /// The index of frames given by path and time, in order.

@@ -8,9 +8,9 @@ use std::path::Path;
 /// What a picture draws of one frame.
 #[derive(Debug, Clone, Default)]
 pub struct FrameView {
-    /// Scene time.
+    /// Scene time of the frame.
     pub time: f64,
-    /// Positions.
+    /// Positions of the points to draw.
     pub points: Vec<[f64; 3]>,
     /// The number that colors each point, NaN where there is none: a signed distance, or a field less the middle of its
     /// range.

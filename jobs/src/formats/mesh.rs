@@ -9,11 +9,11 @@ use std::collections::HashMap;
 /// Points, normals where every point has one, triangles or polygons by their points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
-    /// Positions.
+    /// Positions of the points.
     pub points: Vec<[f64; 3]>,
     /// Normals, as many as points or none.
     pub normals: Vec<[f64; 3]>,
-    /// Faces.
+    /// Corners of each face, as indices of points.
     pub faces: Vec<Vec<u32>>,
 }
 

@@ -8,14 +8,14 @@ use plotters::prelude::{
 use plotters::style::{BLACK, Color};
 use std::ops::Range;
 
-/// One run.
+/// One run of a line.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
-    /// h.
+    /// Spacing h of the run.
     pub spacing: f64,
-    /// CPU seconds.
+    /// CPU seconds of the run.
     pub seconds: f64,
-    /// The error.
+    /// Error of the run.
     pub error: f64,
 }
 

@@ -56,7 +56,7 @@ pub enum Refusal {
     Damaged {
         /// Path of the object.
         place: String,
-        /// Where.
+        /// Offset in the file, in bytes.
         at: u64,
         /// What is wrong.
         what: &'static str,
@@ -66,7 +66,7 @@ pub enum Refusal {
     Unaccepted {
         /// Path of the object.
         place: String,
-        /// What.
+        /// What is not accepted.
         what: String,
     },
 }
@@ -74,7 +74,7 @@ pub enum Refusal {
 /// What a data set says of itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DataSet {
-    /// Extent.
+    /// Number of elements along each axis.
     pub extent: Vec<u64>,
     /// Bytes of an element.
     pub element_bytes: u64,
@@ -91,12 +91,12 @@ pub enum Storage {
     OnePiece {
         /// Where it begins.
         at: u64,
-        /// Its length.
+        /// Length in bytes.
         bytes: u64,
     },
     /// In chunks, found by a tree.
     Chunks {
-        /// The tree.
+        /// Address of the tree.
         tree: u64,
         /// Extent of a chunk.
         extent: Vec<u64>,
@@ -108,7 +108,7 @@ pub enum Storage {
 }
 
 impl DataSet {
-    /// Elements.
+    /// Number of elements.
     #[must_use]
     pub fn elements(&self) -> u64 {
         self.extent.iter().fold(1, |product, n| product.saturating_mul(*n))
@@ -118,7 +118,7 @@ impl DataSet {
 /// Everything in a file, by path.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Structure {
-    /// Data sets.
+    /// Data sets by path.
     pub data_sets: BTreeMap<String, DataSet>,
     /// Groups, the root as the empty path.
     pub groups: BTreeSet<String>,

@@ -157,19 +157,19 @@ pub fn read_normals(path: &Path) -> Result<Option<Vec<[f64; 3]>>, CloudError> {
 /// Why a file holds no points.
 #[derive(Debug, thiserror::Error)]
 pub enum CloudError {
-    /// HDF5.
+    /// libhdf5 failed.
     #[error("{0}")]
     Hdf5(#[from] hdf5::Error),
-    /// Coordinates.
+    /// The coordinates are no triples.
     #[error("/VTKHDF/Points holds {numbers} numbers, which are no triples")]
     NotTriples {
-        /// How many.
+        /// Count of numbers.
         numbers: usize,
     },
-    /// Components.
+    /// The components of the normals are no triples.
     #[error("/VTKHDF/PointData/normal holds {numbers} numbers, which are no triples")]
     NoNormals {
-        /// How many.
+        /// Count of numbers.
         numbers: usize,
     },
 }

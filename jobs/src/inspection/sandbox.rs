@@ -6,9 +6,9 @@ use std::fs::File;
 use std::io;
 use std::os::fd::AsRawFd;
 
-/// Address space.
+/// Most address space of the process, in bytes.
 const MEMORY_BYTES: u64 = 4 << 30;
-/// CPU time.
+/// Most CPU time of the process, in seconds.
 const SECONDS: u64 = 60;
 
 fn limit(resource: Resource, value: u64) -> io::Result<()> {

@@ -16,9 +16,9 @@ use std::time::Duration;
 /// What an attempt needs of the machine that it runs on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Needs {
-    /// Resident memory at most.
+    /// Resident memory at most, in bytes.
     pub memory_bytes: u64,
-    /// Threads.
+    /// Threads of the worker.
     pub threads: u64,
     /// Running time at most, in seconds.
     pub wall_s: Option<f64>,
@@ -74,14 +74,14 @@ pub trait Worker: Send {
 pub enum Phase {
     /// In the executor's queue.
     Waiting,
-    /// At work.
+    /// It computes.
     Running,
 }
 
 /// What a worker uses now; None where the executor cannot tell or limits it by itself.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct WorkerUsage {
-    /// Resident memory.
+    /// Resident memory in bytes.
     pub memory_bytes: Option<u64>,
 }
 
@@ -90,7 +90,7 @@ pub struct WorkerUsage {
 pub enum EndCause {
     /// By itself, with an exit code.
     Exited {
-        /// The code.
+        /// The exit code.
         code: i32,
     },
     /// By a signal.
@@ -139,6 +139,6 @@ pub struct Reservation {
 /// What new workers can have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
-    /// Memory.
+    /// Memory for new workers, in bytes.
     pub memory_bytes: u64,
 }

@@ -17,7 +17,7 @@ use std::path::Path;
 pub struct Finding {
     /// Where: an id, or the store.
     pub place: String,
-    /// What.
+    /// What is wrong there.
     pub what: String,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for Finding {
 /// Counts of what was checked, and everything that is wrong.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Findings {
-    /// Jobs.
+    /// Number of jobs.
     pub jobs: usize,
     /// Files whose digests were taken.
     pub files: usize,

@@ -73,7 +73,7 @@ pub struct Store {
 /// The store failed.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// SQLite failed.
+    /// SQLite reported an error.
     #[error("the store failed: {0}")]
     Sqlite(#[from] rusqlite::Error),
     /// The system failed.

@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// A table.
+/// The table of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Names.
+    /// Names of the columns.
     pub columns: Vec<String>,
     /// A value a column.
     pub rows: Vec<Vec<Value>>,

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Everything that a worker needs to know.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct AttemptSpec {
-    /// The job.
+    /// Id of the job.
     pub job: String,
     /// The attempt's number, the fence of its records.
     pub epoch: u64,
@@ -38,9 +38,9 @@ pub struct AttemptSpec {
 /// A checkpoint to begin with.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StartCheckpoint {
-    /// Its id.
+    /// Id of the checkpoint.
     pub id: String,
-    /// The file.
+    /// Path of its file.
     pub path: PathBuf,
     /// Its digest, where it is known.
     pub sha256: Option<String>,

@@ -11,9 +11,9 @@ use std::sync::OnceLock;
 /// Work and the CPU seconds that it took.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Units.
+    /// Units of work.
     pub work: f64,
-    /// CPU seconds.
+    /// CPU seconds that the work took.
     pub seconds: f64,
 }
 
@@ -22,9 +22,9 @@ pub struct Measured {
 pub struct PhaseMeasured {
     /// Kind, dimension and method.
     pub family: String,
-    /// Phase.
+    /// Phase of the run.
     pub phase: String,
-    /// How much.
+    /// Work and time of that phase.
     pub measured: Measured,
 }
 
@@ -38,7 +38,7 @@ pub struct Calibration {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TimeForecast {
-    /// CPU seconds.
+    /// CPU seconds of the whole run.
     pub cpu_s: f64,
     /// Seconds by the clock.
     pub wall_s: f64,

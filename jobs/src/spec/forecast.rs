@@ -17,7 +17,7 @@ pub const CHUNK_ROWS: usize = 1 << 16;
 /// The size and the cost of a run.
 #[derive(Debug, Clone)]
 pub struct Forecast {
-    /// Size.
+    /// Size of the run: particles, steps, time step.
     pub estimate: Estimate,
     /// Work by phase.
     pub work: Vec<PhaseWork>,
@@ -69,7 +69,7 @@ impl Forecast {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ForecastRecord {
-    /// Particles.
+    /// Number of particles.
     pub particles: u64,
     /// Steps to the end.
     pub steps: u64,
@@ -81,7 +81,7 @@ pub struct ForecastRecord {
     pub memory_bytes: u64,
     /// Size of all files.
     pub disk_bytes: u64,
-    /// CPU seconds.
+    /// CPU seconds, if they can be estimated.
     pub cpu_s: Option<f64>,
     /// Running time in seconds.
     pub wall_s: Option<f64>,

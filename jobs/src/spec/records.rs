@@ -12,14 +12,14 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// One line.
+/// A line of `records.jsonl`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Line {
     /// The attempt's epoch.
     pub epoch: u64,
     /// When it was written.
     pub at: String,
-    /// What happened.
+    /// The record.
     pub record: Record,
 }
 
@@ -62,15 +62,15 @@ pub enum Record {
 pub struct Progress {
     /// 0 to 1.
     pub fraction: f64,
-    /// Scene time.
+    /// Scene time reached so far.
     pub time: f64,
     /// Scene time at the end.
     pub end_time: f64,
-    /// Steps done.
+    /// Steps done so far.
     pub step: u64,
     /// Speed of late.
     pub steps_per_s: Option<f64>,
-    /// Particles.
+    /// Number of particles.
     pub particles: u64,
     /// What is being done.
     pub phase: String,
@@ -87,9 +87,9 @@ pub struct Progress {
 /// Cost of a job.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq)]
 pub struct Usage {
-    /// Running time.
+    /// Running time in seconds.
     pub wall_s: f64,
-    /// CPU time.
+    /// CPU time in seconds.
     pub cpu_s: f64,
     /// Most resident memory.
     pub peak_memory_bytes: u64,
@@ -102,11 +102,11 @@ pub struct Usage {
 pub struct FileRecord {
     /// Path among the job's files, and below the attempt's directory.
     pub path: String,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
-    /// Digest.
+    /// SHA-256 of the file.
     pub sha256: String,
-    /// Media type.
+    /// Media type of the file.
     pub media_type: String,
     /// Scene time, of frames.
     pub time: Option<f64>,
@@ -129,21 +129,21 @@ impl FileRecord {
 /// A checkpoint in the attempt's directory.
 #[derive(Debug, Clone, Serialize, Deserialize, PartialEq)]
 pub struct CheckpointRecord {
-    /// Its id.
+    /// Id of the checkpoint.
     pub id: String,
     /// Path below the attempt's directory.
     pub path: String,
-    /// Step.
+    /// Step of the simulation.
     pub step: u64,
-    /// Scene time.
+    /// Scene time of that step.
     pub time: f64,
-    /// Bytes.
+    /// Size in bytes.
     pub size_bytes: u64,
     /// Digest of the file.
     pub sha256: String,
-    /// Instruction set.
+    /// Instruction set that it was written on.
     pub isa: String,
-    /// Program.
+    /// Program that wrote it.
     pub build: String,
 }
 
@@ -162,7 +162,7 @@ pub enum Verdict {
     Canceled,
     /// It cannot go on.
     Failed {
-        /// Why.
+        /// Reason of the failure.
         reason: crate::spec::states::Reason,
         /// With numbers and places.
         message: String,

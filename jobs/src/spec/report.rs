@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 pub struct RunReport {
     /// Errors against exact answers, in the order of their times.
     pub errors: Vec<ErrorEntry>,
-    /// Cost of the whole run, over all attempts.
+    /// Cost of the whole run.
     pub cost: Cost,
     /// Invariants at the end, and what was noticed.
     pub health: HealthRecord,
@@ -25,11 +25,11 @@ pub struct RunReport {
 /// Cost of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Running time.
+    /// Running time in seconds.
     pub wall_s: f64,
-    /// CPU time.
+    /// CPU time in seconds.
     pub cpu_s: f64,
-    /// Steps.
+    /// Number of steps.
     pub steps: u64,
     /// Particles by steps by running time.
     pub particle_steps_per_s: f64,
@@ -48,7 +48,7 @@ pub struct Provenance {
     pub cpu: Option<String>,
     /// Instruction set of the numerics.
     pub isa: String,
-    /// Threads.
+    /// Threads of the worker.
     pub threads: usize,
     /// Digest of the resolved scene.
     pub scene_sha256: String,
@@ -59,7 +59,7 @@ pub struct Provenance {
 pub struct Results {
     /// Errors, in the order of their times.
     pub errors: Vec<ErrorEntry>,
-    /// Cost.
+    /// Cost of the whole run.
     #[serde(default)]
     pub cost: Cost,
 }

@@ -1,6 +1,6 @@
 //! Requests of the service to a running worker. Nothing else flows into a run.
 
-/// A request.
+/// A request to a running worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
     /// End the run after a checkpoint at the end of the step.

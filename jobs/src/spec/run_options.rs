@@ -85,7 +85,7 @@ pub struct RunOptions {
     pub output: Output,
     /// When to write checkpoints.
     pub checkpoint: Checkpoints,
-    /// Limits.
+    /// Limits of the job.
     pub limits: Limits,
 }
 

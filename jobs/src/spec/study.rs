@@ -9,7 +9,7 @@ pub use sweep::{Axes, MOST_POINTS, Points, Sweep, SweepPoint};
 
 use crate::spec::body::{self, Allowance, BodyError, JobBody, Labels, Name, Sources};
 use crate::spec::calibration::Calibration;
-use meniscus::spec::{Group, Json, Raw, Violation, Word, group, whole};
+use meniscus::spec::{Given, Group, Json, Raw, Violation, Word, group, whole};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashSet};
 
@@ -116,7 +116,8 @@ pub fn parse<J, S: Sources>(
     let mut errors = Vec::new();
     group::check_names(object, &StudySpec::names(), "", &mut errors);
     let parsed = StudySpec::parse_fields(object, "", &mut errors);
-    let base = parsed.as_ref().and_then(|spec| spec.base.0.clone()).or_else(|| object.get("base").cloned());
+    let given = Given::new(object);
+    let base = given.read(StudySpec::base()).and_then(|base| base.0);
     check_base(base.as_ref(), &mut errors);
     let (Some(parsed), Some(base), true) = (parsed, base, errors.is_empty()) else {
         return Err(errors.into());
@@ -129,7 +130,7 @@ pub fn parse<J, S: Sources>(
         name: parsed.name.map(|name| name.0),
         labels: parsed.labels.map(|labels| labels.0).unwrap_or_default(),
         base,
-        sweep: object.get("sweep").cloned().unwrap_or_default(),
+        sweep: given.raw(StudySpec::sweep()),
         axes,
         max_parallel: parsed.max_parallel,
         on_failure: parsed.on_failure.unwrap_or(OnFailure::Continue).word(),

@@ -56,7 +56,7 @@ pub enum Inspection {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Contents {
-    /// A checkpoint.
+    /// An uploaded checkpoint.
     Checkpoint(CheckpointContents),
     /// Points, with or without a surface.
     Points(PointContents),
@@ -67,9 +67,9 @@ pub enum Contents {
 pub struct CheckpointContents {
     /// Resolved body of the job that wrote it.
     pub body: Value,
-    /// Step.
+    /// Step of the simulation.
     pub step: u64,
-    /// Scene time.
+    /// Scene time of that step.
     pub time: f64,
     /// Instruction set that it was written on.
     pub isa: String,
@@ -84,7 +84,7 @@ pub struct CheckpointContents {
 /// An array of an uploaded checkpoint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArrayContents {
-    /// Name.
+    /// Name of the array.
     pub name: String,
     /// Numbers per entry; 0 marks whole numbers.
     pub components: usize,

@@ -101,6 +101,12 @@ pub fn job_body(run: &Value) -> Value {
     if run.get("kind").is_some() { json!({"scene": run}) } else { run.clone() }
 }
 
+/// The scene of a job body.
+#[must_use]
+pub fn scene(body: &Value) -> &Value {
+    body.get("scene").unwrap_or(body)
+}
+
 impl Case {
     /// A case from the text of its file.
     ///

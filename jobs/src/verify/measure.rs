@@ -1,8 +1,34 @@
 //! From reports to the values that targets compare.
 
+use crate::spec::body::{self, Allowance, NoSources};
 use crate::spec::report::RunReport;
 use serde::Deserialize;
 use serde_json::Value;
+
+/// A finished run as measures read it.
+#[derive(Debug, Clone)]
+pub struct FinishedRun {
+    /// Distance of neighboring particles or points, to which errors are compared.
+    pub spacing: Option<f64>,
+    /// Its report.
+    pub report: RunReport,
+}
+
+impl FinishedRun {
+    /// From the job body of a run and its report.
+    ///
+    /// # Errors
+    /// A sentence when the body is not valid.
+    pub fn new(body: &Value, report: RunReport) -> Result<Self, String> {
+        // It has run: its limits are no question any more.
+        let allowance = Allowance { threads: 1, memory_bytes: 1 << 50, local_files: true };
+        let parsed = body::parse(body, allowance, &NoSources).map_err(|error| {
+            let violations = error.violations();
+            violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
+        })?;
+        Ok(Self { spacing: parsed.scene.spacing(), report })
+    }
+}
 
 /// An error as reports list it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -87,14 +113,6 @@ pub fn error(report: &RunReport, of: &Quantity) -> Option<f64> {
     found.filter(|value| value.is_finite())
 }
 
-/// The length to which errors are compared: the spacing h, or for N points N^(−1/2) on a surface and 1/N on a circle.
-#[must_use]
-pub fn spacing(scene: &Value) -> Option<f64> {
-    let is_curve = [&scene["surface"], &scene["surface"]["type"]].iter().any(|surface| **surface == "circle");
-    let apart = |count: f64| if is_curve { 1.0 / count } else { 1.0 / count.sqrt() };
-    scene["spacing"].as_f64().or_else(|| scene["count"].as_f64().map(apart))
-}
-
 /// CPU seconds in cost spans whose names begin with `prefix`; with an empty one in all but the computation of errors.
 #[must_use]
 pub fn seconds(report: &RunReport, prefix: &str) -> f64 {
@@ -102,25 +120,25 @@ pub fn seconds(report: &RunReport, prefix: &str) -> f64 {
     report.cost.phases.iter().filter(|(name, _)| is_meant(name)).map(|(_, seconds)| seconds).sum()
 }
 
-/// The value of a measure over runs (scenes and their reports); NaN where reports do not have it.
+/// The value of a measure over runs; NaN where their reports do not have it.
 #[must_use]
-pub fn evaluate(measure: &Measure, scenes: &[&Value], reports: &[&RunReport]) -> f64 {
-    let (Some(first), Some(last)) = (reports.first(), reports.last()) else { return f64::NAN };
-    let spacing = |scene: &Value| spacing(scene).unwrap_or(f64::NAN);
+pub fn evaluate(measure: &Measure, runs: &[FinishedRun]) -> f64 {
+    let (Some(first), Some(last)) = (runs.first(), runs.last()) else { return f64::NAN };
+    let (first, last) = (&first.report, &last.report);
+    let spacing = |run: &FinishedRun| run.spacing.unwrap_or(f64::NAN);
     let error_of = |report: &RunReport, of: &Quantity| error(report, of).unwrap_or(f64::NAN);
     match measure {
         Measure::Error(of) => error_of(last, of),
         Measure::LargestErrorInSpacings(of) => {
-            let ratio = |(scene, report): (&&Value, &&RunReport)| error_of(report, of) / spacing(scene);
+            let ratio = |run: &FinishedRun| error_of(&run.report, of) / spacing(run);
             // A NaN must not be lost in the maximum.
-            scenes.iter().zip(reports).map(ratio).fold(0.0, |worst, r| if r <= worst { worst } else { r })
+            runs.iter().map(ratio).fold(0.0, |worst, r| if r <= worst { worst } else { r })
         }
         Measure::Order { quantity, norm, time, floor } => {
             let of = Quantity { quantity: quantity.clone(), norm: norm.clone(), time: *time };
-            let points: Vec<(f64, f64)> = scenes
+            let points: Vec<(f64, f64)> = runs
                 .iter()
-                .zip(reports)
-                .filter_map(|(scene, report)| Some((spacing(scene).ln(), error(report, &of)?)))
+                .filter_map(|run| Some((spacing(run).ln(), error(&run.report, &of)?)))
                 .filter(|(_, error)| error > floor)
                 .map(|(x, error)| (x, error.ln()))
                 .collect();
@@ -153,8 +171,9 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Measure, RunReport, evaluate};
+    use super::{FinishedRun, Measure, RunReport, evaluate};
     use serde_json::{Value, json};
+    use std::f64::consts::PI;
 
     fn report(error: f64) -> RunReport {
         let report = json!({
@@ -171,14 +190,26 @@ mod tests {
     }
 
     #[test]
+    fn the_spacing_of_a_run_is_that_of_its_scene() {
+        let finished = |scene: Value| FinishedRun::new(&json!({"scene": scene}), report(0.0));
+        let spacing = |scene: Value| finished(scene).unwrap().spacing.unwrap();
+        assert!((spacing(json!({"kind": "redistance", "spacing": 0.125})) - 0.125).abs() < 1e-15);
+        // The side of the square that a point has for itself on a sphere, the arc on a circle.
+        let points = |surface: &str| spacing(json!({"kind": "surface_pde", "surface": surface, "count": 400}));
+        assert!((points("sphere") - (4.0 * PI / 400.0).sqrt()).abs() < 1e-12);
+        let circle = json!({"kind": "surface_pde", "surface": "circle", "count": 400, "method": {"type": "surface_dcpse", "form": "copies"}});
+        assert!((spacing(circle) - 2.0 * PI / 400.0).abs() < 1e-12);
+        assert!(finished(json!({"kind": "redistance", "spacin": 1})).is_err());
+    }
+
+    #[test]
     fn values_come_out_of_reports() {
         let spacings = [0.1, 0.05, 0.025, 0.0125_f64];
-        let scenes: Vec<Value> = spacings.iter().map(|h| json!({"spacing": h})).collect();
-        let reports: Vec<RunReport> = spacings.iter().map(|h| report(h.powi(3))).collect();
-        let (scenes, reports): (Vec<&Value>, Vec<&RunReport>) = (scenes.iter().collect(), reports.iter().collect());
+        let run = |h: &f64| FinishedRun { spacing: Some(*h), report: report(h.powi(3)) };
+        let runs: Vec<FinishedRun> = spacings.iter().map(run).collect();
         let of = |measure: Value| {
             let measure: Measure = serde_json::from_value(measure).unwrap();
-            evaluate(&measure, &scenes, &reports)
+            evaluate(&measure, &runs)
         };
         let rms = |kind: &str| json!({"type": kind, "quantity": "phi", "norm": "rms"});
         let order = |floor: f64| of(json!({"type": "order", "quantity": "phi", "norm": "rms", "floor": floor}));

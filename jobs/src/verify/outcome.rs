@@ -1,8 +1,7 @@
 //! A target with its value, and how people read it.
 
 use super::case::{Bound, Case, Target, job_body};
-use super::measure;
-use crate::spec::report::RunReport;
+use super::measure::{self, FinishedRun};
 use serde_json::Value;
 use std::fmt::{Display, Formatter};
 
@@ -28,32 +27,28 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// The outcome of a target; `report` hands out the report of a run by its name and job body.
+    /// The outcome of a target; `finish` hands out a finished run by its name and job body.
     pub fn of_target(
         name: &str,
         case: &Case,
         target: &Target,
-        mut report: impl FnMut(&str, &Value) -> Result<RunReport, String>,
+        mut finish: impl FnMut(&str, &Value) -> Result<FinishedRun, String>,
     ) -> Self {
-        let (mut bodies, mut reports, mut failure) = (Vec::new(), Vec::new(), None);
+        let (mut runs, mut failure) = (Vec::new(), None);
         for (run, written) in case.runs_of(target) {
-            let body = job_body(written);
-            match report(run, &body) {
-                Ok(report) => reports.push(report),
+            match finish(run, &job_body(written)) {
+                Ok(finished) => runs.push(finished),
                 Err(cause) => failure = failure.or(Some(cause)),
             }
-            bodies.push(body);
         }
-        let scenes: Vec<&Value> = bodies.iter().map(|body| &body["scene"]).collect();
-        let found: Vec<&RunReport> = reports.iter().collect();
-        let value = if failure.is_none() { measure::evaluate(&target.measure, &scenes, &found) } else { f64::NAN };
+        let value = if failure.is_none() { measure::evaluate(&target.measure, &runs) } else { f64::NAN };
         Self {
             case: name.to_owned(),
             title: target.title.clone(),
             paper: target.paper.clone(),
             bound: target.bound,
             value,
-            cpu_s: reports.iter().map(|report| report.cost.cpu_s).sum(),
+            cpu_s: runs.iter().map(|run| run.report.cost.cpu_s).sum(),
             is_met: target.bound.is_met(value),
             failure,
         }

@@ -62,12 +62,12 @@ impl Workspace {
         lines: &[RunsLine],
     ) -> Result<speed_error::Lines, String> {
         let point = |scene: &Value| {
-            let report = self.report(&json!({"scene": scene}))?;
+            let run = self.finish(&json!({"scene": scene}))?;
             let found = || {
                 Some(speed_error::Point {
-                    spacing: measure::spacing(scene)?,
-                    seconds: measure::seconds(&report, spans),
-                    error: measure::error(&report, error).or_else(|| measure::error(&report, fallback?))?,
+                    spacing: run.spacing?,
+                    seconds: measure::seconds(&run.report, spans),
+                    error: measure::error(&run.report, error).or_else(|| measure::error(&run.report, fallback?))?,
                 })
             };
             found().ok_or_else(|| format!("{scene} reports no {} {}", error.quantity, error.norm))
@@ -82,9 +82,8 @@ impl Workspace {
     fn history(&self, scene: &Value, column: &str) -> Result<Vec<(f64, f64)>, String> {
         let directory = self.run(&json!({"scene": scene}), Keep::Report)?;
         let text = fs::read_to_string(directory.join(attempt_files::SERIES)).map_err(|error| error.to_string())?;
-        let rows = csv::to_json(&text)["rows"].take();
-        let number = |row: &Value, name: &str| row[name].as_f64().unwrap_or(f64::NAN);
-        Ok(rows.as_array().into_iter().flatten().map(|row| (number(row, "time"), number(row, column))).collect())
+        let table = csv::Table::from_text(&text);
+        Ok(table.column("time").zip(table.column(column)).collect())
     }
 
     /// A field of the last frame of a run over the signed distance.
@@ -100,8 +99,8 @@ impl Workspace {
     fn points(&self, line: &PointsLine, error: &Quantity) -> Result<Vec<(f64, f64)>, String> {
         let mut found = Vec::new();
         for point in &line.points {
-            let report = self.report(&json!({"scene": point.run}))?;
-            found.push((point.at, measure::error(&report, error).unwrap_or(f64::NAN)));
+            let run = self.finish(&json!({"scene": point.run}))?;
+            found.push((point.at, measure::error(&run.report, error).unwrap_or(f64::NAN)));
         }
         Ok(found)
     }

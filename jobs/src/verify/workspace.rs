@@ -1,5 +1,6 @@
 //! Where the runs of a verification are kept. Runs of this build that are already there are not repeated.
 
+use super::measure::FinishedRun;
 use crate::spec::attempt_files;
 use crate::spec::report::RunReport;
 use crate::system::build;
@@ -22,10 +23,11 @@ impl Workspace {
         Self { directory: runs.join(build) }
     }
 
-    /// The report of a job body: of its earlier run with this build, or of one made now.
-    pub(super) fn report(&self, body: &Value) -> Result<RunReport, String> {
+    /// A finished run of a job body: an earlier one with this build, or one made now.
+    pub(super) fn finish(&self, body: &Value) -> Result<FinishedRun, String> {
         let directory = self.run(body, Keep::Report)?;
-        read_report(&directory).ok_or_else(|| "the run left no report".to_owned())
+        let report = read_report(&directory).ok_or_else(|| "the run left no report".to_owned())?;
+        FinishedRun::new(body, report)
     }
 
     /// The directory of a run of this build: an earlier one, or one made now.

@@ -18,7 +18,7 @@ use std::path::Path;
 pub enum Keep {
     /// Nothing: frames of large runs would fill the disk.
     Report,
-    /// Its frames.
+    /// The frames, too.
     Frames,
 }
 

@@ -29,9 +29,9 @@ use std::path::PathBuf;
 pub struct Observers<'a> {
     /// Frames and their index.
     pub frames: Frames,
-    /// The series.
+    /// Writer of the series.
     pub series: Series,
-    /// Checkpoints.
+    /// Writer of checkpoints.
     pub checkpoints: Checkpoints,
     /// Progress and cost.
     pub progress: ProgressMeter,
@@ -45,7 +45,7 @@ pub struct Observers<'a> {
     pub sink: &'a mut dyn RecordSink,
     /// Where the attempt writes, and the free space there that it leaves untouched.
     pub directory: PathBuf,
-    /// Bytes.
+    /// Free space that the attempt leaves untouched, in bytes.
     pub reserve_bytes: u64,
     /// Whether the run stops because the reserve is reached.
     pub is_starved: bool,

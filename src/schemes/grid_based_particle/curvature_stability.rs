@@ -25,13 +25,13 @@ const LIMITS: StepLimits =
 /// What a stable time step depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StabilityPlan {
-    /// Integrator of the motion.
+    /// Integrator, whose number of stages counts.
     pub integrator: PathIntegrator,
     /// Dimension of the space.
     pub dimension: usize,
-    /// Degree of the reconstructions.
+    /// Degree of the local polynomials.
     pub degree: usize,
-    /// k of their weights exp(−k t²).
+    /// k of the weights exp(−k t²) of their fits.
     pub weight: f64,
 }
 

@@ -25,9 +25,9 @@ pub struct FootPoint<const D: usize> {
 /// All foot points in the order of their grid points. Particles of corners, and moved particles that stay, follow.
 #[derive(Debug, Clone, Default)]
 pub struct FootPoints<const D: usize> {
-    /// Grid points.
+    /// Numbers of the grid points.
     pub nodes: Vec<Node>,
-    /// Positions.
+    /// Positions y.
     pub positions: Vec<Vector<D>>,
     /// Unit normals, or tangents of a curve in space.
     pub normals: Vec<Vector<D>>,

@@ -1,6 +1,6 @@
 //! The reader for checkpoints of format 1.
 
-use super::exact::{ENTRIES, FrontErrors};
+use super::errors::{ENTRIES, FrontErrors};
 use super::removals::Removals;
 use crate::simulation::format_1::{copy, numbers};
 use crate::simulation::section::check_length;

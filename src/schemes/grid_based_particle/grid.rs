@@ -7,12 +7,12 @@ use crate::geometry::Vector;
 /// Number of a grid point: its level, then its coordinates in spacings of the level. Ascending numbers follow space.
 pub type Node = u64;
 
-/// Bits of the level.
+/// Bits of the number of a grid point that hold its level.
 const LEVEL_BITS: u32 = 4;
 /// Largest number of levels. Each further level doubles the time to visit a row of cells.
 pub const MOST_LEVELS: u32 = 8;
 
-/// Bits of one coordinate.
+/// Bits of the number of a grid point that hold one coordinate.
 const fn bits<const D: usize>() -> u32 {
     (u64::BITS - LEVEL_BITS) / D as u32
 }
@@ -27,21 +27,21 @@ fn shift(level: u32) -> f64 {
     0.5 * (1.0 - f64::from(1_u32 << level))
 }
 
-/// The grid.
+/// The underlying grid: one lattice per level, each level with half the spacing of the level before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// h of level 0.
+    /// h of level 0, the coarsest.
     pub spacing: f64,
 }
 
 impl Grid {
-    /// h of a level.
+    /// The spacing of a level.
     #[must_use]
     pub fn spacing_at(&self, level: u32) -> f64 {
         self.spacing / f64::from(1_u32 << level)
     }
 
-    /// h of the level of a grid point.
+    /// The spacing of the level of a grid point.
     #[must_use]
     pub fn spacing_of(&self, node: Node) -> f64 {
         self.spacing_at(Self::level(node))

@@ -4,9 +4,9 @@
 use crate::linear_algebra::least_squares::LeastSquares;
 use crate::polynomials::MultiIndexSet;
 
-/// The highest degree.
+/// The highest degree of a local polynomial.
 pub(super) const MOST_DEGREE: usize = 4;
-/// Terms of two variables up to that degree.
+/// Number of terms of a polynomial of two variables of that degree.
 const MOST_TERMS: usize = 15;
 /// Directions across a front at most: of a curve in space two.
 pub(super) const MOST_ACROSS: usize = 2;
@@ -42,13 +42,13 @@ const TUNING: GraphTuning = GraphTuning {
     worst_condition: 1e3,
 };
 
-/// Exponents of the terms.
+/// The monomials of a local polynomial, by their exponents.
 #[derive(Debug, Clone)]
 pub(super) struct Terms<const M: usize> {
     indices: Vec<[u8; M]>,
 }
 
-/// Value, slopes and second derivatives of f.
+/// Value, slopes and second derivatives of a local polynomial at one point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GraphJet<const M: usize> {
     pub value: f64,
@@ -56,7 +56,7 @@ pub(super) struct GraphJet<const M: usize> {
     pub second: [[f64; M]; M],
 }
 
-/// What a fit reads.
+/// The points, weights and slopes of a least-squares fit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FitData<'a, const M: usize> {
     /// Points s_j with the quantities there.
@@ -69,7 +69,7 @@ pub(super) struct FitData<'a, const M: usize> {
     pub slope_weight: f64,
 }
 
-/// f with its coefficients.
+/// A local polynomial f: its terms and their coefficients.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LocalGraph<'a, const M: usize> {
     terms: &'a Terms<M>,
@@ -129,7 +129,7 @@ impl<const M: usize> Terms<M> {
     }
 }
 
-/// s_d^k.
+/// The powers s_d^k of each coordinate, k up to the highest degree.
 fn powers<const M: usize>(s: &[f64; M]) -> [[f64; MOST_DEGREE + 1]; M] {
     s.map(|s| {
         let mut powers = [1.0; MOST_DEGREE + 1];
@@ -145,7 +145,7 @@ fn product<const M: usize>(powers: &[[f64; MOST_DEGREE + 1]; M], index: &[u8; M]
 }
 
 impl<const M: usize> LocalGraph<'_, M> {
-    /// f and its derivatives at s.
+    /// Value and first and second derivatives of f at s.
     pub fn jet(&self, s: &[f64; M]) -> GraphJet<M> {
         let powers = powers(s);
         let mut jet = GraphJet { value: 0.0, first: [0.0; M], second: [[0.0; M]; M] };
@@ -249,7 +249,7 @@ fn solve_positive<const M: usize>(matrix: &[[f64; M]; M], b: &[f64; M]) -> Optio
 }
 
 impl<const M: usize> GraphJet<M> {
-    /// 1 + |∇f|².
+    /// 1 + |∇f|², the square of the area element.
     fn stretch(&self) -> f64 {
         1.0 + self.first.iter().map(|f| f * f).sum::<f64>()
     }

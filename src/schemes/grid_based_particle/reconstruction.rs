@@ -13,7 +13,7 @@ use crate::linear_algebra::least_squares::LeastSquares;
 use crate::neighbors::{CellList, Neighbor, NeighborSearch};
 use tuning::TUNING;
 
-/// Why there is no foot point.
+/// Reason why a place gets no closest point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
     /// Too few particles of one segment are near.
@@ -31,12 +31,13 @@ pub enum Failure {
 /// The foot point of a place, or the reason why there is none.
 pub(super) type Outcome<const D: usize> = Result<FootPoint<D>, Failure>;
 
-/// What a reconstruction reads.
+/// Reconstruction of a front through its particles; nothing of it changes while places are served.
 pub(super) struct Reconstruction<'a, const D: usize, const M: usize> {
     /// The particles.
     pub feet: &'a FootPoints<D>,
     /// The particles sorted into cells.
     pub cells: &'a CellList<D>,
+    /// Method, grid, law and segments.
     pub config: &'a FrontConfig<D, M>,
     /// Terms of the degree of the method.
     pub terms: &'a Terms<M>,
@@ -46,7 +47,7 @@ pub(super) struct Reconstruction<'a, const D: usize, const M: usize> {
     pub merges: bool,
 }
 
-/// Storage of a thread.
+/// Storage that one thread uses for all of its reconstructions.
 #[derive(Debug)]
 pub(super) struct Workspace<const D: usize, const M: usize> {
     /// Particles about the place, nearest first, and the radius in which they were searched.

@@ -1,7 +1,7 @@
-//! A front step by step.
+//! The simulation of a front.
 
 use super::config::FrontConfig;
-use super::exact::{FrontErrors, front_errors};
+use super::errors::{FrontErrors, front_errors};
 use super::exact_front::{ExactFrontMotion, Moment};
 use super::foot_points::FootPoints;
 use super::format_1;
@@ -20,7 +20,7 @@ use crate::simulation::{
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
 
-/// A front as a simulation, M = D − 1.
+/// The simulation of a front in D dimensions; M dimensions lie along it, M = D − 1 of a surface.
 pub struct GridBasedParticles<const D: usize, const M: usize> {
     system: FrontSystem<D, M>,
     exact: Box<dyn ExactFrontMotion<D>>,
@@ -28,9 +28,11 @@ pub struct GridBasedParticles<const D: usize, const M: usize> {
     ball: Option<Ball<D>>,
     /// Length or area of the front at the start, up to a constant factor.
     start_area: f64,
+    /// Longest displacement in a step so far, in spacings of the finest level.
     max_cfl: f64,
     /// Time at which the last particle was removed.
     vanished: Option<f64>,
+    /// Errors at the times where they were due so far.
     errors: Vec<FrontErrors>,
     /// Particles at open ends, found in the last step.
     ends: Vec<usize>,
@@ -38,7 +40,7 @@ pub struct GridBasedParticles<const D: usize, const M: usize> {
 }
 
 impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
-    /// At time 0.
+    /// The simulation at time 0. `ball` is the front at the start, where it is a ball.
     #[must_use]
     pub fn new(
         system: FrontSystem<D, M>,
@@ -88,7 +90,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
     }
 
     /// Reports open ends of a front that must stay closed.
-    fn look_for_ends(&mut self, Clock { step, time }: Clock) {
+    fn find_open_ends(&mut self, Clock { step, time }: Clock) {
         if !self.system.config.law.keeps_fronts_closed() {
             return;
         }
@@ -107,6 +109,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
         }
     }
 
+    /// Velocity of particle i at the present time.
     fn velocity(&self, i: usize) -> Vector<D> {
         self.system.config.law.velocity(&self.system.feet, i, self.clock().time)
     }
@@ -121,13 +124,13 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         &mut self.course
     }
 
-    /// 1. Motion, topology and resampling, as long as there is a front. 2. Errors, where they are due.
+    /// 1. Move and resample the front, as long as there is one. 2. Compute the errors, where they are due.
     fn step(&mut self) -> Result<(), StepError> {
         let (from, to) = (self.clock(), self.course.next());
         self.ends.clear();
         if !self.system.feet.is_empty() {
-            let way = self.system.advance(from, to, self.course.pace.time_step, &mut self.course.phases)?;
-            self.max_cfl = self.max_cfl.max(way);
+            let displacement = self.system.advance(from, to, self.course.pace.time_step, &mut self.course.phases)?;
+            self.max_cfl = self.max_cfl.max(displacement);
             self.check_growth(to)?;
             if self.system.feet.is_empty() {
                 self.vanished = Some(to.time);
@@ -142,7 +145,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
             let moment = Moment { feet: &system.feet, grid, time: to.time, interrupt };
             let found = course.phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
             self.errors.extend(found);
-            self.look_for_ends(to);
+            self.find_open_ends(to);
         }
         self.course.step = to.step;
         Ok(())
@@ -173,14 +176,14 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         let feet = &self.system.feet;
         let grid = self.system.config.grid;
         let mut fields = Fields::new(&feet.positions, selection);
-        // Of a wave front the direction of travel.
+        // The normal of a wave front is its direction of travel.
         let is_curve_in_space = D - M == 2;
         let travel = |i: usize| self.velocity(i).try_normalize(0.0).unwrap_or(feet.normals[i]);
         let normal = |i: usize| if is_curve_in_space { travel(i) } else { feet.normals[i] };
         fields.vector(&quantities::NORMAL, || (0..feet.len()).map(normal));
         fields.scalar(&quantities::CURVATURE, || feet.curvatures.clone());
         if D == 3 && !is_curve_in_space {
-            // Shapes tell their mean curvature alone.
+            // Shapes do not tell their Gauss curvature.
             let known = |value: &f64| if self.course.step > 0 { *value } else { f64::NAN };
             fields.scalar(&quantities::GAUSS_CURVATURE, || feet.gauss_curvatures.iter().map(known).collect());
         }

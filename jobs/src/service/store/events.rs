@@ -4,7 +4,7 @@ use super::{Store, StoreError};
 use rusqlite::{Row, Transaction, params};
 use serde_json::Value;
 
-/// One event.
+/// An event of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     /// Number within the job.

@@ -9,7 +9,7 @@ use rusqlite::{Connection, OptionalExtension, Transaction, params};
 pub struct IdempotencyKey {
     /// The client that chose the key.
     pub owner: String,
-    /// The key.
+    /// The key, as the client wrote it.
     pub key: String,
     /// Digest of the request: the same key with another request is a mistake.
     pub fingerprint: String,

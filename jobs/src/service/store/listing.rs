@@ -21,9 +21,9 @@ pub struct JobFilter {
     pub health: Option<HealthStatus>,
     /// With all these labels.
     pub labels: Vec<(String, String)>,
-    /// Made after.
+    /// Made after this time.
     pub created_after: Option<String>,
-    /// Made before.
+    /// Made before this time.
     pub created_before: Option<String>,
     /// Oldest first instead of newest first.
     pub oldest_first: bool,

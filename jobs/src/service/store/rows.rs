@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// A job.
+/// A job as the store has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobRow {
     /// Id of the job.
@@ -109,9 +109,9 @@ pub struct FileRow {
     pub size_bytes: u64,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// Media type.
+    /// Media type of the file.
     pub media_type: String,
-    /// Scene time.
+    /// Scene time of a frame.
     pub time: Option<f64>,
     /// Step of the simulation.
     pub step: Option<u64>,
@@ -132,7 +132,7 @@ pub struct CheckpointRow {
     pub path: String,
     /// Step of the simulation.
     pub step: u64,
-    /// Scene time.
+    /// Scene time of that step.
     pub time: f64,
     /// Size in bytes.
     pub size_bytes: u64,

@@ -14,14 +14,14 @@ use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
-/// A study.
+/// A study as the store has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyRow {
     /// Id of the study.
     pub id: String,
-    /// Name.
+    /// Name, for people.
     pub name: Option<String>,
-    /// Labels.
+    /// Labels, for filters.
     pub labels: BTreeMap<String, String>,
     /// Body that all points share.
     pub base: Value,
@@ -37,7 +37,7 @@ pub struct StudyRow {
     pub on_failure: String,
     /// Whether a failure stops, or has stopped, the rest.
     pub is_stopping: bool,
-    /// Estimated total.
+    /// Forecast of all points together.
     pub estimate: Value,
     /// Time at which it was made.
     pub created_at: String,
@@ -48,9 +48,9 @@ pub struct StudyRow {
 /// A study to be made.
 #[derive(Debug, Clone)]
 pub struct NewStudy {
-    /// Name.
+    /// Name, for people.
     pub name: Option<String>,
-    /// Labels.
+    /// Labels, for filters.
     pub labels: BTreeMap<String, String>,
     /// Body that all points share.
     pub base: Value,
@@ -62,7 +62,7 @@ pub struct NewStudy {
     pub max_parallel: Option<u64>,
     /// `continue` or `stop`.
     pub on_failure: &'static str,
-    /// Estimated total.
+    /// Forecast of all points together.
     pub estimate: Value,
     /// Jobs, one for each point.
     pub jobs: Vec<NewJob>,
@@ -80,7 +80,7 @@ impl From<Study<NewJob>> for NewStudy {
 pub struct PointRow {
     /// Number of the point.
     pub index: u64,
-    /// Latest job.
+    /// Id of the latest job.
     pub job: String,
     /// State of that job.
     pub state: State,
@@ -94,7 +94,7 @@ pub struct PointRow {
     pub spent: [f64; 2],
     /// Particles as reached, else as estimated.
     pub particles: u64,
-    /// Steps done.
+    /// Steps done so far.
     pub steps: u64,
     /// Whether its results can be trusted; none before the first look.
     pub health: Option<HealthStatus>,

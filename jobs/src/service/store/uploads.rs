@@ -13,7 +13,7 @@ pub const CONTENT: &str = "content";
 /// Name of the points that were found in it, in our own plain format.
 pub const CLOUD: &str = "cloud.bin";
 
-/// An upload.
+/// An upload as the store has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UploadRow {
     /// Id of the upload.

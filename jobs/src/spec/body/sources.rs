@@ -16,7 +16,7 @@ pub enum Origin {
 }
 
 impl Origin {
-    /// The id.
+    /// Id of the checkpoint or of the upload.
     #[must_use]
     pub fn id(&self) -> &str {
         match self {
@@ -34,7 +34,7 @@ pub struct RestartSource {
     pub scene: Value,
     /// Instruction set it was written on.
     pub isa: String,
-    /// Its step.
+    /// Step of the checkpoint.
     pub step: u64,
 }
 

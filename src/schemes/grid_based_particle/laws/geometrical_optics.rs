@@ -13,11 +13,11 @@ pub struct GeometricalOptics {
     rays: Rays,
 }
 
-/// Default of dt · c/h.
+/// Default CFL number, dt · c/h.
 const DEFAULT_CFL: f64 = 2.0;
 
 impl GeometricalOptics {
-    /// Rays of speed c.
+    /// The law of rays with speed c.
     #[must_use]
     pub fn new(speed: f64) -> Self {
         Self { rays: Rays { speed } }

@@ -8,11 +8,11 @@ use crate::schemes::grid_based_particle::exact_front::{ExactFrontMotion, Shrinki
 use crate::schemes::grid_based_particle::foot_points::FootPoints;
 use crate::time::PathIntegrator;
 
-/// Velocity −κ n, κ = ∇·n.
+/// The law of mean curvature: the velocity is −κ n with κ = ∇·n.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanCurvature;
 
-/// Default of dt/h², where it is stable.
+/// Default of dt/h²; the longest stable step replaces it where that is shorter.
 const DEFAULT_STEP: f64 = 0.5;
 /// Length or area relative to the start above which a run counts as unstable: the exact front only shrinks.
 const MOST_GROWTH: f64 = 2.0;
@@ -27,7 +27,7 @@ const FOUR_STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 
 /// The same of the TVD scheme of order 2.
 const TWO_STAGES: [(f64, f64); 2] = [(0.0, 0.5), (1.0, 0.5)];
 
-/// −κ n.
+/// The velocity −κ n of particle i.
 fn velocity<const D: usize>(feet: &FootPoints<D>, i: usize) -> Vector<D> {
     feet.normals[i] * -feet.curvatures[i]
 }

@@ -7,14 +7,14 @@ use crate::parallel::Interrupted;
 use crate::schemes::grid_based_particle::exact_front::{ExactFrontMotion, OffsetFront};
 use crate::schemes::grid_based_particle::foot_points::FootPoints;
 
-/// Velocity c n. Paths are straight lines, along which normals stay as they are.
+/// The law of a constant speed: the velocity is c n. Paths are straight lines, along which normals stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NormalSpeed {
-    /// c, positive outward.
+    /// Speed c, positive outward.
     pub speed: f64,
 }
 
-/// Default of dt · |c|/h, that of GBPM 4.1.
+/// Default CFL number dt · |c|/h, that of GBPM 4.1.
 const DEFAULT_CFL: f64 = 0.75;
 
 impl<const D: usize, const M: usize> FrontLaw<D, M> for NormalSpeed {

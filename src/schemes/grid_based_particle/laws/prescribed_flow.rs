@@ -12,13 +12,13 @@ use crate::schemes::grid_based_particle::foot_points::FootPoints;
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
 use std::sync::Arc;
 
-/// Velocity u(x, t).
+/// The law of a prescribed velocity field: each particle moves with u(x, t).
 #[derive(Clone)]
 pub struct PrescribedFlow<const D: usize> {
     flow: Arc<dyn Flow<D>>,
 }
 
-/// Default of dt · top speed/h.
+/// Default CFL number, dt · top speed/h.
 const DEFAULT_CFL: f64 = 10.0;
 /// Largest distance from a particle to a reconstructed place between particles, in spacings: a flow draws particles apart.
 pub(super) const WIDEST_BRIDGE: f64 = 3.0;
@@ -26,7 +26,7 @@ pub(super) const WIDEST_BRIDGE: f64 = 3.0;
 const TANGENT_OFFSET: f64 = 1e-4;
 
 impl<const D: usize> PrescribedFlow<D> {
-    /// Motion in a flow.
+    /// The law that moves particles with `flow`.
     #[must_use]
     pub fn new(flow: Arc<dyn Flow<D>>) -> Self {
         Self { flow }

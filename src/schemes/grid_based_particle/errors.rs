@@ -14,7 +14,7 @@ use crate::schemes::measured_errors::{ErrorNorms, entry};
 use crate::simulation::section::known;
 use crate::simulation::{Component, ErrorEntry, LoadError, Section};
 
-/// Errors of one moment.
+/// Errors of a front at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FrontErrors {
     pub time: f64,
