@@ -51,18 +51,6 @@ impl SupportDiagnostics {
         self.enlarged + self.low_rank + self.unresolved
     }
 
-    /// The numbers that a checkpoint keeps: the counts in their order, and the smallest pivot ratio.
-    #[must_use]
-    pub fn to_numbers(&self) -> ([u64; 4], f64) {
-        ([self.enlarged, self.low_rank, self.unresolved, self.failed], self.min_pivot)
-    }
-
-    /// Restores the numbers of [`Self::to_numbers`]. The index of the first failed point is not kept.
-    #[must_use]
-    pub fn from_numbers([enlarged, low_rank, unresolved, failed]: [u64; 4], min_pivot: f64) -> Self {
-        Self { enlarged, low_rank, unresolved, failed, first_failed: None, min_pivot }
-    }
-
     /// Adds the diagnostics of other fits.
     pub fn add(&mut self, other: &Self) {
         self.enlarged += other.enlarged;

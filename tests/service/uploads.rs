@@ -297,7 +297,7 @@ fn what_is_wrong_with_an_uploaded_surface_is_an_event_or_ends_the_job_with_the_p
     let findings: Vec<&Value> =
         events["items"].as_array().unwrap().iter().filter(|event| event["type"] == "finding").collect();
     assert_eq!(findings.len(), 1, "{events}");
-    assert!(findings[0].to_string().contains("more: neighbours on one side alone"), "{findings:?}");
+    assert!(findings[0].to_string().contains("more: neighbors on one side alone"), "{findings:?}");
     let finding = &findings[0]["data"];
     assert!(finding["code"] == "holes" && finding["severity"] == "warning" && finding["step"] == 0, "{finding}");
     let points = finding["points"].as_array().unwrap();
