@@ -30,7 +30,7 @@ pub struct WeaklyCompressibleSph<const D: usize> {
     /// Parts that the last step was cut into.
     parts_of_step: u64,
     max_cfl: f64,
-    /// Steps in a row in which nobody was too fast for rest.
+    /// Steps in a row in which no particle was too fast for rest.
     resting: u64,
     /// What the first evaluation failed with.
     failure: Option<StepError>,
@@ -218,7 +218,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             _ => 0,
         };
         if self.resting == STEPS_OF_REST {
-            let message = format!("nobody has been faster than {speed:.3e} for {STEPS_OF_REST} steps");
+            let message = format!("no particle has been faster than {speed:.3e} for {STEPS_OF_REST} steps");
             self.findings.push(Finding { name: "came_to_rest", message, time: next.time });
         }
         Ok(())
@@ -507,3 +507,6 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         std::mem::take(&mut self.findings)
     }
 }
+
+#[cfg(test)]
+mod tests;
