@@ -493,3 +493,6 @@ fn copy_flags(from: &[u64], to: &mut [u8]) {
         *flag = (*count).min(255) as u8;
     }
 }
+
+#[cfg(test)]
+mod tests;
