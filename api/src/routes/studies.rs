@@ -61,7 +61,7 @@ pub async fn submit(
         let (allowance, slots) = (here.config.allowance(), here.config.slots);
         let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::from_body)?;
         if query.dry_run {
-            let view = DryRunView { points: study.points, estimate: study.estimate };
+            let view = DryRunView { points: study.points, estimate: serde_json::json!(study.forecast) };
             return Ok(Json(view).into_response());
         }
         check_capacity(&here, store, study.jobs.len() as u64, study.total.disk_bytes)?;

@@ -175,7 +175,7 @@ impl From<StudyRow> for StudyView {
             axes: row.axes,
             max_parallel: row.max_parallel,
             on_failure: row.on_failure,
-            estimate: row.estimate,
+            estimate: serde_json::json!(row.forecast),
             created_at: row.created_at,
             links,
         }

@@ -10,6 +10,7 @@ pub use sweep::{Axes, MOST_POINTS, Points, Sweep, SweepPoint};
 use crate::spec::body::{self, Allowance, BodyError, JobBody, Labels, Name, Sources};
 use crate::spec::calibration::Calibration;
 use meniscus::spec::{Given, Group, Json, Raw, Violation, Word, group, whole};
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashSet};
 
@@ -60,15 +61,34 @@ pub struct Total {
 }
 
 impl Total {
-    /// The total as JSON; the wall time is that of `at_once` jobs side by side.
+    /// The forecast of a number of points, `at_once` of which run side by side.
     #[must_use]
-    pub fn to_json(self, points: usize, at_once: usize) -> Value {
+    pub fn forecast(self, points: usize, at_once: usize) -> StudyForecast {
         let at_once = at_once.clamp(1, points.max(1)) as f64;
-        json!({
-            "points": points, "cpu_s": self.cpu_s, "wall_s": self.cpu_s.map(|cpu_s| cpu_s / at_once),
-            "memory_bytes": self.memory_bytes, "disk_bytes": self.disk_bytes,
-        })
+        StudyForecast {
+            points: points as u64,
+            cpu_s: self.cpu_s,
+            wall_s: self.cpu_s.map(|cpu_s| cpu_s / at_once),
+            memory_bytes: self.memory_bytes,
+            disk_bytes: self.disk_bytes,
+        }
     }
+}
+
+/// What a study will take, as it stands in the store and in answers.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StudyForecast {
+    /// Number of points.
+    pub points: u64,
+    /// CPU seconds of all points, if they can be estimated.
+    pub cpu_s: Option<f64>,
+    /// Running time in seconds with as many jobs at once as may run.
+    pub wall_s: Option<f64>,
+    /// Largest memory of a point, in bytes.
+    pub memory_bytes: u64,
+    /// Size of all files, in bytes.
+    pub disk_bytes: u64,
 }
 
 /// A valid study; `J` is what is kept of the body of each point.
@@ -93,8 +113,8 @@ pub struct Study<J> {
     pub jobs: Vec<J>,
     /// What all points will take.
     pub total: Total,
-    /// The total as JSON.
-    pub estimate: Json,
+    /// What the study will take.
+    pub forecast: StudyForecast,
 }
 
 /// From a client's JSON to a study; `slots` jobs run at once, `keep` makes of each body what is needed later.
@@ -134,7 +154,7 @@ pub fn parse<J, S: Sources>(
         axes,
         max_parallel: parsed.max_parallel,
         on_failure: parsed.on_failure.unwrap_or(OnFailure::Continue).word(),
-        estimate: total.to_json(jobs.len(), at_once),
+        forecast: total.forecast(jobs.len(), at_once),
         points: points.into_iter().map(|point| Value::Object(point.values.into_iter().collect())).collect(),
         jobs,
         total,

@@ -9,7 +9,7 @@ use crate::spec::health::HealthStatus;
 use crate::spec::records::{Progress, Usage};
 use crate::spec::report::Results;
 use crate::spec::states::{Reason, State, Trigger};
-use crate::spec::study::Study;
+use crate::spec::study::{Study, StudyForecast};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
@@ -38,7 +38,7 @@ pub struct StudyRow {
     /// Whether a failure stops, or has stopped, the rest.
     pub is_stopping: bool,
     /// Forecast of all points together.
-    pub estimate: Value,
+    pub forecast: StudyForecast,
     /// Time at which it was made.
     pub created_at: String,
     /// Points by the state of their latest job.
@@ -63,15 +63,15 @@ pub struct NewStudy {
     /// `continue` or `stop`.
     pub on_failure: &'static str,
     /// Forecast of all points together.
-    pub estimate: Value,
+    pub forecast: StudyForecast,
     /// Jobs, one for each point.
     pub jobs: Vec<NewJob>,
 }
 
 impl From<Study<NewJob>> for NewStudy {
     fn from(study: Study<NewJob>) -> Self {
-        let Study { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs, .. } = study;
-        Self { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs }
+        let Study { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, .. } = study;
+        Self { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs }
     }
 }
 
@@ -117,7 +117,7 @@ impl Store {
         receipt: impl FnOnce(&StudyRow) -> Receipt,
     ) -> Result<Made, StoreError> {
         let id = format!("std_{}", self.next_id());
-        let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, estimate, jobs } = study;
+        let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs } = study;
         let mut prepared = Vec::with_capacity(jobs.len());
         for (index, mut job) in jobs.into_iter().enumerate() {
             let job_id = format!("job_{}", self.next_id());
@@ -139,7 +139,7 @@ impl Store {
                     prepared.len() as i64,
                     max_parallel.map(|most| most as i64),
                     on_failure,
-                    estimate.to_string(),
+                    serde_json::to_string(&forecast)?,
                     crate::system::clock::now(),
                 ],
             )?;
@@ -349,7 +349,7 @@ fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, Store
                 max_parallel: row.get::<_, Option<i64>>("max_parallel")?.map(|most| most as u64),
                 on_failure: row.get("on_failure")?,
                 is_stopping: row.get::<_, i64>("stopping")? != 0,
-                estimate: rows::json(row, "estimate")?,
+                forecast: rows::json(row, "estimate")?,
                 created_at: row.get("created_at")?,
                 counts: BTreeMap::new(),
             })
