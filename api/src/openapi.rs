@@ -52,6 +52,9 @@ fn operations(item: &mut PathItem) -> impl Iterator<Item = &mut Operation> {
     [get, put, post, delete, options, head, patch, trace].into_iter().flatten()
 }
 
+/// Media type of answers that are no problems.
+const JSON: &str = "application/json";
+
 fn problem_content() -> Content {
     Content::new(Some(Ref::from_schema_name(Problem::name())))
 }
@@ -64,7 +67,7 @@ fn problem_response(description: &str) -> Response {
 
 fn use_problem_media_type(response: &mut Response) {
     let problem: RefOr<Content> = problem_content().into();
-    if response.content.get("application/json") == Some(&problem) {
+    if response.content.get(JSON) == Some(&problem) {
         response.content.clear();
         response.content.insert("application/problem+json".to_owned(), problem);
     }

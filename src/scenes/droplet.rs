@@ -3,6 +3,7 @@
 mod cases;
 mod flow;
 mod plan;
+mod preset;
 pub mod spec;
 
 use crate::scene::{self, Quantities, SceneKind};
@@ -13,7 +14,7 @@ use crate::spec::Group;
 pub static KIND: SceneKind = SceneKind {
     kind: "droplet",
     title: "Two fluids with surface tension: oscillating, dividing and resting drops (PCP paper, sections 4.3 and 4.4)",
-    presets: &[("paper", spec::paper)],
+    presets: &[("paper", preset::paper)],
     example: include_str!("droplet/example.json"),
     declarations: spec::Droplet::declarations,
     parse: scene::parse_as::<spec::Droplet>,

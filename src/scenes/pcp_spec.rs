@@ -141,7 +141,7 @@ impl PcpSpec {
         // In initial positions branches are apart by themselves.
         self.same_branch &= !matches!(neighborhood, NeighborhoodChoice::Material { .. });
         let minimum_ratio = *self.minimum_ratio.get_or_insert(match neighborhood {
-            // A person who gives a count means it.
+            // A given count is taken as it is, without a margin.
             NeighborhoodChoice::Nearest { .. } | NeighborhoodChoice::Material { .. } => 1.0,
             NeighborhoodChoice::Radius { .. } => default_ratio,
         });

@@ -4,6 +4,7 @@ mod points;
 mod problems;
 mod plan;
 pub mod spec;
+mod surface_scene;
 mod surfaces;
 
 use crate::scene::{self, Quantities, SceneKind};

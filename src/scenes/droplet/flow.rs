@@ -1,10 +1,13 @@
-//! How the flow of a droplet scene is discretized: kernels or fits, and where densities come from.
+//! The flow of a droplet scene: fluids, body force, and its discretization by kernels or fits.
 
 use super::cases::{Case, DEFAULT_DIFFUSION};
-use super::spec::{DensityChoice, DiscretizationChoice, Droplet, GeometryChoice, KernelWord, Shifting};
+use super::spec::{
+    DensityChoice, DiscretizationChoice, Droplet, FluidSpec, ForceChoice, GeometryChoice, KernelWord, Shifting,
+};
+use crate::geometry::Vector;
 use crate::operators::Support;
-use crate::schemes::weakly_compressible_sph::{DensityMethod, Discretization, KernelChoice};
-use crate::spec::Violation;
+use crate::schemes::weakly_compressible_sph::{BodyForce, DensityMethod, Discretization, Fluid, KernelChoice};
+use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
 
 /// The discretization of the flow, as planned.
@@ -16,6 +19,31 @@ pub(super) struct FlowPlan {
     pub density: DensityMethod,
     /// Shifting where none is given: fits have no forces that keep particles apart.
     pub default_shifting: Shifting,
+}
+
+impl From<&FluidSpec> for Fluid {
+    fn from(spec: &FluidSpec) -> Self {
+        let FluidSpec { density, viscosity, sound_speed, polytropic } = *spec;
+        Self { density, viscosity, sound_speed, polytropic }
+    }
+}
+
+/// The body force in `D` dimensions.
+pub(super) fn body_force<const D: usize>(force: &ForceChoice, errors: &mut Vec<Violation>) -> Option<BodyForce<D>> {
+    match force {
+        ForceChoice::None => None,
+        ForceChoice::Pulse { coefficient, duration, a, b, c } => {
+            let lengths = Vector::<D>::from_fn(|d, _| [*a, *b, *c][d]);
+            Some(BodyForce::Pulse { coefficient: *coefficient, duration: *duration, lengths })
+        }
+        ForceChoice::Constant { acceleration } => {
+            if acceleration.len() != D {
+                let (at, detail) = ("/body_force/acceleration", format!("the scene has {D} dimensions"));
+                errors.push(Violation::new(at, "conflict", detail, acceleration.to_json(), format!("{D} numbers")));
+            }
+            Some(BodyForce::Constant(Vector::<D>::from_fn(|d, _| acceleration.get(d).copied().unwrap_or(0.0))))
+        }
+    }
 }
 
 impl From<KernelWord> for KernelChoice {

@@ -1,10 +1,8 @@
 //! From the spec of a `droplet` scene to two fluids in a box.
 
 use super::cases::Case;
-use super::flow::FlowPlan;
-use super::spec::{
-    Corners, Droplet, FluidSpec, ForceChoice, GeometryChoice, IntegratorWord, Shifting, StopWhen, TensionWord,
-};
+use super::flow::{FlowPlan, body_force};
+use super::spec::{Corners, Droplet, GeometryChoice, IntegratorWord, Shifting, StopWhen, TensionWord};
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
@@ -20,8 +18,8 @@ use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    BodyForce, DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, SphConfig, SphSystem,
-    TensionForce, WeaklyCompressibleSph, measurement_interval,
+    DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, SphConfig, SphSystem, TensionForce,
+    WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Coordinates, Parameter, Violation};
@@ -65,30 +63,6 @@ fn corner<const D: usize>(name: &str, numbers: &Coordinates, errors: &mut Vec<Vi
         errors.push(Violation::new(at, "conflict", detail, numbers.to_json(), format!("{D} numbers")));
     }
     Vector::<D>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(0.0))
-}
-
-impl From<&FluidSpec> for Fluid {
-    fn from(spec: &FluidSpec) -> Self {
-        let FluidSpec { density, viscosity, sound_speed, polytropic } = *spec;
-        Self { density, viscosity, sound_speed, polytropic }
-    }
-}
-
-fn body_force<const D: usize>(force: &ForceChoice, errors: &mut Vec<Violation>) -> Option<BodyForce<D>> {
-    match force {
-        ForceChoice::None => None,
-        ForceChoice::Pulse { coefficient, duration, a, b, c } => {
-            let lengths = Vector::<D>::from_fn(|d, _| [*a, *b, *c][d]);
-            Some(BodyForce::Pulse { coefficient: *coefficient, duration: *duration, lengths })
-        }
-        ForceChoice::Constant { acceleration } => {
-            if acceleration.len() != D {
-                let (at, detail) = ("/body_force/acceleration", format!("the scene has {D} dimensions"));
-                errors.push(Violation::new(at, "conflict", detail, acceleration.to_json(), format!("{D} numbers")));
-            }
-            Some(BodyForce::Constant(Vector::<D>::from_fn(|d, _| acceleration.get(d).copied().unwrap_or(0.0))))
-        }
-    }
 }
 
 /// Where normals and curvatures come from; the spec gets what was left open.

@@ -1,28 +1,20 @@
 //! From the spec of a `surface_pde` scene to points, a method and a problem. Points from outside are unknown until a run is
 //! built (`points`).
 
-use super::points;
 use super::problems::{self, ProblemChoice};
 use super::spec::{
     EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, SurfaceChoice,
     SurfacePde,
 };
 use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
-use crate::geometry::random::CounterRandom;
+use crate::geometry::Vector;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
-use crate::geometry::{Surface, Vector};
 use crate::operators::Support;
 use crate::operators::charts::tangent::Metric;
-use crate::point_clouds::{Bump, normals};
-use crate::scene::cloud::{CloudReference, CloudSizes};
-use crate::scene::work::PhaseWork;
-use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
-use crate::scenes::work_estimate;
-use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
-use crate::schemes::surface_equation::quantities::{CURVATURE, NORMAL, VALUE};
-use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method, SurfaceCloud, SurfaceEquation};
-use crate::simulation::fields::COMMON_FIELDS;
-use crate::simulation::{OutputPlan, Quantity, Simulation};
+use crate::point_clouds::Bump;
+use crate::scene::cloud::CloudReference;
+use crate::scene::{Planned, SceneSpec};
+use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method};
 use crate::spec::{Choice, Parameter, Violation};
 use crate::time::FixedStep;
 use serde_json::{Value, json};
@@ -52,15 +44,15 @@ pub(super) struct SurfaceScene {
     /// The spec as given, with the choice of normals: the method is planned again once points from outside are read.
     pub given: SurfacePde,
     /// The spec with everything filled in.
-    spec: SurfacePde,
-    shape: Shape,
-    count: u64,
-    sampling: Sampling,
+    pub spec: SurfacePde,
+    pub shape: Shape,
+    pub count: u64,
+    pub sampling: Sampling,
     pub normals: Normals,
-    scheme: Scheme,
-    problem: ProblemChoice,
+    pub scheme: Scheme,
+    pub problem: ProblemChoice,
     pub fixed: FixedStep,
-    points: Option<CloudReference>,
+    pub points: Option<CloudReference>,
 }
 
 /// Distances of points.
@@ -350,210 +342,6 @@ impl Points<'_> {
             let detail = format!("a support must hold the neighbors that a fit of {terms} functions needs");
             let allowed = json!({"least": least_cutoff});
             errors.push(Violation::new("/method/cutoff_dn", "range", detail, cutoff_dn, allowed));
-        }
-    }
-}
-
-impl SurfaceScene {
-    /// Entries of a row, about.
-    fn entries(&self, method: &Method) -> f64 {
-        let cutoff = method.support.radius / self.shape.spacing(self.count);
-        let is_curve = self.shape.is_curve();
-        1.0 + if is_curve { 2.0 * cutoff } else { std::f64::consts::PI * cutoff * cutoff }
-    }
-
-    /// Nodes of a fit, about.
-    fn nodes(&self, method: &Method) -> f64 {
-        let surface = self.entries(method);
-        match method.form {
-            Form::Intrinsic { .. } => surface,
-            Form::Copies { layers, .. } => surface * (1.0 + 1.6 * f64::from(layers)),
-        }
-    }
-
-    /// Steps of a controlled integrator to one of the scene, when stability binds them: 2 δn² by the diffusivity.
-    fn inner_steps(&self, count: u64) -> f64 {
-        let spacing = self.shape.spacing(count);
-        (self.fixed.time_step * self.problem.diffusivity() / (2.0 * spacing * spacing)).max(1.0)
-    }
-
-    /// Functions of a fit.
-    fn terms(&self, method: &Method) -> f64 {
-        let n = method.support.degree as f64;
-        let is_curve = self.shape.is_curve();
-        let coordinates = if is_curve { 1 } else { 2 } + usize::from(matches!(method.form, Form::Copies { .. }));
-        match coordinates {
-            1 => n,
-            2 => (n + 1.0) * (n + 2.0) / 2.0 - 1.0,
-            _ => (n + 1.0) * (n + 2.0) * (n + 3.0) / 6.0 - 1.0,
-        }
-    }
-
-    /// The cloud with the normals that operators are made with.
-    fn cloud<const D: usize>(
-        &self,
-        mut cloud: SurfaceCloud<D>,
-        radius: f64,
-    ) -> Result<SurfaceCloud<D>, Vec<Violation>> {
-        match self.normals {
-            Normals::Exact | Normals::Given { .. } => {}
-            Normals::Perturbed { sigma } => {
-                let random = CounterRandom::new(self.spec.seed ^ 0x6e6f_726d);
-                for (i, normal) in cloud.normals[..cloud.rows].iter_mut().enumerate() {
-                    let off = Vector::<D>::from_fn(|d, _| sigma * random.symmetric(&[i as i64, d as i64]));
-                    *normal = (*normal + off).normalize();
-                }
-            }
-            Normals::Estimated => {
-                let found = normals::estimate::<D>(&cloud.points, radius);
-                let found = found.map_err(|failed| {
-                    let refused = Violation::new("/normals", "data", failed.to_string(), "estimated", Value::Null);
-                    vec![refused]
-                })?;
-                cloud.normals = found;
-            }
-        }
-        Ok(cloud)
-    }
-}
-
-impl Scene for SurfaceScene {
-    fn kind(&self) -> &'static str {
-        super::KIND.kind
-    }
-
-    fn dimension(&self) -> usize {
-        self.shape.dimension()
-    }
-
-    fn spacing(&self) -> Option<f64> {
-        self.points.is_none().then(|| self.shape.spacing(self.count))
-    }
-
-    fn resolved(&self) -> Value {
-        scene::resolved(super::KIND.kind, &self.spec)
-    }
-
-    fn view(&self) -> View {
-        let has_values = self.problem.fields(&self.shape).iter().any(|field| **field == VALUE);
-        let field = View::SurfaceField { field: "value", normal: "normal", is_plane: self.shape.is_curve() };
-        if has_values { field } else { View::Nothing }
-    }
-
-    fn fields(&self) -> Vec<&'static Quantity> {
-        let mut fields = self.problem.fields(&self.shape);
-        fields.push(&NORMAL);
-        fields.extend(COMMON_FIELDS);
-        if self.points.is_none() {
-            fields.push(&CURVATURE);
-        }
-        fields
-    }
-
-    fn clouds(&self) -> Vec<CloudReference> {
-        self.points.iter().cloned().collect()
-    }
-
-    fn estimate(&self, sizes: &CloudSizes) -> Estimate {
-        let particles = sizes.get("/surface").copied().unwrap_or_else(|| self.shape.points(self.count));
-        let points = particles as f64;
-        let memory = match &self.scheme {
-            // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
-            Scheme::Dcpse(method) => {
-                let entries = self.entries(method);
-                points * (250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, points))
-            }
-            Scheme::Embedding { order, spacing } => {
-                let area = points * self.shape.spacing(self.count).powi(2);
-                let bounds = self.shape.in_space().map(Surface::bounding_box);
-                points * 250.0 + bounds.map_or(0.0, |bounds| EmbeddingParts::memory(*order, *spacing, area, bounds))
-            }
-        };
-        Estimate {
-            particles,
-            steps: self.fixed.steps,
-            time_step: self.fixed.time_step,
-            end_time: self.fixed.clock(self.fixed.steps).time,
-            memory_bytes: memory as u64,
-        }
-    }
-
-    fn family(&self) -> String {
-        let dimension = self.shape.dimension();
-        let problem = self.problem.name();
-        match &self.scheme {
-            Scheme::Dcpse(Method { support, form: Form::Intrinsic { .. } }) => {
-                format!("surface_pde/{dimension}/intrinsic/{}/{problem}", support.degree)
-            }
-            Scheme::Dcpse(Method { support, .. }) => {
-                format!("surface_pde/{dimension}/copies/{}/{problem}", support.degree)
-            }
-            Scheme::Embedding { order, .. } => format!("surface_pde/{dimension}/embedding/{order}"),
-        }
-    }
-
-    fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
-        let Estimate { particles, steps, end_time, .. } = *estimate;
-        let points = particles as f64;
-        let mut work = match &self.scheme {
-            Scheme::Dcpse(method) => {
-                let (nodes, terms) = (self.nodes(method), self.terms(method));
-                let fit = nodes * (20.0 + 0.25 * terms * terms) + 0.02 * terms.powi(3);
-                let application = points * self.entries(method);
-                let mut work = vec![PhaseWork::at_moments("operators/construction", points * fit)];
-                work.extend(self.problem.work(application, points, steps as f64, self.inner_steps(particles)));
-                work
-            }
-            Scheme::Embedding { order, spacing } => {
-                let band = 2.0 * EmbeddingParts::half_band(*order) * (self.shape.spacing(self.count) / spacing).powi(2);
-                let stencil = (*order as f64 + 2.0).powi(3);
-                vec![
-                    PhaseWork::at_moments("operators/construction", points * band * (200.0 + stencil)),
-                    PhaseWork::every_step("operators/application", points * band * stencil * steps as f64),
-                ]
-            }
-        };
-        work.extend(work_estimate::around(points, steps, end_time, plan));
-        work
-    }
-
-    fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        if let Shape::Points(_) = self.shape {
-            return if self.shape.is_curve() {
-                points::build::<2, 1>(self, context)
-            } else {
-                points::build::<3, 2>(self, context)
-            };
-        }
-        let BuildContext { interrupt, cpu_clock, .. } = context;
-        match (&self.scheme, &self.shape) {
-            (Scheme::Dcpse(method), Shape::Circle { radius }) => {
-                let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.spec.seed);
-                let cloud = self.cloud(cloud, method.support.radius)?;
-                let problem = self.problem.build(&self.shape, &cloud, self.spec.seed, self.fixed.time_step)?;
-                Ok(Box::new(SurfaceEquation::<2, 1>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
-            }
-            (Scheme::Dcpse(method), shape) => {
-                let reach = method.support.radius;
-                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, reach, &interrupt);
-                let cloud = self.cloud(cloud, reach)?;
-                let problem = self.problem.build(shape, &cloud, self.spec.seed, self.fixed.time_step)?;
-                Ok(Box::new(SurfaceEquation::<3, 2>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
-            }
-            (Scheme::Embedding { order, spacing }, shape) => {
-                let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, 0.0, &interrupt);
-                let Some((field, values, operated)) = self.problem.known(shape, &cloud) else { return Err(Vec::new()) };
-                let surface: Box<dyn Surface<3>> = match shape {
-                    Shape::Torus(torus) => Box::new(torus.clone()),
-                    Shape::Ellipsoid(ellipsoid) => Box::new(ellipsoid.clone()),
-                    Shape::Circle { .. } | Shape::Bump(_) | Shape::Points(_) => return Err(Vec::new()),
-                };
-                let parts = EmbeddingParts { order: *order, spacing: *spacing, repeats: self.fixed.steps };
-                let SurfaceCloud { points, normals, curvatures, .. } = cloud;
-                let data = SurfaceData { points, normals, curvatures, field: values, reference: operated };
-                let field = Box::new(move |x: &Vector<3>| field.value(x));
-                Ok(Box::new(EmbeddingClosestPoint::new(surface, field, data, parts, interrupt, cpu_clock)))
-            }
         }
     }
 }

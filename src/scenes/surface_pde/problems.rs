@@ -203,16 +203,21 @@ pub(super) fn plan(
                 let at = "/problem/manufactured";
                 errors.push(Violation::new(at, "conflict", detail, manufactured.to_json(), Value::Null));
             }
-            let model = match *model {
-                ModelChoice::GrayScott { feed, kill } => Model::GrayScott { feed, kill },
-                ModelChoice::Brusselator { a, b } => Model::Brusselator { a, b },
-            };
+            let model = reaction(model);
             let diffusivity = [*diffusivity, *second_diffusivity];
             let start = Start::Reaction { model, diffusivity, noise: *noise, manufactured: exact };
             let integrator = explicit(*tolerance, *time_step);
             let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
             Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
         }
+    }
+}
+
+/// The reaction of a choice.
+fn reaction(choice: &ModelChoice) -> Model {
+    match *choice {
+        ModelChoice::GrayScott { feed, kill } => Model::GrayScott { feed, kill },
+        ModelChoice::Brusselator { a, b } => Model::Brusselator { a, b },
     }
 }
 
