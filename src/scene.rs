@@ -122,7 +122,7 @@ impl SceneKind {
 
 /// A valid scene.
 pub trait Scene: Send + Sync {
-    /// The kind.
+    /// Name of the kind of scene.
     fn kind(&self) -> &'static str;
 
     /// Dimension of the space: 2 or 3.

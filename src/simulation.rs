@@ -48,7 +48,7 @@ pub trait Simulation: Send {
         self.clock().step >= self.end().step
     }
 
-    /// Exactly one step.
+    /// Makes exactly one step.
     ///
     /// # Errors
     /// [`StepError`]; the simulation is then of no further use.
@@ -114,13 +114,13 @@ pub enum StepError {
     /// A value stopped being a number.
     #[error("{field} of particle {particle} is not finite at step {step}, time {time}")]
     NonFinite {
-        /// Which field.
+        /// Name of the field.
         field: &'static str,
-        /// Which particle.
+        /// Index of the particle.
         particle: usize,
-        /// In which step.
+        /// Number of the step.
         step: u64,
-        /// At what time.
+        /// Scene time of the step.
         time: f64,
     },
     /// A particle is faster than sound: the fluid is no longer nearly incompressible.
@@ -129,21 +129,21 @@ pub enum StepError {
         advice(*.time_step, *.stable, .bound)
     )]
     TooFast {
-        /// Which particle.
+        /// Index of the particle.
         particle: usize,
-        /// Its speed.
+        /// Speed of the particle.
         speed: f64,
         /// That of sound in its fluid.
         sound_speed: f64,
-        /// Δt.
+        /// Time step Δt.
         time_step: f64,
         /// What the limits allow at usual speeds.
         stable: f64,
-        /// What binds them.
+        /// Name of the limit that binds the step.
         bound: &'static str,
-        /// In which step.
+        /// Number of the step.
         step: u64,
-        /// At what time.
+        /// Scene time of the step.
         time: f64,
     },
     /// A step would have to be cut into more parts than makes sense.
@@ -151,15 +151,15 @@ pub enum StepError {
         "at the speed {speed:.4e} the limits allow {stable:.3e} of a step of {time_step:.3e}, at step {step}, time {time}"
     )]
     TimeStepFloor {
-        /// The largest speed.
+        /// Largest speed of a particle.
         speed: f64,
-        /// Δt.
+        /// Time step Δt.
         time_step: f64,
         /// What the limits allow.
         stable: f64,
-        /// In which step.
+        /// Number of the step.
         step: u64,
-        /// At what time.
+        /// Scene time of the step.
         time: f64,
     },
     /// A system of equations has no solution that the method finds, or a tolerance cannot be kept.
@@ -167,9 +167,9 @@ pub enum StepError {
     Unsolved {
         /// What was tried, and what it left.
         reason: String,
-        /// In which step.
+        /// Number of the step.
         step: u64,
-        /// At what time.
+        /// Scene time of the step.
         time: f64,
     },
     /// An invariant that the scheme watches no longer holds.
@@ -183,17 +183,17 @@ pub enum StepError {
         value: f64,
         /// Limit of the value.
         limit: f64,
-        /// Step.
+        /// Number of the step.
         step: u64,
-        /// Scene time.
+        /// Scene time of the step.
         time: f64,
     },
     /// The surface vanished: no particle has a neighbour of the other sign, or no fit reaches a zero.
     #[error("no sample particle is left on the interface at step {step}, time {time}")]
     InterfaceLost {
-        /// In which step.
+        /// Number of the step.
         step: u64,
-        /// At what time.
+        /// Scene time of the step.
         time: f64,
     },
 }

@@ -10,7 +10,7 @@ use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::weakly_compressible_sph::quantities as own;
 use crate::spec::Group;
 
-/// The kind.
+/// The kind of scene named `droplet`.
 pub static KIND: SceneKind = SceneKind {
     kind: "droplet",
     title: "Two fluids with surface tension: oscillating, dividing and resting drops (PCP paper, sections 4.3 and 4.4)",

@@ -15,7 +15,7 @@ use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::grid_based_particle::quantities as own;
 use crate::spec::Group;
 
-/// The kind.
+/// The kind of scene named `front`.
 pub static KIND: SceneKind = SceneKind {
     kind: "front",
     title: "A front moved by a flow, along its normal or by its curvature, as grid-based particles (GBPM paper)",

@@ -22,7 +22,7 @@ crate::choice! {
 }
 
 impl IntegratorChoice {
-    /// The integrator.
+    /// The path integrator of the choice.
     #[must_use]
     pub fn path_integrator(&self) -> PathIntegrator {
         match *self {

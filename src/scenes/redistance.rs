@@ -7,7 +7,7 @@ use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::static_redistancing::quantities as own;
 use crate::spec::Group;
 
-/// The kind.
+/// The kind of scene named `redistance`.
 pub static KIND: SceneKind = SceneKind {
     kind: "redistance",
     title: "Redistancing of resting particles about a known shape (PCP paper, section 4.1)",

@@ -13,7 +13,7 @@ use crate::schemes::surface_equation::quantities as own;
 use crate::simulation::quantity::without_repetition;
 use crate::spec::Group;
 
-/// The kind.
+/// The kind of scene named `surface_pde`.
 pub static KIND: SceneKind = SceneKind {
     kind: "surface_pde",
     title: "Operators on surfaces known by points with normals (Surface DC-PSE paper)",

@@ -9,7 +9,7 @@ use crate::schemes::{advected_level_set, grid_based_particle};
 use crate::simulation::quantity::without_repetition;
 use crate::spec::Group;
 
-/// The kind.
+/// The kind of scene named `vortex`.
 pub static KIND: SceneKind = SceneKind {
     kind: "vortex",
     title: "An interface carried by a prescribed flow (PCP paper, section 4.2)",

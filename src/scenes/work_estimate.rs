@@ -70,9 +70,9 @@ pub fn frames(steps: u64, end_time: f64, plan: &OutputPlan) -> f64 {
 pub fn around(particles: f64, steps: u64, end_time: f64, plan: &OutputPlan) -> [PhaseWork; 3] {
     let frames = frames(steps, end_time, plan);
     [
-        PhaseWork::at_moments("output", frames * (particles + FRAME_OVERHEAD)),
-        PhaseWork::at_moments("checkpoint", particles + FRAME_OVERHEAD),
-        PhaseWork::at_moments(REST, particles + FRAME_OVERHEAD),
+        PhaseWork::at_milestones("output", frames * (particles + FRAME_OVERHEAD)),
+        PhaseWork::at_milestones("checkpoint", particles + FRAME_OVERHEAD),
+        PhaseWork::at_milestones(REST, particles + FRAME_OVERHEAD),
     ]
 }
 

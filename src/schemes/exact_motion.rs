@@ -87,7 +87,7 @@ impl<const D: usize> ExactMotion<D> {
         self.surface.as_deref()
     }
 
-    /// The flow.
+    /// The prescribed flow.
     #[must_use]
     pub fn flow(&self) -> &dyn Flow<D> {
         self.flow.as_ref()

@@ -36,13 +36,13 @@ impl ErrorNorms {
         self.count += 1;
     }
 
-    /// √(Σ e²/n).
+    /// Root mean square √(Σ e²/n).
     #[must_use]
     pub fn rms(&self) -> f64 {
         (self.squares / self.count.max(1) as f64).sqrt()
     }
 
-    /// max |e|.
+    /// Largest error max |e|.
     #[must_use]
     pub fn max(&self) -> f64 {
         self.largest
@@ -76,7 +76,7 @@ pub fn against_exact(quantity: &str, found: &[f64], exact: &[f64], time: f64, re
     norms.map(|(norm, value)| entry(quantity, norm, value, time, reference)).to_vec()
 }
 
-/// One report entry.
+/// One error as an entry of the report.
 #[must_use]
 pub fn entry(quantity: &str, norm: &str, value: f64, time: f64, reference: &str) -> ErrorEntry {
     ErrorEntry { quantity: quantity.to_owned(), norm: norm.to_owned(), value, time, reference: reference.to_owned() }

@@ -12,9 +12,9 @@ use std::collections::BTreeMap;
 pub struct Course {
     /// Length and number of the steps.
     pub pace: Pace,
-    /// Steps done.
+    /// Number of steps done.
     pub step: u64,
-    /// CPU seconds.
+    /// CPU seconds by phase.
     pub phases: Phases,
     /// Findings that were not taken yet.
     pub findings: Vec<Finding>,

@@ -25,7 +25,7 @@ quantities! {
 /// Which fields are wanted.
 #[derive(Debug, Clone, Copy)]
 pub enum Selection<'a> {
-    /// Every field.
+    /// Every declared field.
     All,
     /// Those of these names.
     Named(&'a [String]),
@@ -45,9 +45,9 @@ impl Selection<'_> {
 /// Points and the values of the selected fields at one moment. 2D points have z = 0.
 #[derive(Debug, Clone)]
 pub struct Fields<'a> {
-    /// Positions.
+    /// Positions of the points; z = 0 in the plane.
     pub points: Vec<[f64; 3]>,
-    /// Point data.
+    /// Values at the points, field by field.
     pub columns: Vec<Field>,
     /// Points that findings are about.
     pub marks: Vec<Mark>,
@@ -66,7 +66,7 @@ pub struct Mark {
 /// One named field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// Name, as declared.
+    /// Name, as the scheme declares it.
     pub name: &'static str,
     /// One value a point.
     pub values: FieldValues,
@@ -75,11 +75,11 @@ pub struct Field {
 /// The values of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FieldValues {
-    /// Numbers.
+    /// One number at each point.
     Scalar(Vec<f64>),
     /// Vectors, z = 0 in 2D.
     Vector(Vec<[f64; 3]>),
-    /// Large whole numbers.
+    /// One whole number at each point.
     Id(Vec<u64>),
 }
 

@@ -27,9 +27,9 @@ pub struct Finding {
     pub count: u64,
     /// The first few of the points, by their index in the frame of that step; empty where it is about none.
     pub points: Vec<u64>,
-    /// Scene time.
+    /// Scene time at which it was noticed.
     pub time: f64,
-    /// Step.
+    /// Step in which it was noticed.
     pub step: u64,
     /// What may be done about it.
     pub advice: Option<Cow<'static, str>>,
@@ -132,11 +132,11 @@ pub struct Health {
 /// What a run diverged in when a check no longer holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Divergence {
-    /// Energy was made.
+    /// The run gained energy from nothing.
     Energy,
-    /// Momentum was made.
+    /// The run gained momentum from nothing.
     Momentum,
-    /// Particles crowded.
+    /// Particles crowded: pairs came too close.
     Crowded,
     /// Area or volume of a phase was lost.
     PhaseLost,

@@ -22,7 +22,7 @@ pub struct Phases {
 }
 
 impl Phases {
-    /// Nothing spent yet.
+    /// No CPU seconds spent yet.
     #[must_use]
     pub fn new(clock: CpuClock) -> Self {
         Self { clock, seconds: BTreeMap::new() }
@@ -41,7 +41,7 @@ impl Phases {
         *self.seconds.entry(name).or_insert(0.0) += seconds;
     }
 
-    /// The counter.
+    /// The counter of CPU seconds.
     #[must_use]
     pub fn clock(&self) -> fn() -> f64 {
         self.clock.0

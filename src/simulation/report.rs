@@ -12,10 +12,10 @@ pub struct ErrorEntry {
     pub quantity: String,
     /// Norm of the error, one of those that the scene's kind declares.
     pub norm: String,
-    /// The error.
+    /// The error in the norm.
     #[serde(deserialize_with = "null_is_nan")]
     pub value: f64,
-    /// Scene time.
+    /// Scene time of the comparison.
     pub time: f64,
     /// Reference of the comparison.
     pub reference: String,
@@ -26,7 +26,7 @@ pub struct ErrorEntry {
 pub struct Diagnostic {
     /// Path-like name, such as `fits.larger_radius`.
     pub name: Cow<'static, str>,
-    /// The number.
+    /// The value of the diagnostic.
     #[serde(deserialize_with = "null_is_nan")]
     pub value: f64,
     /// Unit; empty where there is none.
@@ -42,7 +42,7 @@ impl Diagnostic {
         Self { name: Cow::Borrowed(name), value, unit: Cow::Borrowed(""), doc: Cow::Borrowed(doc) }
     }
 
-    /// A count.
+    /// A diagnostic that is a count.
     #[must_use]
     pub const fn count(name: &'static str, count: u64, doc: &'static str) -> Self {
         Self::new(name, count as f64, doc)

@@ -5,7 +5,7 @@ use super::{Simulation, StepError};
 /// What an observer may ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
-    /// Go on.
+    /// The run goes on.
     Continue,
     /// End the loop here, after this whole step.
     Stop,

@@ -17,18 +17,18 @@ pub struct Section {
 pub enum Entry {
     /// Numbers, `components` of them an item (the D of vectors).
     Reals {
-        /// Numbers an item.
+        /// Numbers of each item.
         components: usize,
         /// The numbers, item by item.
         values: Vec<f64>,
     },
-    /// Whole numbers.
+    /// A list of whole numbers.
     Counts(Vec<u64>),
     /// One number, or none where it is not known.
     Real(Option<f64>),
     /// One whole number, or none where it is not known.
     Count(Option<u64>),
-    /// A section inside.
+    /// The section of a component.
     Section(Section),
 }
 
@@ -54,9 +54,9 @@ pub enum LoadError {
     Length {
         /// Path of the array.
         name: String,
-        /// Its length.
+        /// Length of the entry.
         got: usize,
-        /// The length needed.
+        /// Length that the scene needs.
         expected: usize,
     },
     /// The step of the state lies beyond the end of the run.
@@ -109,18 +109,18 @@ impl Section {
         self.entries.insert(name.to_owned(), entry);
     }
 
-    /// Adds numbers.
+    /// Adds a list of numbers under a name.
     pub fn put_reals(&mut self, name: &str, values: &[f64]) {
         self.put(name, Entry::Reals { components: 1, values: values.to_vec() });
     }
 
-    /// Adds vectors.
+    /// Adds a list of vectors under a name.
     pub fn put_vectors<const D: usize>(&mut self, name: &str, values: &[Vector<D>]) {
         let values = values.iter().flat_map(|v| v.iter().copied()).collect();
         self.put(name, Entry::Reals { components: D, values });
     }
 
-    /// Adds whole numbers.
+    /// Adds a list of whole numbers under a name.
     pub fn put_counts(&mut self, name: &str, values: impl IntoIterator<Item = u64>) {
         self.put(name, Entry::Counts(values.into_iter().collect()));
     }
@@ -130,7 +130,7 @@ impl Section {
         self.put_counts(name, values.iter().map(|value| u64::from(*value)));
     }
 
-    /// Adds a number.
+    /// Adds one number under a name.
     pub fn put_real(&mut self, name: &str, value: f64) {
         self.put(name, Entry::Real(Some(value)));
     }
@@ -252,7 +252,7 @@ impl Section {
         Ok(values)
     }
 
-    /// A number.
+    /// The number of this name.
     ///
     /// # Errors
     /// [`LoadError`], also where it is not known.
@@ -271,7 +271,7 @@ impl Section {
         }
     }
 
-    /// A whole number.
+    /// The whole number of this name.
     ///
     /// # Errors
     /// [`LoadError`], also where it is not known.

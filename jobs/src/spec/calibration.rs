@@ -97,7 +97,7 @@ impl Calibration {
         for phase in work.iter().filter(|phase| phase.units > 0.0) {
             let seconds = phase.units * self.seconds_per_unit(family, phase.phase)?;
             forecast.cpu_s += seconds;
-            if phase.course == Course::Moments {
+            if phase.course == Course::Milestones {
                 *forecast.milestones.entry(phase.phase.to_owned()).or_insert(0.0) += seconds;
             }
         }

@@ -211,7 +211,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             PhaseWork::every_step("front/motion", number),
             PhaseWork::every_step("front/resampling", number * (self.plan.chosen.method.neighbors * rows) as f64),
             PhaseWork::every_step("front/topology", number),
-            PhaseWork::at_moments("errors", exact),
+            PhaseWork::at_milestones("errors", exact),
         ];
         work.extend(work_estimate::around(particles as f64, steps, end_time, plan));
         work

@@ -135,7 +135,7 @@ impl Scene for WavefrontScene {
         let mut work = vec![
             PhaseWork::every_step("front/motion", number),
             PhaseWork::every_step("front/resampling", number * self.plan.chosen.method.neighbors as f64),
-            PhaseWork::at_moments("errors", particles as f64),
+            PhaseWork::at_milestones("errors", particles as f64),
         ];
         work.extend(work_estimate::around(particles as f64, steps, end_time, plan));
         work

@@ -55,7 +55,7 @@ pub(super) struct SurfaceScene {
     pub points: Option<CloudReference>,
 }
 
-/// Distances of points.
+/// Distances of points whose squares are numbers.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
 /// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbours as there are functions, about; larger

@@ -21,7 +21,7 @@ use crate::simulation::Quantity;
 use crate::spec::{Choice, Coordinates, Parameter, Violation};
 use serde_json::{Value, json};
 
-/// The problem.
+/// The planned problem.
 #[derive(Debug, Clone)]
 pub(super) enum ProblemChoice {
     LaplaceBeltrami { field: ExactField },
@@ -364,7 +364,7 @@ impl ProblemChoice {
         }
     }
 
-    /// The largest diffusivity.
+    /// The larger of the diffusivities.
     pub fn diffusivity(&self) -> f64 {
         match self {
             Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => diffusivity[0].max(diffusivity[1]),

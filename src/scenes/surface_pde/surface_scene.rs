@@ -164,7 +164,7 @@ impl Scene for SurfaceScene {
                 let (nodes, terms) = (self.nodes(method), self.terms(method));
                 let fit = nodes * (20.0 + 0.25 * terms * terms) + 0.02 * terms.powi(3);
                 let application = points * self.entries(method);
-                let mut work = vec![PhaseWork::at_moments("operators/construction", points * fit)];
+                let mut work = vec![PhaseWork::at_milestones("operators/construction", points * fit)];
                 work.extend(self.problem.work(application, points, steps as f64, self.inner_steps(particles)));
                 work
             }
@@ -172,7 +172,7 @@ impl Scene for SurfaceScene {
                 let band = 2.0 * EmbeddingParts::half_band(*order) * (self.shape.spacing(self.count) / spacing).powi(2);
                 let stencil = (*order as f64 + 2.0).powi(3);
                 vec![
-                    PhaseWork::at_moments("operators/construction", points * band * (200.0 + stencil)),
+                    PhaseWork::at_milestones("operators/construction", points * band * (200.0 + stencil)),
                     PhaseWork::every_step("operators/application", points * band * stencil * steps as f64),
                 ]
             }

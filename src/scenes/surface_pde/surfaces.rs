@@ -20,7 +20,7 @@ pub(super) enum Shape {
     Ellipsoid(Ellipsoid<3>),
     Torus(Torus),
     Bump(Bump),
-    /// Points from outside.
+    /// Points that come from a file or an upload.
     Points(Extent),
 }
 
@@ -28,7 +28,7 @@ pub(super) enum Shape {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extent {
     dimension: usize,
-    /// Length or area.
+    /// Length of a curve, area of a surface.
     measure: f64,
     /// The largest distance from the middle of their box.
     reach: f64,
@@ -73,7 +73,7 @@ pub(super) enum Sampling {
     Fibonacci,
     /// At random, relaxed or not.
     Random { is_relaxed: bool },
-    /// As they came.
+    /// Where the file has them.
     Given,
 }
 

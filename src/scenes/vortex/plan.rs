@@ -320,7 +320,7 @@ impl<const D: usize> Scene for VortexScene<D> {
             RedistanceWhen::Every(every) => ((steps / every.max(1)) as f64, Course::EveryStep),
             RedistanceWhen::ForOutput => {
                 let frames = work_estimate::frames(steps, end_time, plan) - 1.0;
-                (frames + f64::from(u8::from(halfway.is_some())), Course::Moments)
+                (frames + f64::from(u8::from(halfway.is_some())), Course::Milestones)
             }
         };
         let reach_h = self.reach() / self.lattice.spacing;
@@ -337,7 +337,7 @@ impl<const D: usize> Scene for VortexScene<D> {
         work.push(PhaseWork { phase: "measure", units: particles * times, course });
         let errors =
             |flow: &dyn Flow<D>| error_units(surface.as_deref(), flow, self.lattice.spacing, particles, end_time);
-        work.push(PhaseWork::at_moments("errors", flow.as_deref().map_or(particles, errors)));
+        work.push(PhaseWork::at_milestones("errors", flow.as_deref().map_or(particles, errors)));
         work.extend(work_estimate::around(particles, steps, end_time, plan));
         work
     }

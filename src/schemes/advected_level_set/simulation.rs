@@ -40,7 +40,7 @@ pub struct AdvectedLevelSet<const D: usize> {
 }
 
 impl<const D: usize> AdvectedLevelSet<D> {
-    /// At time 0.
+    /// A simulation at time 0.
     #[must_use]
     pub fn new(
         system: AdvectedSystem<D>,

@@ -47,9 +47,9 @@ pub struct AdvectedSystem<const D: usize> {
 /// Particles at time 0.
 #[derive(Debug, Clone)]
 pub struct Start<const D: usize> {
-    /// Where they are.
+    /// Positions of the particles.
     pub positions: Vec<Vector<D>>,
-    /// Their level.
+    /// Level of each particle.
     pub level: Vec<f64>,
 }
 
@@ -69,17 +69,17 @@ impl<const D: usize> Start<D> {
 /// What a run in a flow is made of, beside particles and flow.
 #[derive(Debug, Clone)]
 pub struct AdvectedParts {
-    /// h.
+    /// Particle spacing h.
     pub spacing: f64,
-    /// w/2.
+    /// Half width w/2 of the band.
     pub half_band: f64,
-    /// Path integrator.
+    /// Integrator of the particle paths.
     pub integrator: PathIntegrator,
-    /// What is transported.
+    /// Choice of the transported level-set function.
     pub field: FieldChoice,
     /// When to redistance.
     pub when: RedistanceWhen,
-    /// The method.
+    /// Parameters of the closest-point method.
     pub method: PcpMethod,
 }
 

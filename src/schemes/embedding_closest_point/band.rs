@@ -154,7 +154,7 @@ impl Band {
         sum
     }
 
-    /// Nodes.
+    /// Nodes of the interpolation.
     pub fn len(&self) -> usize {
         self.closest.len()
     }

@@ -14,12 +14,12 @@ use crate::simulation::{
 use crate::time::FixedStep;
 use std::collections::BTreeMap;
 
-/// Choices.
+/// Parameters of the method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EmbeddingParts {
-    /// 2 or 4.
+    /// Order: 2 or 4.
     pub order: usize,
-    /// Of the grid.
+    /// Spacing of the grid.
     pub spacing: f64,
     /// How often the operator is applied.
     pub repeats: u64,
@@ -46,15 +46,15 @@ impl EmbeddingParts {
 /// The points of a surface and what is known there.
 #[derive(Debug, Clone, Default)]
 pub struct SurfaceData {
-    /// Points.
+    /// Positions of the points.
     pub points: Vec<Vector<3>>,
-    /// Unit normals.
+    /// Unit normals at the points.
     pub normals: Vec<Vector<3>>,
-    /// ∇·n.
+    /// Curvature ∇·n at the points.
     pub curvatures: Vec<f64>,
-    /// The field.
+    /// Values of the field at the points.
     pub field: Vec<f64>,
-    /// Δ_S of it.
+    /// Exact Laplace–Beltrami operator of the field at the points.
     pub reference: Vec<f64>,
 }
 

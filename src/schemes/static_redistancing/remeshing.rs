@@ -20,12 +20,12 @@ pub enum RemeshingKernel {
     Lambda44Normalized,
     /// Σ φ W V / Σ W V with Wendland's kernel (A.5, A.6).
     WendlandC2 {
-        /// ε/h.
+        /// Smoothing length ε in h.
         smoothing_h: f64,
     },
     /// The same with the Gaussian (A.5, A.7).
     Gaussian {
-        /// ε/h.
+        /// Smoothing length ε in h.
         smoothing_h: f64,
     },
 }
@@ -102,13 +102,13 @@ impl<const D: usize> Remeshing<D> {
         Self { weighting, kernel, spacing, nodes, values, volumes: Vec::new(), cells }
     }
 
-    /// The nodes.
+    /// Nodes of the grid near the surface.
     #[must_use]
     pub fn nodes(&self) -> &[Vector<D>] {
         &self.nodes
     }
 
-    /// Their values.
+    /// Values at the nodes.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values

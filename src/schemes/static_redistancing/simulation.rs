@@ -22,7 +22,7 @@ pub struct StaticRedistancing<const D: usize> {
 }
 
 impl<const D: usize> StaticRedistancing<D> {
-    /// At the start.
+    /// A simulation at its start.
     #[must_use]
     pub fn new(system: StaticSystem<D>, cpu_clock: CpuClock, method: BTreeMap<&'static str, String>) -> Self {
         let fixed = FixedStep { time_step: 1.0, steps: system.repeats };

@@ -12,9 +12,9 @@ use crate::particles::{Particles, ScalarKey};
 pub enum InitialLevel<const D: usize> {
     /// √(Σ (x−c)²/A²) − 1 for the given centre and semi-axes: no distance.
     Quadric {
-        /// c.
+        /// Center of the quadric.
         center: Vector<D>,
-        /// A.
+        /// Semi-axes of the quadric.
         semi_axes: Vector<D>,
     },
     /// The exact distance.
@@ -27,7 +27,7 @@ pub enum InitialLevel<const D: usize> {
 pub struct StaticSystem<const D: usize> {
     /// The surface, for errors; None where it is known by its particles alone.
     pub surface: Option<Box<dyn Surface<D>>>,
-    /// h.
+    /// Particle spacing h.
     pub spacing: f64,
     /// How often to redistance.
     pub repeats: u64,
@@ -52,9 +52,9 @@ pub enum Source<const D: usize> {
     Grid(Remeshing<D>),
     /// Other points, which stay as they are.
     Others {
-        /// Where they are.
+        /// Positions of the points.
         positions: Vec<Vector<D>>,
-        /// Their level.
+        /// Level of each point.
         level: Vec<f64>,
     },
 }
@@ -62,13 +62,13 @@ pub enum Source<const D: usize> {
 /// What all static set-ups have in common.
 #[derive(Debug, Clone)]
 pub struct StaticParts {
-    /// h.
+    /// Particle spacing h.
     pub spacing: f64,
-    /// w/2.
+    /// Half width w/2 of the band.
     pub half_band: f64,
     /// How often to redistance.
     pub repeats: u64,
-    /// The method.
+    /// Parameters of the closest-point method.
     pub method: PcpMethod,
     /// Interpolation to a grid first, if any.
     pub remeshing: Option<RemeshingKernel>,

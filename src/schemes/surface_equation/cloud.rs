@@ -5,7 +5,7 @@ use crate::geometry::Vector;
 /// Points with unit normals. The first [`Self::rows`] are unknowns; those behind are images of them across an edge.
 #[derive(Debug, Clone, Default)]
 pub struct SurfaceCloud<const D: usize> {
-    /// Points, images last.
+    /// Positions of the points; images beyond an edge come last.
     pub points: Vec<Vector<D>>,
     /// Unit normals that the operators are made with.
     pub normals: Vec<Vector<D>>,
@@ -13,11 +13,11 @@ pub struct SurfaceCloud<const D: usize> {
     pub source: Vec<u32>,
     /// Supports by that of the method, one a point; empty where all are alike.
     pub scales: Vec<f64>,
-    /// Unknowns.
+    /// Number of unknowns: points without images.
     pub rows: usize,
     /// ∇·n where it is known, else NaN; empty where nothing is known of the surface but its points.
     pub curvatures: Vec<f64>,
-    /// Gauss curvature, likewise.
+    /// Exact Gauss curvature at each unknown, where it is known.
     pub gauss: Vec<f64>,
     /// The share of the surface that each unknown stands for, where it is known.
     pub areas: Option<Vec<f64>>,

@@ -12,7 +12,7 @@ use crate::simulation::{ErrorEntry, LoadError, Observables, Quantity, Section, S
 use crate::time::Clock;
 use std::collections::BTreeMap;
 
-/// Curvatures as computed.
+/// Computed curvatures.
 #[derive(Debug, Default)]
 pub struct Curvature {
     /// H = ∇·n/2 in space, κ = ∇·n in the plane.

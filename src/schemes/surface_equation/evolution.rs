@@ -36,7 +36,7 @@ pub enum EvolutionIntegrator {
 /// What is known exactly of a course.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ExactCourse {
-    /// Nothing.
+    /// No exact course is known.
     Unknown,
     /// The initial field times exp(−λ t): it is an eigenfunction.
     Decay(f64),
@@ -44,7 +44,7 @@ pub enum ExactCourse {
     Manufactured,
 }
 
-/// What evolves.
+/// Fields, reaction and integrator of an evolution.
 #[derive(Debug, Clone)]
 pub struct EvolutionParts {
     /// u, or u and then v.
@@ -53,9 +53,9 @@ pub struct EvolutionParts {
     pub reaction: Option<Reaction>,
     /// Δt of the implicit formula.
     pub time_step: f64,
-    /// Integrator.
+    /// Integrator of time.
     pub integrator: EvolutionIntegrator,
-    /// What is known.
+    /// The exact course, where it is known.
     pub exact: ExactCourse,
 }
 
@@ -240,7 +240,7 @@ impl Evolution {
         }
     }
 
-    /// Unknown fields.
+    /// Number of unknown fields.
     fn fields(&self) -> usize {
         if self.parts.reaction.is_some() { 2 } else { 1 }
     }

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 pub enum ExactField {
     /// Real orthonormal Y_lm on a sphere about the origin: m > 0 ∝ cos mφ, m < 0 ∝ sin |m|φ.
     SphericalHarmonic {
-        /// Degree.
+        /// Degree l.
         l: u32,
         /// Order, |m| ≤ l.
         m: i32,
@@ -17,19 +17,19 @@ pub enum ExactField {
     },
     /// sin(k·x), on any surface.
     PlaneWave {
-        /// k.
+        /// Wave vector k.
         k: Vector<3>,
     },
     /// sin mθ + cos mθ on a circle about the origin.
     SinPlusCos {
-        /// m.
+        /// Wave number m.
         m: u32,
     },
     /// ζ(|x − c|/σ)/σ² with ζ(d) = exp(−1/(1 − d²)) below d = .975: no eigenfunction, and no operator of it is known here.
     TruncatedGaussian {
-        /// c.
+        /// Center c.
         center: Vector<3>,
-        /// σ.
+        /// Width σ.
         sigma: f64,
     },
 }

@@ -20,7 +20,7 @@ pub enum Form {
     Copies {
         /// N_n, to either side.
         layers: u32,
-        /// δn.
+        /// Distance δn of the copies.
         spacing: f64,
     },
 }
@@ -30,20 +30,20 @@ pub enum Form {
 pub struct Method {
     /// Degree and radius of the fits.
     pub support: Support,
-    /// Form.
+    /// Form of the operators.
     pub form: Form,
 }
 
 /// An operator that a problem needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wanted {
-    /// Δ_S.
+    /// Laplace–Beltrami operator Δ_S.
     LaplaceBeltrami,
     /// A component of ∇_S.
     Gradient(usize),
 }
 
-/// Operators as wanted.
+/// The operators that a problem asks for.
 #[derive(Debug)]
 pub struct Operators {
     /// In the order of the wishes.

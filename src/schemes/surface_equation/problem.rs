@@ -9,17 +9,17 @@ use std::collections::BTreeMap;
 
 /// What a step works with.
 pub struct Tools<'a, const D: usize> {
-    /// The surface.
+    /// Points, normals and exact geometry of the surface.
     pub cloud: &'a SurfaceCloud<D>,
     /// The operators that the problem wanted.
     pub operators: &'a Operators,
     /// Asks to drop the step.
     pub interrupt: &'a Interrupt,
-    /// Costs.
+    /// CPU seconds by phase.
     pub phases: &'a mut Phases,
-    /// Before the step.
+    /// Clock before the step.
     pub from: Clock,
-    /// After it.
+    /// Clock after the step.
     pub to: Clock,
 }
 
@@ -31,7 +31,7 @@ pub trait Problem<const D: usize>: Send {
     /// Operators that it needs.
     fn wanted(&self) -> Vec<Wanted>;
 
-    /// One step.
+    /// Makes one step.
     ///
     /// # Errors
     /// [`StepError`].
@@ -55,7 +55,7 @@ pub trait Problem<const D: usize>: Send {
     /// Everything that the future depends on.
     fn save(&self, section: &mut Section);
 
-    /// Takes it back.
+    /// Restores the values from a section.
     ///
     /// # Errors
     /// [`LoadError`]; nothing is changed then.

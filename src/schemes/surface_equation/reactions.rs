@@ -5,16 +5,16 @@
 pub enum Model {
     /// −u v² + F (1 − u) and u v² − (F + k) v (Gray and Scott).
     GrayScott {
-        /// F.
+        /// Feed rate F.
         feed: f64,
-        /// k.
+        /// Kill rate k.
         kill: f64,
     },
     /// a − (b + 1) u + u² v and b u − u² v (Prigogine and Lefever).
     Brusselator {
-        /// a.
+        /// Supply a.
         a: f64,
-        /// b.
+        /// Rate b.
         b: f64,
     },
 }
@@ -49,7 +49,7 @@ impl Model {
 /// A reaction of two substances that diffuse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reaction {
-    /// Terms.
+    /// Values of the reaction terms.
     pub model: Model,
     /// Of u and v.
     pub diffusivity: [f64; 2],

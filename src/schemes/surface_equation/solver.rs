@@ -11,9 +11,9 @@ pub enum Solver {
     BiCgStab(Stopping),
     /// GMRES, begun anew so often, with ILU(0).
     Gmres {
-        /// Vectors.
+        /// Vectors of the basis before a restart.
         restart: usize,
-        /// When to stop.
+        /// Tolerance and largest number of iterations.
         stopping: Stopping,
     },
     /// Sparse LU decomposition.
