@@ -41,7 +41,7 @@ quantities! {
         L2 = "l2", "of the quantity", "L2 norm over the angle (GBPM eq. 18).";
         COVERAGE_H = "coverage_h", "spacings", "Largest distance from the exact front to a particle.";
         GAP_H = "gap_h", "spacings", "Largest gap along the front.";
-        DEVIATION = "deviation", "of the quantity", "Largest deviation from the mean.";
+        DEVIATION = "deviation", "of the quantity", "Standard deviation over the particles.";
         COUNT = "count", "", "Number of items, no error.";
         TIME_NORM = "time", "time", "A time, no error.";
     }
