@@ -6,6 +6,7 @@ pub mod body;
 pub mod calibration;
 pub mod forecast;
 pub mod health;
+mod json_numbers;
 pub mod records;
 pub mod report;
 pub mod requests;

@@ -1,6 +1,7 @@
 //! What a unit of work takes, by phase: kept per build and machine, begun by a few short runs, refined by every job
 //! that finishes.
 
+use crate::spec::json_numbers::{null_is_zero, nulls_are_zero};
 use crate::system::process;
 use meniscus::scene::PhaseWork;
 use meniscus::scene::work::Course;
@@ -39,11 +40,13 @@ pub struct Calibration {
 #[serde(default)]
 pub struct TimeForecast {
     /// CPU seconds of the whole run.
+    #[serde(deserialize_with = "null_is_zero")]
     pub cpu_s: f64,
     /// Seconds by the clock.
+    #[serde(deserialize_with = "null_is_zero")]
     pub wall_s: f64,
     /// CPU seconds of phases that come at milestones, not with every step.
-    #[serde(alias = "moments")]
+    #[serde(alias = "moments", deserialize_with = "nulls_are_zero")]
     pub milestones: BTreeMap<String, f64>,
     /// Measurements on which it rests.
     pub basis: String,

@@ -1,6 +1,7 @@
 //! What a run will take, before it is made: particles, steps, memory, disk, and time by what was measured before.
 
 use crate::spec::calibration::{Calibration, Measured, PhaseMeasured, TimeForecast, wall_phase};
+use crate::spec::json_numbers::{null_is_zero, nulls_are_zero};
 use crate::spec::report::Cost;
 use crate::spec::run_options::RunOptions;
 use meniscus::scene::{Estimate, PhaseWork};
@@ -74,8 +75,10 @@ pub struct ForecastRecord {
     /// Steps to the end.
     pub steps: u64,
     /// Scene time of a step.
+    #[serde(deserialize_with = "null_is_zero")]
     pub time_step: f64,
     /// Scene time at the end.
+    #[serde(deserialize_with = "null_is_zero")]
     pub end_time: f64,
     /// Resident memory of the worker.
     pub memory_bytes: u64,
@@ -92,6 +95,7 @@ pub struct ForecastRecord {
     /// Kind, dimension and method: runs of one family are compared.
     pub family: String,
     /// Units of work by phase.
+    #[serde(deserialize_with = "nulls_are_zero")]
     pub work: BTreeMap<String, f64>,
 }
 
@@ -145,3 +149,26 @@ pub(crate) fn disk_bytes(dimension: usize, estimate: &Estimate, options: &RunOpt
 
 /// Bytes of a particle in a checkpoint.
 const STATE_BYTES: u64 = 90;
+
+#[cfg(test)]
+mod tests {
+    use super::ForecastRecord;
+    use serde_json::json;
+
+    #[test]
+    fn what_an_earlier_build_stored_is_read_and_comes_back() {
+        let record = json!({
+            "particles": 10, "steps": 20, "time_step": 0.1, "end_time": 2.0, "memory_bytes": 1, "disk_bytes": 2, "cpu_s": 3.0,
+            "wall_s": null, "basis": "b", "family": "vortex/2", "work": {"fits": 5.0},
+            "time": {"cpu_s": 3.0, "wall_s": 1.5, "moments": {"errors": 0.5}, "basis": "b"},
+        });
+        let read: ForecastRecord = serde_json::from_value(record).unwrap();
+        assert_eq!(read.time.as_ref().unwrap().milestones["errors"], 0.5);
+        let again: ForecastRecord = serde_json::from_str(&serde_json::to_string(&read).unwrap()).unwrap();
+        assert_eq!(again, read);
+        let infinite = ForecastRecord { end_time: f64::INFINITY, ..read };
+        let again: ForecastRecord = serde_json::from_str(&serde_json::to_string(&infinite).unwrap()).unwrap();
+        assert_eq!(again.end_time, 0.0);
+        assert_eq!(serde_json::from_str::<ForecastRecord>("{}").unwrap(), ForecastRecord::default());
+    }
+}
