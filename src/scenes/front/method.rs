@@ -188,6 +188,6 @@ mod tests {
     fn the_grid_ends_where_its_numbers_do() {
         let unit = (Vector::<3>::zeros(), Vector::<3>::repeat(1.0));
         assert!(is_within_grid(unit, 1e-3, 1) && !is_within_grid(unit, 1e-7, 1));
-        assert!(is_within_grid(unit, 1e-5, 1) && !is_within_grid(unit, 1e-5, 5));
+        assert!(is_within_grid(unit, 1e-4, 1) && !is_within_grid(unit, 1e-4, 5));
     }
 }

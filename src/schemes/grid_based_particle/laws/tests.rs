@@ -137,7 +137,7 @@ fn stretches_are_those_of_the_motion() {
     assert_eq!(stretch(&MeanCurvature, 0.4).most, 1.0);
     let vortex = PrescribedFlow::new(Arc::new(SingleVortex { period: Some(8.0) }));
     let stretched = stretch(&vortex, 8.0);
-    assert!(stretched.most > stretched.mean && stretched.mean > 2.0, "{stretched:?}");
+    assert!(stretched.most > stretched.mean && stretched.mean > 1.2, "{stretched:?}");
     let law: &dyn FrontLaw<3, 2> = &PrescribedFlow::new(Arc::new(Vortex3d { period: None }));
     assert_eq!(law.stretch(&start(), 1.0).most, 4.0);
 }
