@@ -40,7 +40,7 @@ quantities! {
     /// Fields of frames that only this scheme has.
     pub OWN_FIELDS {
         VELOCITY = "velocity", "length/time", "Velocity of the particle.";
-        DENSITY = "density", "mass/length^D", "Density.";
+        DENSITY = "density", "mass/length^D", "Mass density at the particle.";
         PRESSURE = "pressure", "mass/(length*time^2)", "Pressure, with the part of surface tension that it balances.";
         PHASE = "phase", "", "Fluid of the particle: 1 inside, 0 outside.";
         MASS = "mass", "mass", "Mass of the particle.";

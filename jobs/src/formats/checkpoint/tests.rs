@@ -1,5 +1,7 @@
 use super::{CheckpointError, Counters, Meta, is_same_scene, layout, meta, read, write_verified};
 use crate::system::digest;
+use meniscus::scene;
+use meniscus::scenes::SCENES;
 use meniscus::simulation::Section;
 use serde_json::json;
 use std::path::Path;
@@ -106,7 +108,11 @@ fn a_meta_text_that_contradicts_the_file_is_refused() {
 
 #[test]
 fn scenes_are_the_same_but_for_what_a_restart_may_change() {
-    let body = |end: f64, h: f64| json!({"scene": {"kind": "vortex", "end_time": end, "spacing": h}});
+    let body = |end: f64, h: f64| {
+        let mut scene = scene::parse(&json!({"kind": "vortex", "spacing": h}), SCENES).unwrap().resolved();
+        scene["end_time"] = json!(end);
+        json!({"scene": scene})
+    };
     assert!(is_same_scene(&body(8.0, 0.1), &body(9.0, 0.1)));
     assert!(!is_same_scene(&body(8.0, 0.1), &body(8.0, 0.2)));
 }
