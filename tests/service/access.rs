@@ -164,7 +164,7 @@ fn fsck_finds_what_is_wrong() {
     let found = look();
     let text = String::from_utf8_lossy(&found.stdout).into_owned();
     assert!(!found.status.success());
-    for part in ["another digest", "job_stranger", "without gaps", "3 things wrong"] {
+    for part in ["another digest", "job_stranger", "without gaps", "3 errors"] {
         assert!(text.contains(part), "{part}: {text}");
     }
 }

@@ -47,7 +47,7 @@ fn a_job_runs_to_its_end_and_shows_everything() {
     let json = service.request("GET", &format!("/v1/jobs/{id}/series"), &[("accept", "application/json")], None).json();
     assert_eq!(json["rows"].as_array().unwrap().len(), 7);
     let log = service.get(&format!("/v1/jobs/{id}/log")).text();
-    assert!(log.contains("succeeded"));
+    assert!(log.trim_end().ends_with(" succeeded"), "{log}");
     assert_eq!(service.get(&format!("/v1/jobs/{id}/log?tail=1")).text().lines().count(), 1);
     let kinds: BTreeSet<String> = service.events(&id).iter().map(|e| e["type"].as_str().unwrap().to_owned()).collect();
     assert!(["state", "frame", "checkpoint", "progress"].iter().all(|kind| kinds.contains(*kind)), "{kinds:?}");
