@@ -188,7 +188,7 @@ pub enum StepError {
         /// Scene time of the step.
         time: f64,
     },
-    /// The surface vanished: no particle has a neighbour of the other sign, or no fit reaches a zero.
+    /// The surface vanished: no particle has a neighbor of the other sign, or no fit reaches a zero.
     #[error("no sample particle is left on the interface at step {step}, time {time}")]
     InterfaceLost {
         /// Number of the step.

@@ -1,4 +1,4 @@
-//! `droplet`: two fluids with surface tension (PCP paper, sections 4.3 and 4.4, appendix B).
+//! `droplet`: two fluids with surface tension (PCP, sections 4.3 and 4.4, appendix B).
 
 mod cases;
 mod flow;

@@ -29,7 +29,7 @@ pub fn check_extent<const D: usize>(surface: &dyn Surface<D>, reach: f64, spacin
 
 /// Particles of spacing h within `reach` of a surface: the measure of the band over h^D.
 ///
-/// Cubes are halved where the band's border passes through them (the distance is 1-Lipschitz, so its value at the centre
+/// Cubes are halved where the band's border passes through them (the distance is 1-Lipschitz, so its value at the center
 /// and the half diagonal tell) until they are small against the band; those count by the part of their width that lies
 /// inside. A band much thinner than its shape is widened for the count, since its measure is linear in its width.
 #[must_use]

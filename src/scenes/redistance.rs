@@ -1,4 +1,4 @@
-//! `redistance`: static geometry (PCP paper, section 4.1).
+//! `redistance`: static geometry (PCP, section 4.1).
 
 mod plan;
 pub mod spec;

@@ -1,4 +1,4 @@
-//! `vortex`: an interface in a prescribed flow (PCP paper, section 4.2).
+//! `vortex`: an interface in a prescribed flow (PCP, section 4.2).
 
 mod plan;
 pub mod spec;

@@ -40,7 +40,7 @@ pub fn redistancing<const D: usize>(
     let neighbors = ball * method.even_cutoff_h::<D>().powi(D as i32);
     // Material fits are of the level and of every coordinate.
     let fields = if let NeighborhoodChoice::Material { .. } = method.neighborhood { 1.0 + D as f64 } else { 1.0 };
-    // By the neighbour: gathering, moments and right-hand sides in vector lanes; the factorisation; or Householder's
+    // By the neighbor: gathering, moments and right-hand sides in vector lanes; the factorization; or Householder's
     // reflections. A unit is about a nanosecond, as measured over degrees 3 to 6 in two and three dimensions.
     let fit = match method.solver {
         Solver::Moments => neighbors * (40.0 + 0.3 * moments + 0.5 * fields * terms) + 0.02 * terms.powi(3),

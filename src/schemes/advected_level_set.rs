@@ -1,4 +1,4 @@
-//! A level set carried by particles through a prescribed flow (PCP paper, section 4.2).
+//! A level set carried by particles through a prescribed flow (PCP, section 4.2).
 
 mod errors;
 mod format_1;

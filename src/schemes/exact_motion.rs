@@ -275,7 +275,7 @@ mod tests {
         let rotation = Rotation { center: Vector::<2>::new(0.5, 0.5), angular_velocity: 1.0 };
         let motion = ExactMotion::new(ball(), Arc::new(rotation));
         let front = motion.front(std::f64::consts::FRAC_PI_2, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
-        // A quarter turn takes the centre to (0.25, 0.5).
+        // A quarter turn takes the center to (0.25, 0.5).
         assert!((front.signed_distance(&Vector::<2>::new(0.25, 0.8)) - 0.15).abs() < 1e-10);
     }
 }

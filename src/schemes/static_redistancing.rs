@@ -1,4 +1,4 @@
-//! Redistancing of resting particles about a known surface (PCP paper, section 4.1), on the particles themselves or, as a baseline,
+//! Redistancing of resting particles about a known surface (PCP, section 4.1), on the particles themselves or, as a baseline,
 //! on a grid that their values are interpolated to.
 
 mod format_1;

@@ -1,4 +1,4 @@
-//! Equations on surfaces by operators on scattered points (Surface DC-PSE paper, section 4).
+//! Equations on surfaces by operators on scattered points (Surface DC-PSE, section 4).
 //!
 //! One simulation ([`simulation`]) keeps the cloud, constructs the operators that its problem asks for and lets the problem
 //! step; one file a problem.

@@ -1,4 +1,4 @@
-//! Two-phase flow by weakly compressible SPH with surface tension (PCP paper, sections 4.3 and 4.4, appendix B).
+//! Two-phase flow by weakly compressible SPH with surface tension (PCP, sections 4.3 and 4.4, appendix B).
 //!
 //! Particles belong to a [`Species`]; the equations of motion are made of `interactions`, one item a term. Within an
 //! evaluation data flows one way: positions → neighbor lists → interface → densities and pressures → rates.

@@ -35,7 +35,7 @@ pub(super) fn style(k: usize) -> ShapeStyle {
     ShapeStyle::from(&Palette99::pick(k).to_rgba()).stroke_width(2)
 }
 
-/// A label with the colour of its line, one below another.
+/// A label with the color of its line, one below another.
 pub(super) fn legend<'a>(
     area: &DrawingArea<SVGBackend, Shift>,
     labels: impl Iterator<Item = &'a String>,

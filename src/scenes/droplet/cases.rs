@@ -46,7 +46,7 @@ impl Case {
         }
     }
 
-    /// PCP paper, section 4.3.
+    /// PCP, section 4.3.
     fn oscillating(dimension: usize) -> Self {
         let is_flat = dimension == 2;
         Self {
@@ -62,7 +62,7 @@ impl Case {
         }
     }
 
-    /// PCP paper, section 4.4.
+    /// PCP, section 4.4.
     fn dividing(dimension: usize, spacing: f64) -> Self {
         let is_flat = dimension == 2;
         let half = if is_flat { [1.0, 0.5, 0.0] } else { [0.75, 0.390_625, 0.390_625] };

@@ -367,7 +367,7 @@ impl<const D: usize> Scene for DropletScene<D> {
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
         let particles = self.count();
-        // Columns, their gathered copies, a state and a frame in the making; ranges of neighbours.
+        // Columns, their gathered copies, a state and a frame in the making; ranges of neighbors.
         let bytes = if D == 2 { 900 } else { 1750 };
         Estimate {
             particles,

@@ -58,7 +58,7 @@ pub(super) struct SurfaceScene {
 /// Distances of points whose squares are numbers.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
-/// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbours as there are functions, about; larger
+/// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbors as there are functions, about; larger
 /// ones have larger errors (measured on plane waves). Points as drawn at random want more: with less, operators have growing modes.
 fn support(order: u64, is_curve: bool, is_copies: bool, sampling: Sampling) -> Option<(usize, f64)> {
     let degree = match order {
@@ -69,7 +69,7 @@ fn support(order: u64, is_curve: bool, is_copies: bool, sampling: Sampling) -> O
     let cutoff = match (is_copies, is_curve, order) {
         (true, true, _) => 4.1,
         (true, false, _) => 2.9,
-        // On a curve neighbours lie in a row.
+        // On a curve neighbors lie in a row.
         (false, true, 2) => 3.4,
         (false, true, 4) => 5.4,
         (false, true, _) => 7.4,

@@ -80,7 +80,7 @@ pub(super) enum Sampling {
 /// Points of a surface whose number is not given, and before points from outside are read.
 pub(super) const DEFAULT_COUNT: u64 = 4000;
 
-/// Places of a bump whose values go into the series (Surface DC-PSE paper, section 4.4).
+/// Places of a bump whose values go into the series (Surface DC-PSE, section 4.4).
 const BUMP_PROBES: [[f64; 2]; 2] = [[-0.5, 0.0], [-0.25 * std::f64::consts::SQRT_2, 0.25 * std::f64::consts::SQRT_2]];
 
 impl Shape {

@@ -32,7 +32,7 @@ impl EmbeddingParts {
         inner_half_width(order) + (order / 2) as f64
     }
 
-    /// Bytes of a band about a surface of an area between two corners: those of the nodes (closest points, places, neighbours, three
+    /// Bytes of a band about a surface of an area between two corners: those of the nodes (closest points, places, neighbors, three
     /// fields, and what lists of them take until the band stands; measured: 300), and the index of every cell of the box.
     #[must_use]
     pub fn memory(order: usize, spacing: f64, area: f64, (low, high): (Vector<3>, Vector<3>)) -> f64 {

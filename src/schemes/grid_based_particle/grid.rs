@@ -1,4 +1,4 @@
-//! The underlying grid: a quadtree or octree of cells, whose centres are the grid points, named by one number each.
+//! The underlying grid: a quadtree or octree of cells, whose centers are the grid points, named by one number each.
 //!
 //! Level 0 has the multiples of the spacing; a cell of level l is halved along each axis into those of level l + 1 (GBPM 3.5).
 

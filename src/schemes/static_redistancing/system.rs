@@ -10,7 +10,7 @@ use crate::particles::{Particles, ScalarKey};
 /// The level-set function that the particles start with; its zero is the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialLevel<const D: usize> {
-    /// √(Σ (x−c)²/A²) − 1 for the given centre and semi-axes: no distance.
+    /// √(Σ (x−c)²/A²) − 1 for the given center and semi-axes: no distance.
     Quadric {
         /// Center of the quadric.
         center: Vector<D>,

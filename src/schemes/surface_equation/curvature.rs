@@ -1,4 +1,4 @@
-//! Mean and Gauss curvature (Surface DC-PSE paper, section 4.3): from the shape tensor ∇_S n of exact normals, or from
+//! Mean and Gauss curvature (Surface DC-PSE, section 4.3): from the shape tensor ∇_S n of exact normals, or from
 //! the fitted heights where normals are not exact.
 
 use super::cloud::SurfaceCloud;

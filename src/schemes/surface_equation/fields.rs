@@ -83,7 +83,7 @@ fn turned(x: &Vector<3>, axis: usize) -> Vector<3> {
     Vector::<3>::new(x[(axis + 1) % 3], x[(axis + 2) % 3], x[axis % 3])
 }
 
-/// Y_lm at the direction of x, by the recurrence in l of normalised associated Legendre functions.
+/// Y_lm at the direction of x, by the recurrence in l of normalized associated Legendre functions.
 fn spherical_harmonic(l: u32, m: i32, x: &Vector<3>) -> f64 {
     let z = (x[2] / x.norm()).clamp(-1.0, 1.0);
     let (order, sine) = (f64::from(m.unsigned_abs()), (1.0 - z * z).sqrt());

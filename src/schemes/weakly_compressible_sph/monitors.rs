@@ -61,7 +61,7 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 
 impl<const D: usize> SphSystem<D> {
     /// Mean and standard deviation of the curvature over the particles that feel the tension: |φ| < 2 ε, or those of the
-    /// colour field's interface.
+    /// color field's interface.
     fn curvature_spread(&self) -> (f64, f64) {
         let curvature = self.particles.scalar(self.columns.curvature);
         let band = self.particles.flag(self.columns.in_band);
@@ -92,16 +92,16 @@ impl<const D: usize> SphSystem<D> {
         })
     }
 
-    /// Area or volume, centre and second moments of the inside, by quadrature on the fits; None without an interface.
+    /// Area or volume, center and second moments of the inside, by quadrature on the fits; None without an interface.
     pub(super) fn moments(&self) -> Result<Option<EnclosedMoments<D>>, Interrupted> {
         let Some(interface) = self.interface.level_set() else { return Ok(None) };
-        let centre = self.circular_centre(&interface.surface.sample_points());
-        let unwrap = |x: &Vector<D>| centre + self.domain.displacement(&centre, x);
+        let center = self.circular_center(&interface.surface.sample_points());
+        let unwrap = |x: &Vector<D>| center + self.domain.displacement(&center, x);
         enclosed_moments(&interface.surface, unwrap, &self.interrupt).map(Some)
     }
 
-    /// A centre from which nothing is cut: along periodic axes opposite to the widest gap between points.
-    fn circular_centre(&self, points: &[Vector<D>]) -> Vector<D> {
+    /// A center from which nothing is cut: along periodic axes opposite to the widest gap between points.
+    fn circular_center(&self, points: &[Vector<D>]) -> Vector<D> {
         Vector::<D>::from_fn(|d, _| match self.domain.axes()[d] {
             Axis::Unbounded => points.iter().map(|x| x[d]).sum::<f64>() / points.len().max(1) as f64,
             Axis::Periodic { start, length } => {

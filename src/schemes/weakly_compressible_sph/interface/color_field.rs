@@ -1,4 +1,4 @@
-//! The interface as the smoothed color of the species (PCP eqs. B.5 to B.10; Adami et al. 2010): normals from its gradient,
+//! The interface as the smoothed color of the species (PCP eqs. B.5 to B.10; Adami 2010): normals from its gradient,
 //! curvatures from their divergence.
 //!
 //! The sum of B.6 runs over j with its volume (errata, PCP B.6). Curvatures have the sign of this project: positive where the
