@@ -115,13 +115,13 @@ pub struct GbpmContext {
 
 impl GbpmSpec {
     /// What the paper reconstructs by: quadratics of 6 particles, in space of 10, without weights and normals; where another
-    /// degree is given the number of particles is left to it.
+    /// degree is given, or left open by null, the number of particles is left to it.
     #[must_use]
-    pub fn paper(is_in_space: bool, given_degree: Option<usize>) -> Self {
+    pub fn paper(is_in_space: bool, has_own_degree: bool) -> Self {
         let neighbors = if is_in_space { 10 } else { 6 };
         Self {
             degree: Some(2),
-            neighbors: given_degree.is_none_or(|degree| degree == 2).then_some(neighbors),
+            neighbors: (!has_own_degree).then_some(neighbors),
             weight: Some(0.0),
             normal_weight: Some(0.0),
             ..Self::default()

@@ -119,7 +119,7 @@ impl Shape {
     /// The ellipse, or in space the ellipsoid, of these semi-axes about the origin; in the plane the first two count.
     #[must_use]
     pub fn ellipsoid(dimension: usize, semi_axes: [f64; 3]) -> Self {
-        let axes = Coordinates(semi_axes[..dimension].to_vec());
+        let axes = Coordinates(semi_axes.into_iter().take(dimension).collect());
         Self::Plain(if dimension == 2 {
             PlainShape::Ellipse { center: None, semi_axes: axes }
         } else {

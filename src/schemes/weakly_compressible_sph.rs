@@ -13,7 +13,7 @@
 //! | the interface and what it encloses | `interface`, `droplets`, `strays` |
 //! | one evaluation | `system` |
 //! | steps in time | `stepping`, [`time_step`] |
-//! | the simulation and its figures | `simulation`, `monitors`, `summary` |
+//! | the simulation and its figures | `simulation`, `pacing`, `monitors`, `summary` |
 
 mod column;
 pub mod config;
@@ -29,6 +29,7 @@ mod kernel_choice;
 mod mass_form;
 mod monitors;
 mod neighbor_lists;
+mod pacing;
 mod pair_sums;
 mod pair_workspace;
 pub mod quantities;
@@ -45,7 +46,8 @@ pub use config::{DensityMethod, Discretization, Geometry, Integrator, SphConfig}
 pub use fluids::Fluid;
 pub use interactions::{BodyForce, TensionForce};
 pub use kernel_choice::KernelChoice;
-pub use simulation::{WeaklyCompressibleSph, measurement_interval};
+pub use pacing::measurement_interval;
+pub use simulation::WeaklyCompressibleSph;
 pub use species::{Fluids, Species};
 pub use system::{Drop, SphSystem};
 

@@ -77,8 +77,9 @@ macro_rules! group {
             $(
                 /// The key of the field in JSON, for presets.
                 #[must_use]
-                pub const fn $field() -> $crate::spec::Key<$type> {
-                    $crate::spec::Key::new($crate::group_field!(@name $field $($json)?))
+                pub fn $field() -> $crate::spec::Key<$type> {
+                    let domain = $crate::group_field!(@domain $type, [$($domain)?]);
+                    $crate::spec::Key::new($crate::group_field!(@name $field $($json)?), domain)
                 }
             )*
         }

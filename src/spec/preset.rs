@@ -4,20 +4,27 @@ use super::choice::Choice;
 use super::group::Group;
 use super::parameter::Parameter;
 use serde_json::{Map, Value};
-use std::marker::PhantomData;
 
-/// The name of a declared field, with the type of its values.
-#[derive(Debug, Clone, Copy)]
-pub struct Key<T> {
+/// The name of a declared field in JSON, with the type and the domain of its values.
+#[derive(Debug)]
+pub struct Key<T: Parameter> {
     name: &'static str,
-    values: PhantomData<fn() -> T>,
+    domain: T::Domain,
 }
 
-impl<T> Key<T> {
-    /// The key of a field in JSON.
+impl<T: Parameter> Clone for Key<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T: Parameter> Copy for Key<T> {}
+
+impl<T: Parameter> Key<T> {
+    /// The key of a field whose values lie in a domain.
     #[must_use]
-    pub const fn new(name: &'static str) -> Self {
-        Self { name, values: PhantomData }
+    pub const fn new(name: &'static str, domain: T::Domain) -> Self {
+        Self { name, domain }
     }
 }
 
@@ -34,39 +41,39 @@ impl<'a> Given<'a> {
 
     /// Whether the field is given.
     #[must_use]
-    pub fn has<T>(self, key: Key<T>) -> bool {
+    pub fn has<T: Parameter>(self, key: Key<T>) -> bool {
         self.0.contains_key(key.name)
     }
 
     /// The value of a field, if it is given and valid.
     #[must_use]
     pub fn read<T: Parameter>(self, key: Key<T>) -> Option<T> {
-        T::parse(self.0.get(key.name)?, T::any(), "", &mut Vec::new())
+        T::parse(self.0.get(key.name)?, key.domain, "", &mut Vec::new())
     }
 
     /// The value of a field as sent; null where it is absent.
     #[must_use]
-    pub fn raw<T>(self, key: Key<T>) -> Value {
+    pub fn raw<T: Parameter>(self, key: Key<T>) -> Value {
         self.0.get(key.name).cloned().unwrap_or_default()
     }
 
     /// Whether a choice is given by this name, whatever its fields.
     #[must_use]
-    pub fn names<T: Choice>(self, key: Key<T>, name: &str) -> bool {
+    pub fn names<T: Choice + Parameter>(self, key: Key<T>, name: &str) -> bool {
         let given = self.0.get(key.name);
         given.is_some_and(|given| given.get("type").unwrap_or(given) == name)
     }
 
     /// Whether an object is given that has this field.
     #[must_use]
-    pub fn has_inside<T, F>(self, key: Key<T>, field: Key<F>) -> bool {
+    pub fn has_inside<T: Parameter, F: Parameter>(self, key: Key<T>, field: Key<F>) -> bool {
         self.0.get(key.name).is_some_and(|given| given.get(field.name).is_some())
     }
 
     /// The value of a field of an object that is given, if it is there and valid.
     #[must_use]
-    pub fn read_inside<T, F: Parameter>(self, key: Key<T>, field: Key<F>) -> Option<F> {
-        F::parse(self.0.get(key.name)?.get(field.name)?, F::any(), "", &mut Vec::new())
+    pub fn read_inside<T: Parameter, F: Parameter>(self, key: Key<T>, field: Key<F>) -> Option<F> {
+        F::parse(self.0.get(key.name)?.get(field.name)?, field.domain, "", &mut Vec::new())
     }
 }
 

@@ -31,8 +31,8 @@ fn growing_smoothing(spacing: f64) -> f64 {
 
 /// A box about the origin with these half edge lengths; in the plane the first two count.
 fn centered_box(dimension: usize, half: [f64; 3]) -> Corners {
-    let high = &half[..dimension];
-    Corners { low: Coordinates(high.iter().map(|x| -x).collect()), high: Coordinates(high.to_vec()) }
+    let high: Vec<f64> = half.into_iter().take(dimension).collect();
+    Corners { low: Coordinates(high.iter().map(|x| -x).collect()), high: Coordinates(high) }
 }
 
 impl Case {

@@ -58,7 +58,8 @@ pub(super) fn paper(given: Given) -> Preset {
     let implied = given.read(Front::shape()).and_then(|shape| shape.dimension());
     let is_in_space = given.read(Front::dimension()).flatten().or(implied) == Some(3);
     let is_by_curvature = given.names(Front::law(), "mean_curvature");
-    let mut method = GbpmSpec::paper(is_in_space, given.read(GbpmSpec::degree()).flatten());
+    let has_own_degree = given.has(GbpmSpec::degree()) && given.read(GbpmSpec::degree()) != Some(Some(2));
+    let mut method = GbpmSpec::paper(is_in_space, has_own_degree);
     if is_by_curvature && is_in_space {
         // The paper's ten particles of a surface blow up with its own step.
         method.neighbors = None;

@@ -97,8 +97,9 @@ pub(super) fn paper(given: Given) -> Preset {
     if given.names(Vortex::method(), "gbpm") {
         let implied = given.read(Vortex::shape()).and_then(|shape| shape.dimension());
         let is_in_space = given.read(Vortex::dimension()).flatten().or(implied) == Some(3);
-        let degree = given.read_inside(Vortex::method(), GbpmSpec::degree()).flatten();
-        let method = GbpmSpec { cfl: (!has_step).then_some(0.75), ..GbpmSpec::paper(is_in_space, degree) };
+        let has_own_degree = given.has_inside(Vortex::method(), GbpmSpec::degree())
+            && given.read_inside(Vortex::method(), GbpmSpec::degree()) != Some(Some(2));
+        let method = GbpmSpec { cfl: (!has_step).then_some(0.75), ..GbpmSpec::paper(is_in_space, has_own_degree) };
         return Preset::default()
             .set(Vortex::integrator(), IntegratorChoice::TvdRk2)
             .set(Vortex::method(), Method::Gbpm { method });

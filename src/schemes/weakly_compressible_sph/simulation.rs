@@ -4,6 +4,7 @@ use super::droplets::ball_curvature;
 use super::format_1;
 use super::interface::LevelSet;
 use super::monitors::{Row, deformation, load_row, names, save_row};
+use super::pacing::{PACING, measurement_interval};
 use super::quantities::{DENSITY, MASS, PHASE, PRESSURE, TIME, TIME_STEP, VELOCITY};
 use super::species::Species;
 use super::stepping::Stepper;
@@ -46,21 +47,6 @@ pub struct WeaklyCompressibleSph<const D: usize> {
 fn mean_steps(pace: &Pace) -> FixedStep {
     let end = pace.clock(pace.last);
     FixedStep { time_step: end.time / end.step.max(1) as f64, steps: end.step }
-}
-
-/// Parts that a step may be cut into.
-const MOST_PARTS: f64 = 64.0;
-/// Steps of rest that count as rest.
-const STEPS_OF_REST: u64 = 50;
-/// Steps between measurements at least: each costs about as much as a step, and takes room of its own.
-const LEAST_BETWEEN: u64 = 16;
-/// Measurements of a run, about.
-const MEASUREMENTS: u64 = 400;
-
-/// Steps from one measurement to the next in a run of `steps`, beside those that the series asks for.
-#[must_use]
-pub fn measurement_interval(steps: u64) -> u64 {
-    (steps / MEASUREMENTS).max(LEAST_BETWEEN)
 }
 
 impl<const D: usize> WeaklyCompressibleSph<D> {
@@ -154,7 +140,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let speed = self.system.flow.largest_speed();
         let StepLimit { length: limit, .. } = longest_step(&self.system.config, speed);
         let parts = (self.course.pace.time_step / limit - 1e-9).ceil().max(1.0);
-        if parts <= MOST_PARTS {
+        if parts <= PACING.most_parts {
             return Ok(parts as u64);
         }
         let (time_step, stable) = (self.course.pace.time_step, limit);
@@ -179,8 +165,8 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             Some(limit) if speed < limit => self.resting + 1,
             _ => 0,
         };
-        if self.resting == STEPS_OF_REST {
-            let message = format!("no particle has been faster than {speed:.3e} for {STEPS_OF_REST} steps");
+        if self.resting == PACING.steps_of_rest {
+            let message = format!("no particle has been faster than {speed:.3e} for {} steps", PACING.steps_of_rest);
             self.course.findings.push(Finding::info("came_to_rest", message, (next.step, next.time)));
         }
         Ok(())
@@ -224,7 +210,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn is_finished(&self) -> bool {
-        self.course.step >= self.course.pace.last || self.resting >= STEPS_OF_REST
+        self.course.step >= self.course.pace.last || self.resting >= PACING.steps_of_rest
     }
 
     /// 1. The parts that the limits ask for. 2. Each part by the integrator. 3. A look at soundness and, where due, a row.

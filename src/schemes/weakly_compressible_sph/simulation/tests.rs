@@ -1,7 +1,8 @@
 //! Steps that are cut into parts, steps that fail, and the end of a run at rest.
 
-use super::{STEPS_OF_REST, WeaklyCompressibleSph};
+use super::WeaklyCompressibleSph;
 use crate::parallel::Interrupt;
+use crate::schemes::weakly_compressible_sph::pacing::PACING;
 use crate::schemes::weakly_compressible_sph::test_setting::{Setting, setting};
 use crate::schemes::weakly_compressible_sph::time_step::longest_step;
 use crate::schemes::weakly_compressible_sph::{Drop, KernelChoice, SphConfig, SphSystem};
@@ -52,7 +53,7 @@ fn particles_faster_than_sound_end_a_run() {
 fn a_run_ends_after_enough_steps_below_the_speed_of_rest() {
     let (this, config, limit) = free();
     let mut resting = run(&this, SphConfig { rest_below: Some(1e3), ..config }, 0.2 * limit);
-    for _ in 1..STEPS_OF_REST {
+    for _ in 1..PACING.steps_of_rest {
         resting.step().unwrap();
     }
     assert!(!resting.is_finished());
