@@ -49,16 +49,15 @@ impl<const D: usize, const M: usize> FrontLaw<D, M> for MeanCurvature {
             PathIntegrator::Rk4 | PathIntegrator::Dopri5 { .. } => &FOUR_STAGES,
         };
         let MovingFront { feet, stages: storage, renew_geometry } = front;
-        let n = feet.len();
         let (starts, slopes) = (&mut storage.starts, &mut storage.slopes);
         starts.clear();
         starts.extend_from_slice(&feet.positions);
         slopes.clear();
-        slopes.resize(n, Vector::<D>::zeros());
+        slopes.resize(feet.len(), Vector::<D>::zeros());
         for (k, (offset, weight)) in stages.iter().enumerate() {
             if k > 0 {
-                for i in 0..n {
-                    feet.positions[i] = starts[i] + velocity(feet, i) * (offset * step.step);
+                for (i, start) in starts.iter().enumerate() {
+                    feet.positions[i] = start + velocity(feet, i) * (offset * step.step);
                 }
                 renew_geometry(feet)?;
             }
@@ -67,9 +66,9 @@ impl<const D: usize, const M: usize> FrontLaw<D, M> for MeanCurvature {
             }
         }
         let mut longest = 0.0_f64;
-        for i in 0..n {
-            feet.positions[i] = starts[i] + slopes[i] * step.step;
-            longest = longest.max(slopes[i].norm());
+        for ((x, start), slope) in feet.positions.iter_mut().zip(&*starts).zip(&*slopes) {
+            *x = start + slope * step.step;
+            longest = longest.max(slope.norm());
         }
         Ok(longest * step.step / step.spacing)
     }
