@@ -1,6 +1,6 @@
 //! Particle methods for moving interfaces: the engine of Meniscus.
 //!
-//! Data flows one way: JSON → parameters ([`scene::schema`]) → valid scene ([`scene::Scene`]) →
+//! Data flows one way: JSON → declared parameters ([`spec`]) → plan of a scene ([`scene::Scene`]) →
 //! [`simulation::Simulation`] → steps → observers ([`simulation::run`]).
 //!
 //! The engine knows no job, no HTTP, no file path and no wall clock; it prints nothing. A simulation's future depends

@@ -198,7 +198,7 @@ fn what_is_wrong_with_points_is_said_before_the_first_step() {
     let findings = simulation.take_findings();
     let names: Vec<_> = findings.iter().map(|finding| finding.code.as_ref()).collect();
     assert_eq!(names, ["holes", "inconsistent_normals"]);
-    assert!(findings[0].message.contains("more: neighbours on one side alone"), "{}", findings[0].message);
+    assert!(findings[0].message.contains("more: neighbors on one side alone"), "{}", findings[0].message);
     assert!(findings[1].message.starts_with("point 70:"), "{}", findings[1].message);
     assert_eq!(simulation.take_findings(), []);
     // A wrong normal is replaced.

@@ -69,8 +69,8 @@ impl<const D: usize> Case<D> {
         // Every sample that stands in for a closest point is counted, and counted once.
         let samples = answers.iter().filter(|(_, answer)| answer.is_sample).count() as u64;
         assert!(entries.contains(&("queries.sample_distance", samples)), "{samples} samples, {entries:?}");
-        assert!(entries.contains(&("queries", answers.len() as u64)));
-        // Whoever is solved beside others gets the bits of being solved alone.
+        assert!(entries.contains(&("newton.solves", answers.len() as u64)));
+        // A query that is solved beside others gets the bits of being solved alone.
         for (i, answer) in answers.iter().step_by(answers.len() / 1000 + 1) {
             assert_eq!(surface.query(&self.points[*i], f64::INFINITY), Some(*answer));
         }

@@ -36,7 +36,7 @@ mod tests {
     fn the_back_of_a_sphere_is_not_seen_and_up_is_up() {
         let points = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.45, -0.7, 0.0]];
         let (shown, values) = seen(&points, &points, &[1.0, 2.0, 3.0]);
-        assert_eq!((shown.len(), values), (2, vec![3.0, 1.0]));
+        assert_eq!((shown.len(), values), (2, vec![1.0, 3.0]));
         assert!(shown[0][1] > 0.5 && shown[0][0].abs() < 1e-12);
     }
 }

@@ -349,7 +349,8 @@ mod tests {
     fn what_is_no_sweep_is_refused() {
         let base = json!({"scene": {"kind": "redistance"}});
         for (spec, pointer) in [
-            (json!({"base": base}), "/sweep/mode"),
+            (json!({"base": base}), "/sweep"),
+            (json!({"base": base, "sweep": {"mode": "gird"}}), "/sweep/mode"),
             (json!({"base": base, "sweep": {"mode": "grid", "axes": {}}}), "/sweep/axes"),
             (json!({"base": base, "sweep": {"mode": "list", "points": []}}), "/sweep/points"),
             (json!({"base": base, "sweep": {"mode": "zip", "axes": {"/a": [1], "/b": [1, 2]}}}), "/sweep/axes/~1b"),

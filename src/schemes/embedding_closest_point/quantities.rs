@@ -8,7 +8,7 @@ use crate::simulation::quantity::{quantities, without_repetition};
 quantities! {
     /// Scalars of the series.
     pub OBSERVABLES {
-        TIME = "time", "applications", "Applications of the operator done.";
+        TIME = "time", "time", "Scene time; of one-step problems the number of applications.";
         ERROR_RELATIVE = "error_relative", "", "Size of the error by that of the exact value.";
         ERROR_MAX = "error_max", "of the field", "Largest error over the points.";
     }
