@@ -287,7 +287,7 @@ fn what_runs_show_is_declared() {
             let one = [shown[0].to_owned()];
             assert_eq!(simulation.fields(Selection::Named(&one)).columns.len(), 1, "{body}");
             for (quantity, _) in simulation.observables() {
-                assert!(declared.observables.iter().any(|known| *known == quantity), "{} of {body}", quantity.name);
+                assert!(declared.observables.contains(&quantity), "{} of {body}", quantity.name);
             }
             for error in simulation.report().errors {
                 assert!(declared.norms.iter().any(|known| known.name == error.norm), "{} of {body}", error.norm);

@@ -167,13 +167,13 @@ pub fn block_end(tokens: &[Token], k: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::tokens;
+    use super::{Token, tokens};
 
     #[test]
     fn literals_comments_and_tests_leave_no_tokens() {
         let text = "fn a<'b>(x: &'b str) { x != \"{ // \\\" \" && r#\"}\"# ; '{' } // fn c\n#[cfg(test)]\nmod t { fn d() {} }\nfn e() {}";
         let words: Vec<(String, usize)> =
-            tokens(text).into_iter().filter(|t| t.is_word()).map(|t| (t.text, t.line)).collect();
+            tokens(text).into_iter().filter(Token::is_word).map(|t| (t.text, t.line)).collect();
         let expected = [("fn", 1), ("a", 1), ("b", 1), ("x", 1), ("b", 1), ("str", 1), ("x", 1), ("fn", 4), ("e", 4)];
         let words: Vec<(&str, usize)> = words.iter().map(|(word, line)| (word.as_str(), *line)).collect();
         assert_eq!(words, expected);

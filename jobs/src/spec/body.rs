@@ -110,8 +110,10 @@ pub struct JobBody {
 
 /// From a client's JSON to a job.
 ///
-/// 1. Every field by itself. 2. The scene, or the one of the checkpoint. 3. Points from outside. 4. Fields of frames and limits, by
-/// what the scene and the machine allow. `sources` knows the checkpoints and uploads that a body may name.
+/// Steps: every field by itself; the scene, or the one of the checkpoint; points from outside; fields of frames and limits, by what
+/// the scene and the machine allow.
+///
+/// `sources` knows the checkpoints and uploads that a body may name.
 ///
 /// # Errors
 /// Everything that is wrong at once, with pointers from the body's root, or a failed look-up.

@@ -146,7 +146,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let flow = FlowPlan::new(&mut spec, &case, &mut errors);
     let geometry = geometry(&mut spec, &case, D, flow.smoothing_h).map_err(|error| errors.push(error)).ok();
     let given_step = spec.time_step.or(if spec.steps.is_none() { case.time_step } else { None });
-    let config = sph_config(&mut spec, &case, flow, geometry, given_step, &mut errors);
+    let config = sph_config(&mut spec, &case, &flow, geometry, given_step, &mut errors);
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     if errors.is_empty()
         && let Err(error) = Pencils::<D>::new(&domain_of(&low, &lengths), config.cutoff())
@@ -174,7 +174,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
 fn sph_config<const D: usize>(
     spec: &mut Droplet,
     case: &Case,
-    flow: FlowPlan,
+    flow: &FlowPlan,
     geometry: Option<Geometry>,
     given_step: Option<f64>,
     errors: &mut Vec<Violation>,

@@ -133,7 +133,7 @@ pub trait FrontLaw<const D: usize, const M: usize>: Send + Sync {
 
     /// The time after which every particle is back at its start; None where that never happens.
     fn return_time(&self) -> Option<f64> {
-        self.flow().and_then(|flow| flow.return_time())
+        self.flow().and_then(Flow::return_time)
     }
 
     // Estimates and errors.

@@ -88,8 +88,8 @@ impl<const D: usize, const M: usize> Placement<'_, D, M> {
     /// Sets the parameter of each particle along the outline of its part.
     fn set_parameters(&self, feet: &mut FootPoints<D>) {
         let spacing = OUTLINE_SPACING * self.config.finest_spacing();
-        let course = |surface: &Box<dyn Surface<D>>| Course::from_surface(surface.as_ref(), spacing);
-        let courses: Vec<_> = self.surfaces.iter().map(course).collect();
+        let surfaces = self.surfaces.iter();
+        let courses: Vec<_> = surfaces.map(|surface| Course::from_surface(surface.as_ref(), spacing)).collect();
         for i in 0..feet.len() {
             let course = courses.get(feet.parts[i] as usize).and_then(Option::as_ref);
             feet.parameters[i] = course.map_or(0.0, |course| course.parameter(&feet.positions[i]));

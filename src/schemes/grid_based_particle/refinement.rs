@@ -302,10 +302,10 @@ mod tests {
     use crate::schemes::grid_based_particle::system::FrontSystem;
 
     /// Levels and positions of the foot points of surfaces on a refined grid.
-    fn levels_of(surfaces: Vec<Box<dyn Surface<2>>>, levels: u32, curvature_constant: f64) -> Vec<(u32, Vector<2>)> {
+    fn levels_of(surfaces: &[Box<dyn Surface<2>>], levels: u32, curvature_constant: f64) -> Vec<(u32, Vector<2>)> {
         let mut config = config::<2, 1>(NormalSpeed { speed: 1.0 });
         config.method.adaptivity = Some(Adaptivity { levels, curvature_constant });
-        let system = FrontSystem::from_surfaces(&surfaces, config);
+        let system = FrontSystem::from_surfaces(surfaces, config);
         system.feet.nodes.iter().map(|node| Grid::level(*node)).zip(system.feet.positions).collect()
     }
 
@@ -317,7 +317,7 @@ mod tests {
     #[test]
     fn the_level_follows_the_curvature() {
         for (constant, level) in [(0.2, 0), (0.08, 1), (0.04, 2), (0.001, 3)] {
-            let found = levels_of(vec![circle(0.0, 0.2)], 4, constant);
+            let found = levels_of(&[circle(0.0, 0.2)], 4, constant);
             assert!(!found.is_empty() && found.iter().all(|(found, _)| *found == level), "{constant}: {found:?}");
         }
     }
@@ -325,13 +325,13 @@ mod tests {
     #[test]
     fn corners_and_narrow_passages_are_refined_and_straight_sides_are_not() {
         let square = Cuboid { center: Vector::<2>::zeros(), size: Vector::<2>::repeat(0.8) };
-        for (level, x) in levels_of(vec![Box::new(square)], 3, 0.05) {
+        for (level, x) in levels_of(&[Box::new(square)], 3, 0.05) {
             let from_corner = x.map(|c| 0.4 - c.abs()).norm();
             assert!(level == 2 || from_corner > SPACING, "{level} at {x}");
             assert!(level == 0 || from_corner < 8.0 * SPACING, "{level} at {x}");
         }
         let gap = 0.8 * TUNING.clearance * SPACING;
-        let near = levels_of(vec![circle(-0.4 - 0.5 * gap, 0.4), circle(0.4 + 0.5 * gap, 0.4)], 2, 0.5);
+        let near = levels_of(&[circle(-0.4 - 0.5 * gap, 0.4), circle(0.4 + 0.5 * gap, 0.4)], 2, 0.5);
         let level_at = |place: Vector<2>| {
             near.iter().min_by(|a, b| (a.1 - place).norm().total_cmp(&(b.1 - place).norm())).unwrap().0
         };

@@ -80,13 +80,16 @@ fn forge(path: &Path, change: impl FnOnce(&mut Meta)) {
     assert_eq!(digest::of_file(path).unwrap().0.len(), 64);
 }
 
+/// What is changed in a checkpoint, and how.
+type Change = (&'static str, fn(&mut Meta));
+
 #[test]
 fn a_meta_text_that_contradicts_the_file_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("7.h5");
     forge(&path, |_| ());
     assert!(read(&path, None).is_ok());
-    let changes: [(&str, fn(&mut Meta)); 6] = [
+    let changes: [Change; 6] = [
         ("a section that is no group", |meta| meta.entries[0].path = "nowhere".to_owned()),
         ("an entry twice", |meta| meta.entries.push(meta.entries[1].clone())),
         ("an entry in a number", |meta| meta.entries[1].path = "clock/step/time".to_owned()),
