@@ -49,7 +49,7 @@ test: setup $(VENV)/ready
 	cargo build --profile test --locked -p meniscus-api
 	export MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)" \
 	MENISCUS_NODE_TOOLS="$(abspath $(VENV)/node/node_modules/.bin)"; \
-	if cargo nextest --version > /dev/null 2>&1; then cargo nextest run --locked --workspace --no-fail-fast; \
+	if cargo nextest --version > /dev/null 2>&1; then cargo nextest run --locked --workspace --no-fail-fast && cargo test --doc --locked --workspace; \
 	else cargo test --locked --workspace --no-fail-fast; fi
 
 check:
