@@ -433,6 +433,9 @@ fn nonsense_is_refused_at_its_place() {
             json!({"kind": "surface_pde", "surface": "circle", "count": 99, "problem": {"type": "poisson", "field": {"type": "sin_plus_cos", "m": 50}}}),
             "/problem/field/m",
         ),
+        // A preset reads what is given only where it is valid.
+        (json!({"kind": "droplet", "preset": "paper", "dimension": 4}), "/dimension"),
+        (json!({"kind": "front", "preset": "paper", "degree": 9}), "/degree"),
         (json!({"kind": "surface_pde", "surface": {"type": "bump", "height": 10.1}}), "/surface/height"),
         (json!({"kind": "surface_pde", "surface": {"type": "sphere", "radius": 1e-60}}), "/surface"),
         (json!({"kind": "surface_pde", "solver": {"type": "bicgstab", "tolerance": 1e-9}}), "/solver"),
