@@ -137,7 +137,7 @@ impl Shape {
         }
     }
 
-    /// Whether the shape is a circle, sphere, ellipse or ellipsoid: the zero of a quadric.
+    /// Center and semi-axes of a circle, sphere, ellipse or ellipsoid, the zero of a quadric; none for other shapes.
     #[must_use]
     pub fn quadric<const D: usize>(&self) -> Option<(Vector<D>, Vector<D>)> {
         let at = |center: &Option<Coordinates>| {

@@ -67,8 +67,24 @@ pub fn parse<T: Choice>(given: &Value, place: &str, errors: &mut Vec<Violation>)
     found.filter(|_| errors.len() == before)
 }
 
+/// The variant named `name` with the defaults that it declares: the default of a parameter says a name, not the
+/// variant's fields a second time.
+///
+/// # Panics
+///
+/// Where there is no such variant or one of its fields has no default: a mistake in a declaration, met by whatever
+/// reads the schema.
+#[must_use]
+pub fn with_defaults<T: Choice>(name: &str) -> T {
+    let read = T::parse_variant(name, &Map::new(), "", &mut Vec::new()).flatten();
+    let Some(variant) = read else {
+        unreachable!("a default names a variant that needs fields or is not declared: {name}")
+    };
+    variant
+}
+
 /// A variant whose fields were all read, or none.
-pub fn whole<T>(variant: impl FnOnce() -> Option<T>) -> Option<T> {
+pub fn when_complete<T>(variant: impl FnOnce() -> Option<T>) -> Option<T> {
     variant()
 }
 

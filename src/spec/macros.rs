@@ -287,7 +287,7 @@ macro_rules! choice {
                             $($( let $field: Option<$type> = $crate::group_field!(
                                 @parse given, place, errors, $type, ($field $($json)?), concat!($($doc),*), [$($default)?], [$($domain)?] $($flag)?
                             ); )*)?
-                            Some($crate::spec::choice::whole(|| Some(Self::$Variant { $($( $field: $field?, )*)? })))
+                            Some($crate::spec::choice::when_complete(|| Some(Self::$Variant { $($( $field: $field?, )*)? })))
                         }
                     )*
                     _ => $crate::group_field!(@other name, given, place, errors $(, Self::$Other, $OtherType)?),

@@ -240,7 +240,7 @@ impl Contents {
 pub fn is_same_scene(a: &Value, b: &Value) -> bool {
     let plain = |body: &Value| {
         // A build before may have left out what this one writes as null: what is resolved resolves to the same again.
-        let scene = resolved_scene(body).unwrap_or_default();
+        let scene = resolved_scene(body).ok()?;
         let mut scene = scene::parse(&scene, SCENES).map_or(scene, |scene| scene.resolved());
         let safe = meniscus::scenes::kind_of(&scene).map(scene::SceneKind::restart_safe);
         if let Some(map) = scene.as_object_mut() {
@@ -248,9 +248,10 @@ pub fn is_same_scene(a: &Value, b: &Value) -> bool {
                 map.shift_remove(pointer.trim_start_matches('/'));
             }
         }
-        scene
+        Some(scene)
     };
-    plain(a) == plain(b)
+    // Two bodies without a scene say nothing of each other.
+    matches!((plain(a), plain(b)), (Some(a), Some(b)) if a == b)
 }
 
 /// An empty meta for the program that runs.

@@ -150,7 +150,7 @@ pub fn evaluate(measure: &Measure, runs: &[FinishedRun]) -> f64 {
         Measure::Seconds { spans } => seconds(last, spans),
         Measure::SecondsPerStep { spans } => seconds(last, spans) / last.cost.steps as f64,
         Measure::SecondsRatio { spans } => seconds(last, spans) / seconds(first, spans),
-        Measure::Diagnostic { name } => last.diagnostic(name).unwrap_or(0.0),
+        Measure::Diagnostic { name } => last.diagnostic(name).unwrap_or(f64::NAN),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::scenes::pcp_spec::PcpSpec;
 use crate::scenes::shapes::Shape;
+use crate::spec::choice::with_defaults;
 use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, whole};
 
 crate::words! {
@@ -213,10 +214,9 @@ crate::group! {
         /// balanced: −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet; csf: κ₀ = 0 (the paper)
         tension_force: TensionWord = TensionWord::Balanced;
         /// where normals and curvatures come from
-        geometry: GeometryChoice = GeometryChoice::Pcp { band_h: None, method: PcpSpec::default() };
+        geometry: GeometryChoice = with_defaults("pcp");
         /// how the flow is discretized
-        discretization: DiscretizationChoice =
-            DiscretizationChoice::Sph { kernel: KernelWord::WendlandC2, smoothing_h: None };
+        discretization: DiscretizationChoice = with_defaults("sph");
         /// where densities come from; by case when not given
         density_method: Option<DensityChoice>;
         /// particle shifting; by case when not given

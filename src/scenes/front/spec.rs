@@ -4,6 +4,7 @@ use crate::geometry::flows::FlowChoice;
 use crate::scenes::gbpm_spec::{GbpmSpec, TopologyWord};
 use crate::scenes::integrators::IntegratorChoice;
 use crate::scenes::shapes::{PlainShape, Shape};
+use crate::spec::choice::with_defaults;
 use crate::spec::{Given, POSITIVE, Preset, whole};
 
 crate::choice! {
@@ -19,7 +20,7 @@ crate::choice! {
         /// a prescribed velocity field
         Flow = "flow" {
             /// the velocity field
-            flow: FlowChoice = FlowChoice::SingleVortex { period: Some(8.0) };
+            flow: FlowChoice = with_defaults("single_vortex");
         }
         /// rays that start along the inner normals of a circle or an ellipse, as a curve in (x, y, θ)
         GeometricalOptics = "geometrical_optics" {
@@ -35,7 +36,7 @@ crate::group! {
         /// 2 or 3; when not given, that of the shape, else 2
         dimension: Option<usize>, in whole(2, 3);
         /// what moves the front
-        law: Law = Law::Normal { speed: 1.0 };
+        law: Law = with_defaults("normal");
         /// the front at the start
         shape: Shape = Shape::Plain(PlainShape::Circle { center: Some([0.5, 0.5].into()), radius: 0.25 });
         /// spacing h of the underlying grid

@@ -3,6 +3,7 @@
 use crate::scene::cloud::PointsSource;
 use crate::scenes::pcp_spec::{Neighborhood, PcpSpec};
 use crate::scenes::shapes::Shape;
+use crate::spec::choice::with_defaults;
 use crate::spec::{Given, Interval, POSITIVE, Preset, whole};
 
 crate::choice! {
@@ -88,7 +89,7 @@ crate::group! {
         /// number of redistancings in a row
         repeat: u64 = 1, in whole(1, 1_000_000) => restart_safe;
         /// the method
-        method: Method = Method::Pcp { method: PcpSpec::default() };
+        method: Method = with_defaults("pcp");
         /// where to ask for the distance; with points of a file frames show those
         queries: Queries = Queries::Particles;
     }

@@ -1,6 +1,7 @@
 //! The parameters of a `surface_pde` scene.
 
 use crate::scene::cloud::PointsSource;
+use crate::spec::choice::with_defaults;
 use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Sign, whole};
 
 crate::choice! {
@@ -194,7 +195,7 @@ crate::choice! {
         /// two substances that react and diffuse
         ReactionDiffusion = "reaction_diffusion" {
             /// the reaction
-            model: ModelChoice = ModelChoice::Brusselator { a: 3.0, b: 9.0 };
+            model: ModelChoice = with_defaults("brusselator");
             /// diffusivity of the first substance
             diffusivity: f64 = 0.005, in POSITIVE;
             /// diffusivity of the second substance
@@ -325,7 +326,7 @@ crate::group! {
     /// Operators and equations on a surface that is known by points.
     pub struct SurfacePde {
         /// the surface, about the origin
-        surface: SurfaceChoice = SurfaceChoice::Sphere { radius: 1.0 };
+        surface: SurfaceChoice = with_defaults("sphere");
         /// dimension of the space: 2 for circles, of points when it is given, else 3
         dimension: Option<usize>, in whole(2, 3);
         /// number of points; of a bump about; 4000 when not given
@@ -335,9 +336,7 @@ crate::group! {
         /// what is computed
         problem: ProblemSpec = ProblemSpec::LaplaceBeltrami { field: None };
         /// the method
-        method: MethodSpec = MethodSpec::SurfaceDcpse {
-            order: 2, form: FormWord::Intrinsic, cutoff_dn: None, layers: None, normal_spacing: None,
-        };
+        method: MethodSpec = with_defaults("surface_dcpse");
         /// the normals that operators are made with; `given` for points, else `exact`, when not given
         normals: Option<NormalsChoice>;
         /// how systems of equations are solved: those of `poisson` and of `bdf2`

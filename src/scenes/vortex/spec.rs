@@ -5,6 +5,7 @@ use crate::scenes::gbpm_spec::GbpmSpec;
 use crate::scenes::integrators::IntegratorChoice;
 use crate::scenes::pcp_spec::{Neighborhood, PcpSpec};
 use crate::scenes::shapes::{PlainShape, Shape};
+use crate::spec::choice::with_defaults;
 use crate::spec::{Given, Interval, POSITIVE, Preset, Whole, whole};
 
 const STEPS: Whole = whole(1, 1_000_000_000);
@@ -63,7 +64,7 @@ crate::group! {
         /// 2 or 3; when not given, that of the shape, else 2
         dimension: Option<usize>, in whole(2, 3);
         /// the velocity field
-        flow: FlowChoice = FlowChoice::SingleVortex { period: Some(8.0) };
+        flow: FlowChoice = with_defaults("single_vortex");
         /// the surface at the start
         shape: Shape = Shape::Plain(PlainShape::Circle { center: Some([0.5, 0.75].into()), radius: 0.15 });
         /// distance h of neighboring particles

@@ -118,4 +118,6 @@ fn scenes_are_the_same_but_for_what_a_restart_may_change() {
     };
     assert!(is_same_scene(&body(8.0, 0.1), &body(9.0, 0.1)));
     assert!(!is_same_scene(&body(8.0, 0.1), &body(8.0, 0.2)));
+    let without_scene = serde_json::json!({"label": "x"});
+    assert!(!is_same_scene(&without_scene, &without_scene), "two bodies without a scene are not the same scene");
 }
