@@ -169,9 +169,28 @@ impl<const D: usize> CellList<D> {
         if self.is_wrapped { self.domain.wrap(x) } else { x }
     }
 
+    /// The displacement `to - from`, `wraps` as in [`Self::displacement`].
     #[inline(always)]
-    fn displacement(&self, from: &Vector<D>, to: &Vector<D>) -> Vector<D> {
-        if self.is_wrapped { self.domain.displacement(from, to) } else { to - from }
+    fn nearest_image(&self, from: &Vector<D>, to: &Vector<D>, wraps: bool) -> Vector<D> {
+        if wraps { self.displacement::<true>(from, to) } else { self.displacement::<false>(from, to) }
+    }
+
+    /// The displacement `to - from`. With `WRAPS` it is the shortest of all images; without it, no image may be nearer
+    /// (see [`Self::crosses_border`]), which saves a division along each axis.
+    #[inline(always)]
+    fn displacement<const WRAPS: bool>(&self, from: &Vector<D>, to: &Vector<D>) -> Vector<D> {
+        if WRAPS { self.domain.displacement(from, to) } else { to - from }
+    }
+
+    /// Whether a displacement between two points in the given spans of cells may have to be wrapped: a span reaches over
+    /// the border of a period, or is as long as half a period.
+    #[inline(always)]
+    fn crosses_border(&self, spans: &[(i64, i64); D]) -> bool {
+        let crosses = |d: usize| {
+            let ((first, last), count) = (spans[d], self.counts[d] as i64);
+            self.is_periodic(d) && (first < 0 || last >= count || 2 * (last - first + 1) >= count)
+        };
+        self.is_wrapped && (0..D).any(crosses)
     }
 
     /// Whether a span of a row contains so few points that narrowing it costs more than it saves.
@@ -257,12 +276,57 @@ impl<const D: usize> CellList<D> {
         }
     }
 
-    #[inline(always)]
     /// A cell index along axis d, wrapped into the grid.
+    #[inline(always)]
     fn wrapped(&self, index: i64, d: usize) -> usize {
         let count = self.counts[d] as i64;
         // The test avoids a division in the innermost loop.
         if (0..count).contains(&index) { index as usize } else { index.rem_euclid(count) as usize }
+    }
+
+    /// Appends the points of the given spans within `radius` of `x`; `WRAPS` as in [`Self::displacement`].
+    fn gather_in<const WRAPS: bool>(
+        &self,
+        x: &Vector<D>,
+        spans: &[(i64, i64); D],
+        radius: f64,
+        found: &mut Vec<Neighbor<D>>,
+    ) {
+        let limit = radius * radius;
+        let filler = Neighbor { r2: 0.0, index: 0, dx: Vector::<D>::zeros() };
+        self.for_each_range(spans, |from, to| {
+            let mut end = found.len();
+            // Each candidate is written to the slot of the next hit. A branch would be mispredicted half the time.
+            found.resize(end + (to - from), filler);
+            for (slot, position) in (from..to).zip(&self.sorted[from..to]) {
+                let dx = self.displacement::<WRAPS>(x, position);
+                let r2 = dx.norm_squared();
+                found[end] = Neighbor { r2, index: self.order[slot], dx };
+                end += usize::from(r2 <= limit);
+            }
+            found.truncate(end);
+        });
+    }
+
+    /// Calls `visit` with the points of the given spans within `radius` of `x`; `WRAPS` as in [`Self::displacement`].
+    #[inline]
+    fn for_each_in<const WRAPS: bool>(
+        &self,
+        x: &Vector<D>,
+        spans: &[(i64, i64); D],
+        radius: f64,
+        visit: &mut impl FnMut(usize, &Vector<D>, f64),
+    ) {
+        let limit = radius * radius;
+        self.for_each_range(spans, |from, to| {
+            for slot in from..to {
+                let dx = self.displacement::<WRAPS>(x, &self.sorted[slot]);
+                let r2 = dx.norm_squared();
+                if r2 <= limit {
+                    visit(self.order[slot], &dx, r2);
+                }
+            }
+        });
     }
 
     /// The spans of cells along all axes that can contain points within `radius` of `x`.
@@ -274,36 +338,24 @@ impl<const D: usize> CellList<D> {
 impl<const D: usize> NeighborSearch<D> for CellList<D> {
     fn gather(&self, x: &Vector<D>, radius: f64, found: &mut Vec<Neighbor<D>>) {
         let x = self.wrap(*x);
-        let limit = radius * radius;
-        let filler = Neighbor { r2: 0.0, index: 0, dx: Vector::<D>::zeros() };
+        let spans = self.spans(&x, radius);
         found.clear();
-        self.for_each_range(&self.spans(&x, radius), |from, to| {
-            let mut end = found.len();
-            // Each candidate is written to the slot of the next hit. A branch would be mispredicted half the time.
-            found.resize(end + (to - from), filler);
-            for (slot, position) in (from..to).zip(&self.sorted[from..to]) {
-                let dx = self.displacement(&x, position);
-                let r2 = dx.norm_squared();
-                found[end] = Neighbor { r2, index: self.order[slot], dx };
-                end += usize::from(r2 <= limit);
-            }
-            found.truncate(end);
-        });
+        if self.crosses_border(&spans) {
+            self.gather_in::<true>(&x, &spans, radius, found);
+        } else {
+            self.gather_in::<false>(&x, &spans, radius, found);
+        }
     }
 
     #[inline]
     fn for_each_within(&self, x: &Vector<D>, radius: f64, mut visit: impl FnMut(usize, &Vector<D>, f64)) {
         let x = self.wrap(*x);
-        let limit = radius * radius;
-        self.for_each_range(&self.spans(&x, radius), |from, to| {
-            for slot in from..to {
-                let dx = self.displacement(&x, &self.sorted[slot]);
-                let r2 = dx.norm_squared();
-                if r2 <= limit {
-                    visit(self.order[slot], &dx, r2);
-                }
-            }
-        });
+        let spans = self.spans(&x, radius);
+        if self.crosses_border(&spans) {
+            self.for_each_in::<true>(&x, &spans, radius, &mut visit);
+        } else {
+            self.for_each_in::<false>(&x, &spans, radius, &mut visit);
+        }
     }
 
     fn nearest(&self, x: &Vector<D>, cutoff: f64) -> Option<(usize, f64)> {
@@ -356,12 +408,14 @@ impl<const D: usize> CellList<D> {
     pub fn any_within(&self, x: &Vector<D>, radius: f64, condition: impl Fn(usize) -> bool) -> bool {
         let x = self.wrap(*x);
         let limit = radius * radius;
+        let spans = self.spans(&x, radius);
+        let wraps = self.crosses_border(&spans);
         let mut found = false;
-        self.for_each_range(&self.spans(&x, radius), |from, to| {
+        self.for_each_range(&spans, |from, to| {
             found = found
                 || (from..to).zip(&self.sorted[from..to]).any(|(slot, position)| {
                     // The condition is often cheaper than the distance.
-                    condition(slot) && self.displacement(&x, position).norm_squared() <= limit
+                    condition(slot) && self.nearest_image(&x, position, wraps).norm_squared() <= limit
                 });
         });
         found
@@ -395,12 +449,26 @@ impl<const D: usize> CellList<D> {
     #[must_use]
     pub fn nearest_from(&self, x: &Vector<D>, known: (usize, f64)) -> (usize, f64) {
         let x = self.wrap(*x);
-        let mut best = known;
         let spans = self.spans(&x, known.1.sqrt());
+        if self.crosses_border(&spans) {
+            self.nearest_in::<true>(&x, &spans, known)
+        } else {
+            self.nearest_in::<false>(&x, &spans, known)
+        }
+    }
+
+    /// The search of [`Self::nearest_from`] in spans of cells; `WRAPS` as in [`Self::displacement`].
+    fn nearest_in<const WRAPS: bool>(
+        &self,
+        x: &Vector<D>,
+        spans: &[(i64, i64); D],
+        known: (usize, f64),
+    ) -> (usize, f64) {
+        let mut best = known;
         // The indices of a span over a whole period do not tell the distance of its rows.
         let is_whole: [bool; D] =
             std::array::from_fn(|d| self.is_periodic(d) && spans[d].1 - spans[d].0 + 1 >= self.counts[d] as i64);
-        self.for_each_row(&spans, |row, base| {
+        self.for_each_row(spans, |row, base| {
             let mut row_distance = 0.0;
             for d in 1..D {
                 if !is_whole[d] {
@@ -416,13 +484,12 @@ impl<const D: usize> CellList<D> {
             let mut along = spans[0];
             if !is_whole[0] && !self.is_row_short(base, along) {
                 let cutoff = (best.1 - row_distance * (1.0 - 1e-9)).sqrt();
-                let narrow = self.span(&x, cutoff, 0);
+                let narrow = self.span(x, cutoff, 0);
                 along = (along.0.max(narrow.0), along.1.min(narrow.1));
             }
             self.for_each_part(base, along, |from, to| {
                 for (slot, position) in (from..to).zip(&self.sorted[from..to]) {
-                    let dx = self.displacement(&x, position);
-                    let r2 = dx.norm_squared();
+                    let r2 = self.displacement::<WRAPS>(x, position).norm_squared();
                     if r2 < best.1 || r2 <= best.1 && self.order[slot] < best.0 {
                         best = (self.order[slot], r2);
                     }
@@ -445,7 +512,9 @@ impl<const D: usize> CellList<D> {
         at: impl Fn(usize) -> Vector<D>,
     ) -> Option<(usize, f64)> {
         let nearest = match *last {
-            Some(point) => self.nearest_from(x, (point, self.displacement(x, &at(point)).norm_squared())),
+            Some(point) => {
+                self.nearest_from(x, (point, self.nearest_image(x, &at(point), self.is_wrapped).norm_squared()))
+            }
             // The plain search respects the cutoff itself.
             None => self.nearest(x, cutoff).map(|(point, distance)| (point, distance * distance))?,
         };

@@ -7,7 +7,7 @@ mod preset;
 pub mod spec;
 
 use crate::scene::{self, Quantities, SceneKind};
-use crate::schemes::weakly_compressible_sph::quantities as own;
+use crate::schemes::weakly_compressible_sph::{frame_fields, quantities as own};
 use crate::spec::Group;
 
 /// The kind of scene named `droplet`.
@@ -19,7 +19,7 @@ pub static KIND: SceneKind = SceneKind {
     declarations: spec::Droplet::declarations,
     parse: scene::parse_as::<spec::Droplet>,
     quantities: || Quantities {
-        fields: own::all_fields(),
+        fields: frame_fields::all(),
         observables: own::OBSERVABLES.to_vec(),
         norms: own::norms(),
     },

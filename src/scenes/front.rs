@@ -12,7 +12,7 @@ pub(super) use plan::plan_front;
 pub(super) use spec::Law;
 
 use crate::scene::{self, Quantities, SceneKind};
-use crate::schemes::grid_based_particle::quantities as own;
+use crate::schemes::grid_based_particle::{frame_fields, quantities as own};
 use crate::spec::Group;
 
 /// The kind of scene named `front`.
@@ -24,7 +24,7 @@ pub static KIND: SceneKind = SceneKind {
     declarations: spec::Front::declarations,
     parse: scene::parse_as::<spec::Front>,
     quantities: || Quantities {
-        fields: own::all_fields(),
+        fields: frame_fields::all(),
         observables: own::OBSERVABLES.to_vec(),
         norms: own::norms(),
     },

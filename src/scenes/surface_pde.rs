@@ -9,7 +9,7 @@ mod surfaces;
 
 use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::embedding_closest_point::quantities as embedding;
-use crate::schemes::surface_equation::quantities as own;
+use crate::schemes::surface_equation::{self, quantities as own};
 use crate::simulation::quantity::without_repetition;
 use crate::spec::Group;
 
@@ -22,7 +22,7 @@ pub static KIND: SceneKind = SceneKind {
     declarations: spec::SurfacePde::declarations,
     parse: scene::parse_as::<spec::SurfacePde>,
     quantities: || Quantities {
-        fields: own::all_fields(),
+        fields: surface_equation::all_fields(),
         observables: without_repetition(&[own::OBSERVABLES, embedding::OBSERVABLES]),
         norms: without_repetition(&[&own::norms(), embedding::NORMS]),
     },

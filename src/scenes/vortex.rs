@@ -19,8 +19,8 @@ pub static KIND: SceneKind = SceneKind {
     parse: scene::parse_as::<spec::Vortex>,
     quantities: || Quantities {
         fields: without_repetition(&[
-            &advected_level_set::quantities::fields(FieldChoice::Dual),
-            &grid_based_particle::quantities::all_fields(),
+            &advected_level_set::frame_fields::shown(FieldChoice::Dual),
+            &grid_based_particle::frame_fields::all(),
         ]),
         observables: without_repetition(&[
             advected_level_set::quantities::OBSERVABLES,

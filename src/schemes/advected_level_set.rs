@@ -2,6 +2,7 @@
 
 mod errors;
 mod format_1;
+pub mod frame_fields;
 pub mod quantities;
 mod simulation;
 mod system;

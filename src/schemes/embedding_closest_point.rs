@@ -4,7 +4,10 @@
 
 mod band;
 mod format_1;
+mod frame_fields;
 pub mod quantities;
 mod simulation;
+mod surface_data;
 
-pub use simulation::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
+pub use simulation::{EmbeddingClosestPoint, EmbeddingParts};
+pub use surface_data::SurfaceData;

@@ -6,6 +6,7 @@
 //! | file | content |
 //! | --- | --- |
 //! | `system`, `simulation` | the front and its steps; the simulation |
+//! | `frame_fields`, `quantities` | what frames show; what series and reports show |
 //! | `config`, `method` | the configuration of a front; the parameters of the method |
 //! | `laws` | what moves a front, one file a law |
 //! | `placement`, `corners`, `wavefront` | foot points at the start; corners that open; wave fronts of optics |
@@ -26,6 +27,7 @@ mod exact_front;
 mod fixtures;
 mod foot_points;
 mod format_1;
+pub mod frame_fields;
 mod gaps;
 mod grid;
 pub mod laws;

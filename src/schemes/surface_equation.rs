@@ -3,6 +3,10 @@
 //! One simulation ([`simulation`]) keeps the cloud, constructs the operators that its problem asks for and lets the problem
 //! step; one file a problem.
 
+use crate::simulation::Quantity;
+use crate::simulation::fields::COMMON_FIELDS;
+use crate::simulation::quantity::without_repetition;
+
 mod cloud;
 mod curvature;
 mod evolution;
@@ -28,3 +32,16 @@ pub use problem::Problem;
 pub use reactions::{Model, Reaction};
 pub use simulation::SurfaceEquation;
 pub use solver::Solver;
+
+/// Every field that frames of this scheme may show.
+#[must_use]
+pub fn all_fields() -> Vec<&'static Quantity> {
+    without_repetition(&[
+        &Evolution::shown_fields(true, true),
+        &Pointwise::shown_fields(true),
+        &Poisson::shown_fields(true),
+        &Curvature::shown_fields(),
+        &[&quantities::NORMAL, &quantities::CURVATURE],
+        COMMON_FIELDS,
+    ])
+}

@@ -13,7 +13,7 @@
 //! | the interface and what it encloses | `interface`, `droplets`, `strays` |
 //! | one evaluation | `system` |
 //! | steps in time | `stepping`, [`time_step`] |
-//! | the simulation and its figures | `simulation`, `pacing`, `monitors`, `summary` |
+//! | the simulation and what it shows | `simulation`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
 
 mod column;
 pub mod config;
@@ -23,6 +23,7 @@ mod equations;
 mod flow_state;
 pub mod fluids;
 mod format_1;
+pub mod frame_fields;
 mod interactions;
 mod interface;
 mod kernel_choice;

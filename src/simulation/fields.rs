@@ -72,6 +72,42 @@ pub struct Field {
     pub values: FieldValues,
 }
 
+/// A field of a scheme: its quantity, when frames show it, and how its values are computed. A scheme lists its fields in
+/// one table, so that a new field is one entry.
+///
+/// `C` is the choice that decides which fields there are, known before a run; `S` is the state that frames show.
+pub struct FrameField<C, S> {
+    quantity: &'static Quantity,
+    is_shown: fn(&C) -> bool,
+    values: fn(&S) -> FieldValues,
+}
+
+impl<C, S> FrameField<C, S> {
+    /// A field of every frame.
+    #[must_use]
+    pub fn new(quantity: &'static Quantity, values: fn(&S) -> FieldValues) -> Self {
+        Self { quantity, is_shown: |_| true, values }
+    }
+
+    /// The same field, but only with certain choices.
+    #[must_use]
+    pub fn only_if(self, is_shown: fn(&C) -> bool) -> Self {
+        Self { is_shown, ..self }
+    }
+}
+
+/// The quantities of all fields of a table.
+#[must_use]
+pub fn quantities_of<C, S>(table: &[FrameField<C, S>]) -> Vec<&'static Quantity> {
+    table.iter().map(|field| field.quantity).collect()
+}
+
+/// The quantities of those fields of a table that frames show with a choice.
+#[must_use]
+pub fn shown_quantities<C, S>(table: &[FrameField<C, S>], choice: &C) -> Vec<&'static Quantity> {
+    table.iter().filter(|field| (field.is_shown)(choice)).map(|field| field.quantity).collect()
+}
+
 /// The values of a field.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FieldValues {
@@ -81,6 +117,14 @@ pub enum FieldValues {
     Vector(Vec<[f64; 3]>),
     /// One whole number at each point.
     Id(Vec<u64>),
+}
+
+impl FieldValues {
+    /// Vectors of a space of D dimensions.
+    #[must_use]
+    pub fn vectors<const D: usize>(values: impl Iterator<Item = Vector<D>>) -> Self {
+        Self::Vector(values.map(|v| embed(&v)).collect())
+    }
 }
 
 /// A vector with its missing components set to zero.
@@ -107,7 +151,14 @@ impl<'a> Fields<'a> {
         quantity: &'static Quantity,
         values: impl FnOnce() -> I,
     ) {
-        self.add(quantity, || FieldValues::Vector(values().map(|v| embed(&v)).collect()));
+        self.add(quantity, || FieldValues::vectors(values()));
+    }
+
+    /// Adds the fields of a scheme's table that frames show with a choice, if they are wanted.
+    pub fn add_table<C, S>(&mut self, table: &[FrameField<C, S>], choice: &C, state: &S) {
+        for field in table.iter().filter(|field| (field.is_shown)(choice)) {
+            self.add(field.quantity, || (field.values)(state));
+        }
     }
 
     /// Adds the numbers of the particles, if they are wanted.

@@ -358,7 +358,7 @@ impl<const D: usize> Scene for DropletScene<D> {
     }
 
     fn fields(&self) -> Vec<&'static Quantity> {
-        weakly_compressible_sph::quantities::fields(&self.config)
+        weakly_compressible_sph::frame_fields::shown(&self.config)
     }
 
     fn clouds(&self) -> Vec<CloudReference> {

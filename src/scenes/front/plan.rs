@@ -164,7 +164,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     }
 
     fn fields(&self) -> Vec<&'static Quantity> {
-        grid_based_particle::quantities::fields(D, false, &self.plan.chosen.segments)
+        grid_based_particle::frame_fields::shown(D, false, &self.plan.chosen.segments)
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {

@@ -111,7 +111,7 @@ impl Scene for WavefrontScene {
     }
 
     fn fields(&self) -> Vec<&'static Quantity> {
-        grid_based_particle::quantities::fields(3, true, &self.plan.chosen.segments)
+        grid_based_particle::frame_fields::shown(3, true, &self.plan.chosen.segments)
     }
 
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {

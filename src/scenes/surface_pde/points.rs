@@ -1,5 +1,6 @@
-//! A surface that is known by points from outside alone: read, examined, given normals where it has none. Nothing is known
-//! of it exactly, so that no error is reported and what wants an exact answer was refused before.
+//! A surface that is given by uploaded points: they are read and examined, and normals are estimated where none came with
+//! them. No exact answer is known on such a surface. Its report has no errors, and the plan refuses problems that need an
+//! exact answer.
 
 use super::plan::{Normals, Scheme, SurfaceScene, choices};
 use super::surfaces::{Extent, Sampling, Shape};
@@ -14,12 +15,12 @@ use crate::simulation::{Finding, Mark, Simulation};
 use crate::spec::Violation;
 use serde_json::Value;
 
-/// Where a scene names them.
+/// Place of the points in a scene.
 const PLACE: &str = "/surface";
 
-/// 1. Points and the normals that came with them are read. 2. The points are examined; their spacing is known now.
-/// 3. Method and problem are understood again, by it. 4. Normals are estimated where none came. 5. What is wrong with both
-///    becomes findings.
+/// 1. Reads the points and the normals that came with them. 2. Examines the points, which gives their spacing. 3. Plans
+///    method and problem anew with that spacing. 4. Estimates normals where none came. 5. Reports flaws of points and normals
+///    as findings.
 pub(super) fn build<const D: usize, const M: usize>(
     scene: &SurfaceScene,
     context: BuildContext,

@@ -10,9 +10,6 @@ use crate::geometry::random::CounterRandom;
 use crate::linear_algebra::krylov::Stopping;
 use crate::operators::charts::tangent::Metric;
 use crate::scene::work::PhaseWork;
-use crate::schemes::surface_equation::quantities::{
-    FIELD, GAUSS_CURVATURE, MEAN_CURVATURE, REFERENCE, SECOND_VALUE, VALUE,
-};
 use crate::schemes::surface_equation::{
     Condition, Curvature, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, ExactField, Model, Pointwise,
     Poisson, Problem, Reaction, Solver, SurfaceCloud,
@@ -312,20 +309,18 @@ impl ProblemChoice {
 
     /// Fields that frames show of it.
     pub fn fields(&self, shape: &Shape) -> Vec<&'static Quantity> {
+        let is_exact = !matches!(shape, Shape::Points(_));
         match self {
-            Self::LaplaceBeltrami { .. } | Self::Poisson { .. } if matches!(shape, Shape::Points(_)) => {
-                vec![&VALUE, &FIELD]
+            Self::LaplaceBeltrami { .. } => Pointwise::shown_fields(is_exact),
+            Self::Poisson { .. } => Poisson::shown_fields(is_exact),
+            Self::Curvature { .. } => Curvature::shown_fields(),
+            Self::Evolution { start: Start::Field(field), .. } => Evolution::shown_fields(
+                false,
+                matches!(field, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. }),
+            ),
+            Self::Evolution { start: Start::Reaction { manufactured, .. }, .. } => {
+                Evolution::shown_fields(true, manufactured.is_some())
             }
-            Self::LaplaceBeltrami { .. } | Self::Poisson { .. } => vec![&VALUE, &FIELD, &REFERENCE],
-            Self::Curvature { .. } => vec![&MEAN_CURVATURE, &GAUSS_CURVATURE],
-            Self::Evolution { start: Start::Field(field), .. } => match field {
-                ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. } => vec![&VALUE, &REFERENCE],
-                _ => vec![&VALUE],
-            },
-            Self::Evolution { start: Start::Reaction { manufactured, .. }, .. } => match manufactured {
-                Some(_) => vec![&VALUE, &SECOND_VALUE, &REFERENCE],
-                None => vec![&VALUE, &SECOND_VALUE],
-            },
         }
     }
 

@@ -276,7 +276,7 @@ impl<const D: usize> Scene for VortexScene<D> {
     }
 
     fn fields(&self) -> Vec<&'static Quantity> {
-        advected_level_set::quantities::fields(self.field)
+        advected_level_set::frame_fields::shown(self.field)
     }
 
     fn clouds(&self) -> Vec<CloudReference> {

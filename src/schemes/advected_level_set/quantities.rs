@@ -1,10 +1,8 @@
-//! What frames, series and reports of an advected level set show.
+//! What series and reports of an advected level set show.
 
-use super::system::FieldChoice;
 use crate::schemes::measured_errors;
 use crate::simulation::Quantity;
-use crate::simulation::fields::{COMMON_FIELDS, SURFACE_FIELDS};
-use crate::simulation::quantity::{quantities, without_repetition};
+use crate::simulation::quantity::quantities;
 
 quantities! {
     /// Scalars of the series.
@@ -20,24 +18,6 @@ quantities! {
     }
 }
 
-quantities! {
-    /// Fields of frames that only this scheme has.
-    pub OWN_FIELDS {
-        VELOCITY = "velocity", "length/time", "Velocity of the flow at the particle.";
-        PSI = "psi", "length", "Level that the particle carries unchanged.";
-    }
-}
-
 /// Norms of the report.
 pub static NORMS: &[&Quantity] =
     &[&measured_errors::RMS, &measured_errors::MAX, &measured_errors::MEAN, &measured_errors::RELATIVE];
-
-/// Fields of frames.
-#[must_use]
-pub fn fields(choice: FieldChoice) -> Vec<&'static Quantity> {
-    let mut fields = without_repetition(&[SURFACE_FIELDS, &[&VELOCITY], COMMON_FIELDS]);
-    if choice == FieldChoice::Dual {
-        fields.push(&PSI);
-    }
-    fields
-}

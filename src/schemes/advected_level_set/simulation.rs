@@ -2,10 +2,9 @@
 
 use super::errors::{DistanceErrors, MeasuredErrors};
 use super::format_1;
-use super::quantities::{
-    AREA, BAND_PARTICLES, CFL, PSI, RESCUED_FITS, TIME, TIME_STEP, VELOCITY, VOLUME, VOLUME_DRIFT,
-};
-use super::system::{AdvectedSystem, FieldChoice, RedistanceWhen};
+use super::frame_fields;
+use super::quantities::{AREA, BAND_PARTICLES, CFL, RESCUED_FITS, TIME, TIME_STEP, VOLUME, VOLUME_DRIFT};
+use super::system::{AdvectedSystem, RedistanceWhen};
 use crate::closest_point::enclosed_moments::enclosed_area_or_volume;
 use crate::closest_point::{FitDiagnostics, LevelSurface};
 use crate::geometry::Vector;
@@ -233,15 +232,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
                 Err(Interrupted) => &self.system.particles,
             }
         };
-        let mut fields = Fields::new(particles.positions(), selection);
-        fields.surface(particles, &self.system.columns, true);
-        if self.system.parts.field == FieldChoice::Dual {
-            fields.scalar(&PSI, || particles.scalar(self.system.psi).to_vec());
-        }
-        let (flow, time) = (self.system.motion.flow(), self.clock().time);
-        fields.vector(&VELOCITY, || particles.positions().iter().map(|x| flow.velocity(x, time)));
-        fields.particle_id();
-        fields
+        frame_fields::frame(&self.system, particles, self.clock().time, selection)
     }
 
     fn save(&self, state: &mut Section) {

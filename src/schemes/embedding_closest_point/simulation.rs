@@ -2,7 +2,9 @@
 
 use super::band::{Band, Places, inner_half_width};
 use super::format_1;
-use super::quantities::{CURVATURE, ERROR_MAX, ERROR_RELATIVE, FIELD, NORMAL, REFERENCE, TIME, VALUE};
+use super::frame_fields;
+use super::quantities::{ERROR_MAX, ERROR_RELATIVE, TIME};
+use super::surface_data::SurfaceData;
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
 use crate::schemes::measured_errors::against_exact;
@@ -41,21 +43,6 @@ impl EmbeddingParts {
         let cells: f64 = (high - low).iter().map(|side| side / spacing + 2.0 * half + 3.0).product();
         300.0 * nodes + 4.0 * cells
     }
-}
-
-/// The points of a surface and what is known there.
-#[derive(Debug, Clone, Default)]
-pub struct SurfaceData {
-    /// Positions of the points.
-    pub points: Vec<Vector<3>>,
-    /// Unit normals at the points.
-    pub normals: Vec<Vector<3>>,
-    /// Curvature ∇·n at the points.
-    pub curvatures: Vec<f64>,
-    /// Values of the field at the points.
-    pub field: Vec<f64>,
-    /// Exact Laplace–Beltrami operator of the field at the points.
-    pub reference: Vec<f64>,
 }
 
 /// A field on a surface, anywhere on it.
@@ -157,17 +144,9 @@ impl Simulation for EmbeddingClosestPoint {
     }
 
     fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
-        let SurfaceData { points, normals, curvatures, field, reference } = &self.data;
-        let mut fields = Fields::new(points, selection);
         // Nothing is computed before the first step.
-        let is_begun = self.course.step > 0;
-        fields.scalar(&VALUE, || if is_begun { self.value.clone() } else { vec![f64::NAN; self.value.len()] });
-        fields.scalar(&FIELD, || field.clone());
-        fields.scalar(&REFERENCE, || reference.clone());
-        fields.vector(&NORMAL, || normals.iter().copied());
-        fields.scalar(&CURVATURE, || curvatures.clone());
-        fields.particle_id();
-        fields
+        let value = (self.course.step > 0).then_some(self.value.as_slice());
+        frame_fields::frame(&self.data, value, selection)
     }
 
     fn save(&self, state: &mut Section) {

@@ -1,9 +1,7 @@
-//! What frames, series and reports of a front show.
+//! What series and reports of a front show.
 
-use super::segments::Segments;
 use crate::schemes::measured_errors;
 use crate::simulation::Quantity;
-use crate::simulation::fields::COMMON_FIELDS;
 use crate::simulation::quantity::{quantities, without_repetition};
 
 quantities! {
@@ -18,20 +16,6 @@ quantities! {
         UNRESOLVED = "unresolved", "", "Grid points so far that got no foot-point.";
         SWEPT = "swept", "", "Particles so far that another segment has passed.";
         KEPT = "kept", "", "Moved particles so far that stayed for want of a reconstruction.";
-    }
-}
-
-quantities! {
-    /// Fields of frames that only this scheme has.
-    pub OWN_FIELDS {
-        NORMAL = "normal", "", "Unit normal of the front, outward; of a wave front its direction of travel.";
-        CURVATURE = "curvature", "1/length", "Divergence of the unit normal.";
-        GAUSS_CURVATURE = "gauss_curvature", "1/length^2", "Product of the principal curvatures.";
-        VELOCITY = "velocity", "length/time", "Velocity of the front at the particle.";
-        GRID_POINT = "grid_point", "length", "Grid point whose closest point the particle is.";
-        LEVEL = "level", "", "Level of refinement of the grid point.";
-        PARAMETER = "parameter", "", "Position along its closed part of the front at the start, from 0 to 1.";
-        SEGMENT = "segment", "", "Number of its closed part of the front at the start.";
     }
 }
 
@@ -53,24 +37,4 @@ pub fn norms() -> Vec<&'static Quantity> {
     let shared: &[&Quantity] =
         &[&measured_errors::RMS, &measured_errors::MAX, &measured_errors::MEAN, &measured_errors::ABSOLUTE];
     without_repetition(&[shared, OWN_NORMS])
-}
-
-/// Every field that frames of this scheme may show.
-#[must_use]
-pub fn all_fields() -> Vec<&'static Quantity> {
-    without_repetition(&[OWN_FIELDS, COMMON_FIELDS])
-}
-
-/// Fields of frames of a surface or curve in D dimensions; `is_curve_in_space` for wave fronts.
-#[must_use]
-pub fn fields(dimension: usize, is_curve_in_space: bool, segments: &Segments) -> Vec<&'static Quantity> {
-    let mut fields = vec![&NORMAL, &CURVATURE, &VELOCITY, &GRID_POINT, &LEVEL, &SEGMENT];
-    fields.extend(COMMON_FIELDS);
-    if dimension == 3 && !is_curve_in_space {
-        fields.push(&GAUSS_CURVATURE);
-    }
-    if segments.parameter.is_some() {
-        fields.push(&PARAMETER);
-    }
-    fields
 }

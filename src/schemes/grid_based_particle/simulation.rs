@@ -5,11 +5,10 @@ use super::errors::{FrontErrors, front_errors};
 use super::exact_front::{ExactFrontMotion, Moment};
 use super::foot_points::FootPoints;
 use super::format_1;
-use super::grid::Grid;
+use super::frame_fields;
 use super::quantities;
 use super::removals::Removals;
 use super::system::FrontSystem;
-use crate::geometry::Vector;
 use crate::geometry::surfaces::Ball;
 use crate::schemes::measured_errors::entry;
 use crate::simulation::course::is_finite;
@@ -108,11 +107,6 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
             self.course.findings.push(finding.with_advice("a smaller spacing resolves the front"));
         }
     }
-
-    /// Velocity of particle i at the present time.
-    fn velocity(&self, i: usize) -> Vector<D> {
-        self.system.config.law.velocity(&self.system.feet, i, self.clock().time)
-    }
 }
 
 impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
@@ -173,28 +167,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
     }
 
     fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
-        let feet = &self.system.feet;
-        let grid = self.system.config.grid;
-        let mut fields = Fields::new(&feet.positions, selection);
-        // The normal of a wave front is its direction of travel.
-        let is_curve_in_space = D - M == 2;
-        let travel = |i: usize| self.velocity(i).try_normalize(0.0).unwrap_or(feet.normals[i]);
-        let normal = |i: usize| if is_curve_in_space { travel(i) } else { feet.normals[i] };
-        fields.vector(&quantities::NORMAL, || (0..feet.len()).map(normal));
-        fields.scalar(&quantities::CURVATURE, || feet.curvatures.clone());
-        if D == 3 && !is_curve_in_space {
-            // Shapes do not tell their Gauss curvature.
-            let known = |value: &f64| if self.course.step > 0 { *value } else { f64::NAN };
-            fields.scalar(&quantities::GAUSS_CURVATURE, || feet.gauss_curvatures.iter().map(known).collect());
-        }
-        fields.vector(&quantities::VELOCITY, || (0..feet.len()).map(|i| self.velocity(i)));
-        fields.vector(&quantities::GRID_POINT, || feet.nodes.iter().map(|node| grid.place::<D>(*node)));
-        fields.scalar(&quantities::LEVEL, || feet.nodes.iter().map(|node| f64::from(Grid::level(*node))).collect());
-        if self.system.config.segments.parameter.is_some() {
-            fields.scalar(&quantities::PARAMETER, || feet.parameters.clone());
-        }
-        fields.scalar(&quantities::SEGMENT, || feet.parts.iter().map(|part| f64::from(*part)).collect());
-        fields.particle_id();
+        let mut fields = frame_fields::frame(&self.system, self.clock(), selection);
         if !self.ends.is_empty() {
             fields.marks.push(Mark { code: "front_open", points: self.ends.clone() });
         }

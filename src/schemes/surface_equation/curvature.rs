@@ -5,12 +5,21 @@ use super::cloud::SurfaceCloud;
 use super::format_1;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
-use super::quantities::{CURVATURE_MEAN, GAUSS_CURVATURE, GAUSS_INTEGRAL, MEAN_CURVATURE};
+use super::quantities::{CURVATURE_MEAN, GAUSS_INTEGRAL};
 use crate::operators::{derivative_tensor, divergence, sum_of_minors};
 use crate::schemes::measured_errors::against_exact;
+use crate::simulation::quantity::quantities;
 use crate::simulation::{ErrorEntry, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
+
+quantities! {
+    /// Fields that frames show.
+    FIELDS {
+        MEAN_CURVATURE = "mean_curvature", "1/length", "Computed mean curvature; NaN before the first step.";
+        GAUSS_CURVATURE = "gauss_curvature", "1/length^2", "Computed Gauss curvature; NaN before the first step.";
+    }
+}
 
 /// Computed curvatures.
 #[derive(Debug, Default)]
@@ -22,6 +31,12 @@ pub struct Curvature {
 }
 
 impl Curvature {
+    /// The fields that frames show, the surface's own excepted.
+    #[must_use]
+    pub fn shown_fields() -> Vec<&'static Quantity> {
+        FIELDS.to_vec()
+    }
+
     /// Of so many points; `of_heights`: heights are fitted.
     #[must_use]
     pub fn new(rows: usize, of_heights: bool) -> Self {
@@ -57,7 +72,7 @@ impl<const D: usize> Problem<D> for Curvature {
     }
 
     fn columns(&self) -> Vec<&'static Quantity> {
-        vec![&MEAN_CURVATURE, &GAUSS_CURVATURE]
+        Self::shown_fields()
     }
 
     fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {

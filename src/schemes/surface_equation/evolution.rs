@@ -6,7 +6,7 @@ use super::cloud::SurfaceCloud;
 use super::format_1;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
-use super::quantities::{INTEGRAL, LARGEST, LEAST, PROBES, RATE, REFERENCE, SECOND_VALUE, VALUE};
+use super::quantities::{INTEGRAL, LARGEST, LEAST, PROBES, RATE, REFERENCE, VALUE};
 use super::reactions::Reaction;
 use super::solver::{Factors, Solver, Workspace};
 use crate::linear_algebra::SparseRows;
@@ -18,6 +18,10 @@ use crate::time::Clock;
 use crate::time::embedded_pair::EmbeddedPair;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use std::collections::BTreeMap;
+
+/// Computed value of the second substance.
+static SECOND_VALUE: Quantity =
+    Quantity { name: "second_value", unit: "of the field", doc: "Computed value of the second substance." };
 
 /// How time is integrated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -229,6 +233,15 @@ impl Evolution {
         }
     }
 
+    /// The fields that frames show, the surface's own excepted.
+    #[must_use]
+    pub fn shown_fields(has_second_value: bool, has_reference: bool) -> Vec<&'static Quantity> {
+        let mut fields = vec![&VALUE];
+        fields.extend(has_second_value.then_some(&SECOND_VALUE));
+        fields.extend(has_reference.then_some(&REFERENCE));
+        fields
+    }
+
     /// Whether [`Self::reference`] knows one.
     fn has_reference(&self) -> bool {
         match self.parts.exact {
@@ -308,14 +321,7 @@ impl<const D: usize> Problem<D> for Evolution {
     }
 
     fn columns(&self) -> Vec<&'static Quantity> {
-        let mut columns = vec![&VALUE];
-        if self.fields() == 2 {
-            columns.push(&SECOND_VALUE);
-        }
-        if self.has_reference() {
-            columns.push(&REFERENCE);
-        }
-        columns
+        Self::shown_fields(self.fields() == 2, self.has_reference())
     }
 
     fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {

@@ -19,6 +19,12 @@ pub struct Pointwise {
 }
 
 impl Pointwise {
+    /// The fields that frames show, the surface's own excepted.
+    #[must_use]
+    pub fn shown_fields(has_reference: bool) -> Vec<&'static Quantity> {
+        if has_reference { vec![&VALUE, &FIELD, &REFERENCE] } else { vec![&VALUE, &FIELD] }
+    }
+
     /// At the start: nothing is computed yet.
     #[must_use]
     pub fn new(field: Vec<f64>, reference: Option<Vec<f64>>) -> Self {
@@ -39,9 +45,7 @@ impl<const D: usize> Problem<D> for Pointwise {
     }
 
     fn columns(&self) -> Vec<&'static Quantity> {
-        let mut columns = vec![&VALUE, &FIELD];
-        columns.extend(self.reference.as_ref().map(|_| &REFERENCE));
-        columns
+        Self::shown_fields(self.reference.is_some())
     }
 
     fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {

@@ -38,6 +38,12 @@ pub struct Poisson {
 }
 
 impl Poisson {
+    /// The fields that frames show, the surface's own excepted.
+    #[must_use]
+    pub fn shown_fields(has_reference: bool) -> Vec<&'static Quantity> {
+        if has_reference { vec![&VALUE, &FIELD, &REFERENCE] } else { vec![&VALUE, &FIELD] }
+    }
+
     /// Δ_S u = `right` with the solution `exact`. Without a mean the system takes from `right` what no solution has.
     #[must_use]
     pub fn new(right: Vec<f64>, mut exact: Option<Vec<f64>>, condition: Condition, solver: Solver) -> Self {
@@ -109,9 +115,7 @@ impl<const D: usize> Problem<D> for Poisson {
     }
 
     fn columns(&self) -> Vec<&'static Quantity> {
-        let mut columns = vec![&VALUE, &FIELD];
-        columns.extend(self.exact.as_ref().map(|_| &REFERENCE));
-        columns
+        Self::shown_fields(self.exact.is_some())
     }
 
     fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {

@@ -2,7 +2,6 @@
 
 use crate::schemes::measured_errors;
 use crate::simulation::Quantity;
-use crate::simulation::fields::COMMON_FIELDS;
 use crate::simulation::quantity::{quantities, without_repetition};
 
 quantities! {
@@ -26,14 +25,11 @@ quantities! {
 }
 
 quantities! {
-    /// Fields of frames, of all problems together.
+    /// Fields of frames that several problems show. A problem declares its own fields in its file.
     pub FIELDS {
         VALUE = "value", "of the field", "Computed value; of two substances that of the first. NaN before the first step.";
-        SECOND_VALUE = "second_value", "of the field", "Computed value of the second substance.";
         FIELD = "field", "of the field", "Given field, or right-hand side.";
         REFERENCE = "reference", "of the field", "Exact value at the point.";
-        MEAN_CURVATURE = "mean_curvature", "1/length", "Computed mean curvature; NaN before the first step.";
-        GAUSS_CURVATURE = "gauss_curvature", "1/length^2", "Computed Gauss curvature; NaN before the first step.";
         NORMAL = "normal", "", "Unit normal at the point, outward.";
         CURVATURE = "curvature", "1/length", "Exact divergence of the unit normal at the point.";
     }
@@ -58,10 +54,4 @@ pub(super) static PROBES: [&Quantity; 3] = [&PROBE_0, &PROBE_1, &PROBE_2];
 pub fn norms() -> Vec<&'static Quantity> {
     let shared: &[&Quantity] = &[&measured_errors::MAX, &measured_errors::RELATIVE, &measured_errors::MAX_RELATIVE];
     without_repetition(&[shared, OWN_NORMS])
-}
-
-/// Every field that frames of this scheme may show.
-#[must_use]
-pub fn all_fields() -> Vec<&'static Quantity> {
-    without_repetition(&[FIELDS, COMMON_FIELDS])
 }

@@ -1,9 +1,7 @@
-//! What frames, series and reports of two fluids show.
+//! What series and reports of two fluids show.
 
-use super::config::{Geometry, SphConfig};
 use crate::schemes::measured_errors;
 use crate::simulation::Quantity;
-use crate::simulation::fields::{COMMON_FIELDS, CURVATURE, NORMAL, SURFACE_FIELDS};
 use crate::simulation::quantity::{quantities, without_repetition};
 
 quantities! {
@@ -33,17 +31,6 @@ quantities! {
         MACH = "mach", "", "Largest speed by the lower speed of sound.";
         CFL = "cfl", "spacings", "Longest way of a particle in a part of the last step.";
         LEAST_PAIR_DISTANCE_H = "least_pair_distance_h", "spacings", "Least distance of two particles.";
-    }
-}
-
-quantities! {
-    /// Fields of frames that only this scheme has.
-    pub OWN_FIELDS {
-        VELOCITY = "velocity", "length/time", "Velocity of the particle.";
-        DENSITY = "density", "mass/length^D", "Mass density at the particle.";
-        PRESSURE = "pressure", "mass/(length*time^2)", "Pressure, with the part of surface tension that it balances.";
-        PHASE = "phase", "", "Fluid of the particle: 1 inside, 0 outside.";
-        MASS = "mass", "mass", "Mass of the particle.";
     }
 }
 
@@ -88,28 +75,4 @@ pub(super) static EXTREMES: [&Quantity; MOST_TURNS] =
 pub fn norms() -> Vec<&'static Quantity> {
     let shared: &[&Quantity] = &[&measured_errors::MAX, &measured_errors::MEAN, &measured_errors::RELATIVE];
     without_repetition(&[shared, OWN_NORMS])
-}
-
-/// Every field that frames of this scheme may show.
-#[must_use]
-pub fn all_fields() -> Vec<&'static Quantity> {
-    without_repetition(&[SURFACE_FIELDS, OWN_FIELDS, COMMON_FIELDS])
-}
-
-/// Fields of frames.
-#[must_use]
-pub fn fields<const D: usize>(config: &SphConfig<D>) -> Vec<&'static Quantity> {
-    let mut fields: Vec<&'static Quantity> = Vec::new();
-    if config.has_tension() {
-        match config.geometry {
-            Geometry::Pcp { .. } => fields.extend(SURFACE_FIELDS),
-            Geometry::ColorField => fields.extend([&NORMAL, &CURVATURE]),
-        }
-    }
-    fields.extend([&VELOCITY, &DENSITY, &PRESSURE, &PHASE]);
-    if !config.fluids.have_one_mass() {
-        fields.push(&MASS);
-    }
-    fields.extend(COMMON_FIELDS);
-    fields
 }

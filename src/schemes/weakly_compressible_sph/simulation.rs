@@ -2,10 +2,11 @@
 
 use super::droplets::ball_curvature;
 use super::format_1;
+use super::frame_fields;
 use super::interface::LevelSet;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
-use super::quantities::{DENSITY, MASS, PHASE, PRESSURE, TIME, TIME_STEP, VELOCITY};
+use super::quantities::{TIME, TIME_STEP};
 use super::species::Species;
 use super::stepping::Stepper;
 use super::summary::Summary;
@@ -16,7 +17,6 @@ use crate::operators::SupportDiagnostics;
 use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, support_diagnostics};
 use crate::simulation::components::{check_particles, load_particles, save_particles};
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
-use crate::simulation::fields::{CURVATURE, NORMAL};
 use crate::simulation::section::{copy_vectors, known};
 use crate::simulation::{
     Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Report,
@@ -250,30 +250,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn fields<'a>(&self, selection: Selection<'a>) -> Fields<'a> {
-        let system = &self.system;
-        let mut fields = Fields::new(system.particles.positions(), selection);
-        if system.config.has_tension() {
-            if system.interface.level_set().is_some() {
-                fields.surface(&system.particles, &system.columns, true);
-            } else {
-                let band = system.particles.flag(system.columns.in_band);
-                let known = |i: usize, value: f64| if band[i] == 1 { value } else { f64::NAN };
-                let (normal, curvature) =
-                    (system.particles.vector(system.columns.normal), system.particles.scalar(system.columns.curvature));
-                fields.vector(&NORMAL, || normal.iter().enumerate().map(|(i, n)| n.map(|c| known(i, c))));
-                fields.scalar(&CURVATURE, || curvature.iter().enumerate().map(|(i, c)| known(i, *c)).collect());
-            }
-        }
-        fields.vector(&VELOCITY, || system.flow.velocity.iter().copied());
-        fields.scalar(&DENSITY, || system.flow.density.clone());
-        let pressures = system.flow.pressure.iter().enumerate();
-        fields.scalar(&PRESSURE, || pressures.map(|(i, p)| p + system.absorbed_pressure(i)).collect());
-        fields.scalar(&PHASE, || system.flow.species.iter().map(|species| f64::from(species.code())).collect());
-        if !system.config.fluids.have_one_mass() {
-            fields.scalar(&MASS, || (0..system.flow.count()).map(|i| system.flow.mass(i)).collect());
-        }
-        fields.particle_id();
-        fields
+        frame_fields::frame(&self.system, selection)
     }
 
     fn save(&self, state: &mut Section) {
