@@ -43,12 +43,33 @@ pub struct SceneKind {
     pub example: &'static str,
     /// Short scenes by which the speed of a machine is measured, as a JSON array. Together they have every phase of the kind.
     pub calibration: &'static str,
+    /// What a resolved scene of an earlier version sets otherwise, so that it means the same now.
+    pub of_earlier_version: fn(Given) -> Preset,
     /// What frames, series and reports of the kind show.
     pub quantities: fn() -> Quantities,
     /// Its parameters, `kind` and `preset` excepted.
     pub declarations: fn() -> Vec<Declaration>,
     /// From its parameters as sent, and what is already known to be wrong, to a scene.
     pub parse: fn(given: &Object, errors: Vec<Violation>) -> Planned,
+}
+
+/// Nothing: resolved scenes of every earlier version mean the same now.
+#[must_use]
+pub fn unchanged(_: Given) -> Preset {
+    Preset::default()
+}
+
+/// A resolved scene as this version writes it: scenes of earlier versions go on to mean what they meant.
+#[must_use]
+pub fn of_earlier_version(scene: Json, kinds: &[&'static SceneKind]) -> Json {
+    let Json::Object(given) = scene else { return scene };
+    match find_kind(&given, kinds) {
+        Ok(kind) => {
+            let preset = (kind.of_earlier_version)(Given::new(&given));
+            Json::Object(preset.over(given))
+        }
+        Err(_) => Json::Object(given),
+    }
 }
 
 /// The quantities that the schemes of a kind declare.

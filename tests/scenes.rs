@@ -45,14 +45,19 @@ fn bodies() -> Vec<Value> {
     let droplet = |more: Value| -> Value {
         // Driven fast enough that neighbours are listed anew a few times.
         let force = json!({"type": "constant", "acceleration": [300, 100]});
-        let mut body = json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.014, "body_force": force});
+        let mut body =
+            json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.014, "body_force": force, "allow_soft": true});
         body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
         body
     };
     bodies.push(droplet(json!({})));
     bodies.push(droplet(json!({"integrator": "predictor_corrector", "tension_force": "csf", "end_time": 0.008})));
     bodies.push(droplet(json!({"geometry": "colorfield", "discretization": {"type": "sph", "kernel": "quintic_spline", "smoothing_h": 1.5}})));
-    bodies.push(droplet(json!({"surface_tension": 0, "fluids": {"inside": {"density": 2, "viscosity": 0.1}}})));
+    bodies.push(droplet(json!({
+        "surface_tension": 0, "fluids": {"inside": {"density": 2, "viscosity": 0.1}},
+        "body_force": {"type": "constant", "acceleration": [300, 100], "balance": "mean"}
+    })));
+    bodies.push(droplet(json!({"tension_force": "balanced_0_1"})));
     bodies.push(droplet(json!({
         "case": "dividing", "domain": {"low": [-1, -1], "high": [1, 1]}, "end_time": 0.02, "time_step": 1e-3,
         "body_force": {"type": "pulse", "coefficient": 4000, "duration": 0.02},
@@ -382,7 +387,7 @@ fn nonsense_is_refused_at_its_place() {
         (json!({"kind": "droplet", "case": "custom"}), "/shape"),
         (json!({"kind": "droplet", "fluids": {"inside": {"density": -1}}}), "/fluids/inside/density"),
         (json!({"kind": "droplet", "fluids": {"inside": {"densty": 1}}}), "/fluids/inside/densty"),
-        (json!({"kind": "droplet", "spacing": 0.2}), "/domain"),
+        (json!({"kind": "droplet", "spacing": 0.5}), "/domain"),
         (json!({"kind": "droplet", "domain": {"low": [0, 0], "high": [1, -1]}}), "/domain/high"),
         (json!({"kind": "droplet", "shape": {"type": "circle", "radius": 3}}), "/shape"),
         (json!({"kind": "droplet", "geometry": {"type": "pcp", "band_h": 4}}), "/geometry/band_h"),

@@ -7,6 +7,7 @@
 use super::level_surface::LevelSurface;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
+use nalgebra::SMatrix;
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
 /// Number of times that a cut cell is halved.
@@ -29,6 +30,8 @@ pub struct EnclosedMoments<const D: usize> {
     pub first: Vector<D>,
     /// Second moments ∫ x_d² dV, axis by axis.
     pub second: Vector<D>,
+    /// Mixed second moments ∫ x_d x_e dV with the axis e after d, for d = x, y, z; in the plane the first is ∫ x y dV.
+    pub mixed: Vector<D>,
     /// Lower corner of the bounding box of the samples.
     pub low: Vector<D>,
     /// Upper corner of the bounding box of the samples.
@@ -39,7 +42,7 @@ impl<const D: usize> EnclosedMoments<D> {
     /// The moments of an empty set.
     fn zero() -> Self {
         let zero = Vector::<D>::zeros();
-        Self { area_or_volume: 0.0, first: zero, second: zero, low: zero, high: zero }
+        Self { area_or_volume: 0.0, first: zero, second: zero, mixed: zero, low: zero, high: zero }
     }
 
     /// Adds the moments of another set.
@@ -47,6 +50,7 @@ impl<const D: usize> EnclosedMoments<D> {
         self.area_or_volume += other.area_or_volume;
         self.first += other.first;
         self.second += other.second;
+        self.mixed += other.mixed;
     }
 
     /// Center of area or volume.
@@ -60,6 +64,20 @@ impl<const D: usize> EnclosedMoments<D> {
     pub fn variance(&self) -> Vector<D> {
         let center = self.center();
         self.second / self.area_or_volume - center.component_mul(&center)
+    }
+
+    /// The tensor of central second moments divided by the area or volume.
+    #[must_use]
+    pub fn covariance(&self) -> SMatrix<f64, D, D> {
+        let (center, variance) = (self.center(), self.variance());
+        SMatrix::<f64, D, D>::from_fn(|d, e| {
+            if d == e {
+                return variance[d];
+            }
+            // The pair (d, e) stands at the axis from which e is the next.
+            let at = if (d + 1) % D == e { d } else { e };
+            self.mixed[at] / self.area_or_volume - center[d] * center[e]
+        })
     }
 }
 
@@ -150,6 +168,7 @@ fn inside_of_cell<const D: usize>(
         sum.area_or_volume += area_or_volume;
         sum.first += center * area_or_volume;
         sum.second += center.component_mul(&center).add_scalar(edge * edge / 12.0) * area_or_volume;
+        sum.mixed += Vector::<D>::from_fn(|d, _| center[d] * center[(d + 1) % D]) * area_or_volume;
     };
     if foot.distance >= half_diagonal {
         if surface.is_inside(&center, &foot) {

@@ -40,6 +40,12 @@ impl<const D: usize> ClosestPoints<D> {
         self.queries.iter().zip(&self.feet).filter_map(|(query, foot)| Some((*query, foot.as_ref()?)))
     }
 
+    /// The sample nearest to a query of [`Self::iter`].
+    #[must_use]
+    pub fn nearest_sample(&self, query: usize) -> usize {
+        self.nearest.get(query).map_or(NONE, |nearest| nearest.0)
+    }
+
     /// One slot per query, in the order of queries, for writing closest points.
     pub(super) fn resize_to_queries(&mut self, queries: usize) -> &mut [Option<ClosestPoint<D>>] {
         self.queries.clear();

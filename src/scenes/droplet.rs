@@ -2,9 +2,13 @@
 
 mod cases;
 mod flow;
+mod formulation;
+mod numbers;
 mod plan;
 mod preset;
 pub mod spec;
+mod start_lattice;
+mod start_levels;
 
 use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::weakly_compressible_sph::{frame_fields, quantities as own};
@@ -18,6 +22,7 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("droplet/example.json"),
     declarations: spec::Droplet::declarations,
     parse: scene::parse_as::<spec::Droplet>,
+    of_earlier_version: formulation::of_earlier_version,
     quantities: || Quantities {
         fields: frame_fields::all(),
         observables: own::OBSERVABLES.to_vec(),

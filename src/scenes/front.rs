@@ -23,6 +23,7 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("front/example.json"),
     declarations: spec::Front::declarations,
     parse: scene::parse_as::<spec::Front>,
+    of_earlier_version: scene::unchanged,
     quantities: || Quantities {
         fields: frame_fields::all(),
         observables: own::OBSERVABLES.to_vec(),

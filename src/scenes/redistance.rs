@@ -15,6 +15,7 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("redistance/example.json"),
     declarations: spec::Redistance::declarations,
     parse: scene::parse_as::<spec::Redistance>,
+    of_earlier_version: scene::unchanged,
     quantities: || Quantities {
         fields: own::fields(),
         observables: own::OBSERVABLES.to_vec(),

@@ -21,6 +21,7 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("surface_pde/example.json"),
     declarations: spec::SurfacePde::declarations,
     parse: scene::parse_as::<spec::SurfacePde>,
+    of_earlier_version: scene::unchanged,
     quantities: || Quantities {
         fields: surface_equation::all_fields(),
         observables: without_repetition(&[own::OBSERVABLES, embedding::OBSERVABLES]),

@@ -17,6 +17,7 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("vortex/example.json"),
     declarations: spec::Vortex::declarations,
     parse: scene::parse_as::<spec::Vortex>,
+    of_earlier_version: scene::unchanged,
     quantities: || Quantities {
         fields: without_repetition(&[
             &advected_level_set::frame_fields::shown(FieldChoice::Dual),

@@ -15,6 +15,8 @@
 //! | steps in time | `stepping`, [`time_step`] |
 //! | the simulation and what it shows | `simulation`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
 
+mod budget;
+mod checks;
 mod column;
 pub mod config;
 mod dcpse;
@@ -24,9 +26,11 @@ mod flow_state;
 pub mod fluids;
 mod format_1;
 pub mod frame_fields;
+mod guard;
 mod interactions;
 mod interface;
 mod kernel_choice;
+pub mod level_update;
 mod mass_form;
 mod monitors;
 mod neighbor_lists;
@@ -34,6 +38,7 @@ mod pacing;
 mod pair_sums;
 mod pair_workspace;
 pub mod quantities;
+mod saved_state;
 mod simulation;
 pub mod species;
 mod stepping;
@@ -43,10 +48,13 @@ mod system;
 pub mod time_step;
 mod volume_form;
 
-pub use config::{DensityMethod, Discretization, Geometry, Integrator, SphConfig};
+pub use config::{
+    DensityMethod, Discretization, Geometry, Integrator, PressureConfig, PressureForm, SphConfig, Volumes,
+};
 pub use fluids::Fluid;
 pub use interactions::{BodyForce, TensionForce};
 pub use kernel_choice::KernelChoice;
+pub use level_update::LevelUpdate;
 pub use pacing::measurement_interval;
 pub use simulation::WeaklyCompressibleSph;
 pub use species::{Fluids, Species};

@@ -78,7 +78,8 @@ pub struct Field {
 /// `C` is the choice that decides which fields there are, known before a run; `S` is the state that frames show.
 pub struct FrameField<C, S> {
     quantity: &'static Quantity,
-    is_shown: fn(&C) -> bool,
+    /// None for a field of every frame.
+    is_shown: Option<fn(&C) -> bool>,
     values: fn(&S) -> FieldValues,
 }
 
@@ -86,13 +87,13 @@ impl<C, S> FrameField<C, S> {
     /// A field of every frame.
     #[must_use]
     pub fn new(quantity: &'static Quantity, values: fn(&S) -> FieldValues) -> Self {
-        Self { quantity, is_shown: |_| true, values }
+        Self { quantity, is_shown: None, values }
     }
 
     /// The same field, but only with certain choices.
     #[must_use]
     pub fn only_if(self, is_shown: fn(&C) -> bool) -> Self {
-        Self { is_shown, ..self }
+        Self { is_shown: Some(is_shown), ..self }
     }
 }
 
@@ -102,10 +103,17 @@ pub fn quantities_of<C, S>(table: &[FrameField<C, S>]) -> Vec<&'static Quantity>
     table.iter().map(|field| field.quantity).collect()
 }
 
-/// The quantities of those fields of a table that frames show with a choice.
+/// The quantities of those fields of a table that every frame shows.
 #[must_use]
-pub fn shown_quantities<C, S>(table: &[FrameField<C, S>], choice: &C) -> Vec<&'static Quantity> {
-    table.iter().filter(|field| (field.is_shown)(choice)).map(|field| field.quantity).collect()
+pub fn always_shown<C, S>(table: &[FrameField<C, S>]) -> Vec<&'static Quantity> {
+    table.iter().filter(|field| field.is_shown.is_none()).map(|field| field.quantity).collect()
+}
+
+/// The quantities of those fields of a table that frames show because of a choice.
+#[must_use]
+pub fn shown_by_choice<C, S>(table: &[FrameField<C, S>], choice: &C) -> Vec<&'static Quantity> {
+    let is_chosen = |field: &&FrameField<C, S>| field.is_shown.is_some_and(|is_shown| is_shown(choice));
+    table.iter().filter(is_chosen).map(|field| field.quantity).collect()
 }
 
 /// The values of a field.
@@ -156,7 +164,7 @@ impl<'a> Fields<'a> {
 
     /// Adds the fields of a scheme's table that frames show with a choice, if they are wanted.
     pub fn add_table<C, S>(&mut self, table: &[FrameField<C, S>], choice: &C, state: &S) {
-        for field in table.iter().filter(|field| (field.is_shown)(choice)) {
+        for field in table.iter().filter(|field| field.is_shown.is_none_or(|is_shown| is_shown(choice))) {
             self.add(field.quantity, || (field.values)(state));
         }
     }

@@ -102,6 +102,13 @@ impl Preset {
         self
     }
 
+    /// The preset over `given`: the fields of the preset win.
+    #[must_use]
+    pub fn over(self, mut given: Map<String, Value>) -> Map<String, Value> {
+        given.extend(self.0);
+        given
+    }
+
     /// `given` over the preset: what is given wins; objects of the same `type` (or without one) are merged.
     #[must_use]
     pub fn under(self, given: Map<String, Value>) -> Map<String, Value> {

@@ -87,7 +87,8 @@ pub fn resolved_scene(body: &Value) -> Result<Value, serde_json::Error> {
     struct SceneAlone {
         scene: Value,
     }
-    SceneAlone::deserialize(body).map(|body| body.scene)
+    let scene = SceneAlone::deserialize(body)?.scene;
+    Ok(scene::of_earlier_version(scene, SCENES))
 }
 
 /// A valid job body with every default, and its scene.

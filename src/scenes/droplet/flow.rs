@@ -1,8 +1,10 @@
 //! The flow of a droplet scene: fluids, body force, and its discretization by kernels or fits.
 
 use super::cases::{Case, DEFAULT_DIFFUSION};
+use super::formulation::{Scope, Start};
 use super::spec::{
-    DensityChoice, DiscretizationChoice, Droplet, FluidSpec, ForceChoice, GeometryChoice, KernelWord, Shifting,
+    Balance, DensityChoice, DiscretizationChoice, Droplet, FluidSpec, Fluids, ForceChoice, GeometryChoice, KernelWord,
+    LatticeWord, Shifting,
 };
 use crate::geometry::Vector;
 use crate::operators::Support;
@@ -16,6 +18,9 @@ pub(super) struct FlowPlan {
     pub kernel: KernelChoice,
     /// Smoothing length ε in h.
     pub smoothing_h: f64,
+    /// Lattice of the start.
+    pub lattice: LatticeWord,
+    pub scope: Scope,
     pub density: DensityMethod,
     /// Shifting where none is given: fits have no forces that keep particles apart.
     pub default_shifting: Shifting,
@@ -29,19 +34,33 @@ impl From<&FluidSpec> for Fluid {
 }
 
 /// The body force in `D` dimensions.
-pub(super) fn body_force<const D: usize>(force: &ForceChoice, errors: &mut Vec<Violation>) -> Option<BodyForce<D>> {
+pub(super) fn body_force<const D: usize>(
+    force: &ForceChoice,
+    fluids: &Fluids,
+    errors: &mut Vec<Violation>,
+) -> Option<BodyForce<D>> {
     match force {
         ForceChoice::None => None,
         ForceChoice::Pulse { coefficient, duration, a, b, c } => {
             let lengths = Vector::<D>::from_fn(|d, _| [*a, *b, *c][d]);
             Some(BodyForce::Pulse { coefficient: *coefficient, duration: *duration, lengths })
         }
-        ForceChoice::Constant { acceleration } => {
+        ForceChoice::Constant { acceleration, balance } => {
             if acceleration.len() != D {
                 let (at, detail) = ("/body_force/acceleration", format!("the scene has {D} dimensions"));
                 errors.push(Violation::new(at, "conflict", detail, acceleration.to_json(), format!("{D} numbers")));
             }
-            Some(BodyForce::Constant(Vector::<D>::from_fn(|d, _| acceleration.get(d).copied().unwrap_or(0.0))))
+            let acceleration_vector = Vector::<D>::from_fn(|d, _| acceleration.get(d).copied().unwrap_or(0.0));
+            let (inside, outside) = (fluids.inside.density, fluids.outside.density);
+            if *balance == Balance::None && inside != outside && acceleration_vector.norm() > 0.0 {
+                let detail = "in a periodic box two fluids fall freely together, whatever their densities; balance mean takes the \
+                              mean force out and leaves buoyancy";
+                errors.push(Violation::new("/body_force/balance", "conflict", detail, "none", json!(["mean"])));
+            }
+            Some(match balance {
+                Balance::None => BodyForce::Constant(acceleration_vector),
+                Balance::Mean => BodyForce::WithoutMean(acceleration_vector),
+            })
         }
     }
 }
@@ -59,11 +78,17 @@ impl From<KernelWord> for KernelChoice {
 
 impl FlowPlan {
     /// Plans the flow of a scene; the spec gets what was left open.
-    pub fn new(spec: &mut Droplet, case: &Case, errors: &mut Vec<Violation>) -> Self {
+    pub fn new(spec: &mut Droplet, case: &Case, dimension: usize, errors: &mut Vec<Violation>) -> Self {
         if let DiscretizationChoice::Dcpse { order, .. } = spec.discretization {
             check_fits(spec, order, errors);
         }
         let given_density = spec.density_method.clone();
+        let is_kernels = matches!(spec.discretization, DiscretizationChoice::Sph { .. });
+        let is_summation =
+            is_kernels && given_density.as_ref().unwrap_or(&case.density_method) == &DensityChoice::Summation;
+        let scope = Scope { dimension, is_summation };
+        let start = Start::new(spec, scope, errors);
+        let (lattice, default_smoothing) = (start.lattice, start.smoothing_h.unwrap_or(case.smoothing_h));
         match &mut spec.discretization {
             DiscretizationChoice::Sph { kernel, smoothing_h } => {
                 let density = given_density.unwrap_or_else(|| case.density_method.clone());
@@ -71,7 +96,9 @@ impl FlowPlan {
                 Self {
                     discretization: Discretization::Kernels,
                     kernel: (*kernel).into(),
-                    smoothing_h: *smoothing_h.get_or_insert(case.smoothing_h),
+                    smoothing_h: *smoothing_h.get_or_insert(default_smoothing),
+                    lattice,
+                    scope,
                     density: match density {
                         DensityChoice::Summation => DensityMethod::Summation,
                         DensityChoice::Continuity { diffusion } => DensityMethod::Continuity { diffusion },
@@ -91,7 +118,9 @@ impl FlowPlan {
                 Self {
                     discretization: Discretization::Dcpse(support),
                     kernel: KernelChoice::WendlandC2,
-                    smoothing_h: *smoothing_h.get_or_insert(case.smoothing_h),
+                    smoothing_h: *smoothing_h.get_or_insert(default_smoothing),
+                    lattice,
+                    scope,
                     density: DensityMethod::Continuity { diffusion },
                     default_shifting: Shifting::Pst,
                 }

@@ -2,38 +2,40 @@
 
 use super::cases::Case;
 use super::flow::{FlowPlan, body_force};
-use super::spec::{Corners, Droplet, GeometryChoice, IntegratorWord, Shifting, StopWhen, TensionWord};
-use crate::closest_point::{LevelSurface, Redistancing};
+use super::formulation::{Scope, level_and_curvature, pressures};
+use super::numbers::SceneNumbers;
+use super::spec::{
+    Corners, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, Shifting, StopWhen, TensionWord,
+};
+use super::start_lattice::StartLattice;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::Pencils;
-use crate::parallel::Interrupt;
 use crate::polynomials::multi_index::term_count;
-use crate::scene::cloud::{self, CloudReference, CloudSizes};
+use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
-use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
+use crate::scenes::pcp_spec::{Neighborhood, PcpContext};
 use crate::scenes::shapes::Shape;
 use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
-use crate::schemes::weakly_compressible_sph::time_step::{REFERENCE_SPEED, StepLimit, longest_step};
+use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
     DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, SphConfig, SphSystem, TensionForce,
     WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Coordinates, Parameter, Violation};
-use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-struct DropletScene<const D: usize> {
-    spec: Droplet,
-    shape: Shape,
-    low: Vector<D>,
-    high: Vector<D>,
-    sides: [usize; D],
-    config: SphConfig<D>,
+pub(super) struct DropletScene<const D: usize> {
+    pub(super) spec: Droplet,
+    pub(super) shape: Shape,
+    pub(super) low: Vector<D>,
+    pub(super) high: Vector<D>,
+    lattice: StartLattice<D>,
+    pub(super) config: SphConfig<D>,
     time_step: f64,
     steps: u64,
     chosen: BTreeMap<&'static str, String>,
@@ -41,7 +43,7 @@ struct DropletScene<const D: usize> {
 }
 
 /// Neighbors per coefficient, where the level is overwritten at every evaluation.
-const RATIO: f64 = 2.0;
+pub(super) const RATIO: f64 = 2.0;
 /// Number of particles of a run at most.
 const MOST_PARTICLES: f64 = 1e9;
 /// Units of a measurement for each particle near the interface, for the enclosed shape; the sums over all particles are 1.
@@ -66,12 +68,19 @@ fn corner<const D: usize>(name: &str, numbers: &Coordinates, errors: &mut Vec<Vi
 }
 
 /// Where normals and curvatures come from; the spec gets what was left open.
-fn geometry(spec: &mut Droplet, case: &Case, dimension: usize, smoothing_h: f64) -> Result<Geometry, Violation> {
+fn geometry(
+    spec: &mut Droplet,
+    case: &Case,
+    scope: Scope,
+    smoothing_h: f64,
+    errors: &mut Vec<Violation>,
+) -> Result<Geometry, Violation> {
+    let (level_update, curvature_filter) = level_and_curvature(spec, scope, errors);
     let GeometryChoice::Pcp { band_h, method } = &mut spec.geometry else { return Ok(Geometry::ColorField) };
     if method.neighborhood.is_none() && method.cutoff_h.is_none() {
         method.neighborhood = Some(Neighborhood::Radius { cutoff_h: case.fits.1 });
     }
-    let context = PcpContext { pointer: "/geometry", dimension, default_ratio: RATIO };
+    let context = PcpContext { pointer: "/geometry", dimension: scope.dimension, default_ratio: RATIO };
     let (planned, full) = method.clone().plan(context)?;
     if let Some(error) = full.refuse_material("/geometry", "particles mix: fits are made in space") {
         return Err(error);
@@ -84,17 +93,12 @@ fn geometry(spec: &mut Droplet, case: &Case, dimension: usize, smoothing_h: f64)
         let allowed = format!("a number ≥ {least_band_h}");
         return Err(Violation::new("/geometry/band_h", "range", detail, band_h, allowed));
     }
-    Ok(Geometry::Pcp { method: planned, half_band: 0.5 * band_h * spec.spacing })
+    let half_band = 0.5 * band_h * spec.spacing;
+    Ok(Geometry::Pcp { method: planned, half_band, level_update, curvature_filter })
 }
 
-/// The box, with how many particles lie along each side.
-struct Sides<const D: usize> {
-    low: Vector<D>,
-    high: Vector<D>,
-    counts: [usize; D],
-}
-
-fn sides<const D: usize>(spec: &Droplet, corners: &Corners, errors: &mut Vec<Violation>) -> Sides<D> {
+/// The lower and the upper corner of the box.
+fn corners_of<const D: usize>(corners: &Corners, errors: &mut Vec<Violation>) -> (Vector<D>, Vector<D>) {
     let low = corner::<D>("low", &corners.low, errors);
     let high = corner::<D>("high", &corners.high, errors);
     let lengths = high - low;
@@ -102,13 +106,24 @@ fn sides<const D: usize>(spec: &Droplet, corners: &Corners, errors: &mut Vec<Vio
         let detail = "the upper corner must lie above the lower one along every axis";
         errors.push(Violation::new("/domain/high", "range", detail, corners.high.to_json(), Value::Null));
     }
-    let counts = lengths.map(|length| (length / spec.spacing).round());
-    if errors.is_empty() && !(1.0..=MOST_PARTICLES).contains(&counts.product()) {
+    (low, high)
+}
+
+/// The particles of the start.
+fn start_lattice<const D: usize>(
+    spec: &Droplet,
+    word: LatticeWord,
+    lengths: &Vector<D>,
+    is_box: bool,
+    errors: &mut Vec<Violation>,
+) -> StartLattice<D> {
+    let lattice = StartLattice::new(word, lengths, spec.spacing, MOST_PARTICLES);
+    if is_box && !(1.0..=MOST_PARTICLES).contains(&lattice.count()) {
         let least = (lengths.product() / MOST_PARTICLES).powf(1.0 / D as f64);
         let allowed = format!("a number ≥ {least:.3e} and below every side");
         errors.push(Violation::new("/spacing", "range", "too many particles, or none", spec.spacing, allowed));
     }
-    Sides { low, high, counts: std::array::from_fn(|d| counts[d].clamp(0.0, MOST_PARTICLES) as usize) }
+    lattice
 }
 
 /// The shape of the drop and the points that it names; the spec gets the shape.
@@ -140,26 +155,44 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let mut errors = Vec::new();
     let case = Case::new(spec.case, D, spec.spacing);
     let corners = spec.domain.get_or_insert_with(|| case.domain.clone()).clone();
-    let Sides { low, high, counts } = sides::<D>(&spec, &corners, &mut errors);
+    let (low, high) = corners_of::<D>(&corners, &mut errors);
     let lengths = high - low;
+    let is_box = errors.is_empty();
     let shape = drop_shape(&mut spec, &case, &lengths, &mut errors);
-    let flow = FlowPlan::new(&mut spec, &case, &mut errors);
-    let geometry = geometry(&mut spec, &case, D, flow.smoothing_h).map_err(|error| errors.push(error)).ok();
+    let flow = FlowPlan::new(&mut spec, &case, D, &mut errors);
+    let lattice = start_lattice(&spec, flow.lattice, &lengths, is_box, &mut errors);
+    let geometry = geometry(&mut spec, &case, flow.scope, flow.smoothing_h, &mut errors);
+    let geometry = geometry.map_err(|error| errors.push(error)).ok();
     let given_step = spec.time_step.or(if spec.steps.is_none() { case.time_step } else { None });
-    let config = sph_config(&mut spec, &case, &flow, geometry, given_step, &mut errors);
+    // ε is measured by the volume of a particle; version 0.1 and the paper take the spacing as it was given.
+    let volume = lengths.product() / lattice.count();
+    let is_given = spec.tension_force != TensionWord::Balanced;
+    let length = if is_given { spec.spacing } else { volume.powf(1.0 / D as f64) };
+    let smoothing_length = flow.smoothing_h * length;
+    let tension = *spec.surface_tension.get_or_insert(case.tension);
+    let gravity = match spec.body_force.as_ref() {
+        Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().map(|g| g * g).sum::<f64>().sqrt(),
+        Some(ForceChoice::Pulse { .. } | ForceChoice::None) | None => 0.0,
+    };
+    let numbers = SceneNumbers::new(shape.as_ref().map(|(shape, _)| shape), tension, gravity, &lengths);
+    let expected_speed = numbers.expected_speed(&spec);
+    let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
+    let config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
-    if errors.is_empty()
+    if is_box
+        && lattice.count() >= 1.0
         && let Err(error) = Pencils::<D>::new(&domain_of(&low, &lengths), config.cutoff())
     {
         let got = corners.to_json();
         errors.push(Violation::new("/domain", "range", error.to_string(), got, error.least));
     }
+    numbers.check_sound_speeds(&spec, &mut errors);
     let Some((shape, points)) = shape.filter(|_| errors.is_empty()) else {
         return Err(errors);
     };
     let mut chosen = BTreeMap::new();
     if config.is_adaptive {
-        let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {REFERENCE_SPEED}");
+        let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {expected_speed:.4}");
         chosen.insert("time_step", why);
     }
     spec.dimension = Some(D);
@@ -167,7 +200,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         spec.time_step = given_step;
     }
     let clouds = points.into_iter().collect();
-    Ok(Box::new(DropletScene { spec, shape, low, high, sides: counts, config, time_step, steps, chosen, clouds }))
+    Ok(Box::new(DropletScene { spec, shape, low, high, lattice, config, time_step, steps, chosen, clouds }))
 }
 
 /// What the scheme is made of; the spec gets what was left open.
@@ -175,20 +208,23 @@ fn sph_config<const D: usize>(
     spec: &mut Droplet,
     case: &Case,
     flow: &FlowPlan,
-    geometry: Option<Geometry>,
+    (geometry, smoothing_length, expected_speed): (Option<Geometry>, f64, f64),
     given_step: Option<f64>,
     errors: &mut Vec<Violation>,
 ) -> SphConfig<D> {
     let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
-    let body_force = body_force(force, errors);
+    let body_force = body_force(force, &spec.fluids, errors);
+    let pressure = pressures(spec, flow.scope, errors);
     SphConfig {
         spacing: spec.spacing,
-        smoothing_length: flow.smoothing_h * spec.spacing,
+        smoothing_length,
+        pressure,
         kernel: flow.kernel,
         fluids: Fluids { inside: Fluid::from(&spec.fluids.inside), outside: Fluid::from(&spec.fluids.outside) },
         tension: *spec.surface_tension.get_or_insert(case.tension),
         tension_force: match spec.tension_force {
             TensionWord::Balanced => TensionForce::Balanced,
+            TensionWord::Balanced01 => TensionForce::BalancedUncorrected,
             TensionWord::Csf => TensionForce::Csf,
         },
         geometry: geometry.unwrap_or(Geometry::ColorField),
@@ -200,6 +236,7 @@ fn sph_config<const D: usize>(
             IntegratorWord::KickDriftKick => Integrator::KickDriftKick,
             IntegratorWord::PredictorCorrector => Integrator::PredictorCorrector,
         },
+        expected_speed,
         is_adaptive: given_step.is_none() && spec.steps.is_none(),
         rest_below: spec.stop_when.as_ref().map(|StopWhen::AtRest { velocity }| *velocity),
     }
@@ -216,12 +253,12 @@ fn time_step<const D: usize>(
         let detail = "steps are given instead of a time step; give one of them";
         errors.push(Violation::new("/time_step", "conflict", detail, step, Value::Null));
     }
-    let StepLimit { length: limit, cause: bound } = longest_step(config, REFERENCE_SPEED);
+    let StepLimit { length: limit, cause: bound } = longest_step(config, config.expected_speed);
     let time_step = match (given_step, spec.steps) {
         (Some(step), _) => step,
         (None, Some(steps)) => spec.end_time / steps as f64,
-        // A whole number of steps to a unit of time, whatever the end: a later end repeats the same steps.
-        (None, None) => 1.0 / (1.0 / limit).ceil(),
+        // The last step lands on the end.
+        (None, None) => spec.end_time / (spec.end_time / limit).ceil(),
     };
     let steps = (spec.end_time / time_step - 1e-9).ceil();
     if !(time_step.is_normal() && (1.0..=1e9).contains(&steps)) {
@@ -240,7 +277,7 @@ fn check_size<const D: usize>(surface: &dyn Surface<D>, lengths: &Vector<D>, sha
     (!fits).then(|| Violation::new("/shape", "conflict", detail, shape.to_json(), json!(lengths.as_slice())))
 }
 
-fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Domain<D> {
+pub(super) fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Domain<D> {
     Domain::new(std::array::from_fn(|d| Axis::Periodic { start: low[d], length: lengths[d] }))
 }
 
@@ -254,84 +291,12 @@ impl<const D: usize> DropletScene<D> {
         particles * nodes * (40.0 + 0.25 * terms * terms)
     }
 
-    fn lengths(&self) -> Vector<D> {
+    pub(super) fn lengths(&self) -> Vector<D> {
         self.high - self.low
     }
 
     fn count(&self) -> u64 {
-        self.sides.iter().map(|side| *side as u64).product()
-    }
-
-    /// Centers of the cells of the box.
-    fn positions(&self) -> Vec<Vector<D>> {
-        let lengths = self.lengths();
-        (0..self.count() as usize)
-            .map(|k| {
-                let mut rest = k;
-                Vector::<D>::from_fn(|d, _| {
-                    let index = rest % self.sides[d];
-                    rest /= self.sides[d];
-                    self.low[d] + (index as f64 + 0.5) * lengths[d] / self.sides[d] as f64
-                })
-            })
-            .collect()
-    }
-
-    /// Signed distances from the nearest image of a shape.
-    fn levels(&self, surface: &dyn Surface<D>, positions: &[Vector<D>]) -> Vec<f64> {
-        let lengths = self.lengths();
-        let (low, high) = surface.bounding_box();
-        let images: Vec<Vector<D>> = (0..3_usize.pow(D as u32))
-            .map(|image| {
-                let turns = Vector::<D>::from_fn(|d, _| (image / 3_usize.pow(d as u32) % 3) as f64 - 1.0);
-                turns.component_mul(&lengths)
-            })
-            .collect();
-        positions
-            .par_iter()
-            .map(|x| {
-                let mut least = f64::INFINITY;
-                for image in &images {
-                    let y = x + image;
-                    // No point of the shape is nearer than its box.
-                    let away = (low - y).sup(&(y - high)).sup(&Vector::<D>::zeros()).norm();
-                    if away < least {
-                        least = least.min(surface.signed_distance(&y));
-                    }
-                }
-                least
-            })
-            .collect()
-    }
-
-    /// Signed distances from the surface of points that came from elsewhere.
-    fn levels_of_points(&self, context: &BuildContext, positions: &[Vector<D>]) -> Result<Vec<f64>, Violation> {
-        let (points, level) = cloud::points_with_levels::<D>(&context.clouds, "/shape")?;
-        if let Some(found) = cloud::check_spacing(&points, self.config.spacing) {
-            return Err(found);
-        }
-        let domain = domain_of(&self.low, &self.lengths());
-        let points: Vec<Vector<D>> = points.iter().map(|x| domain.wrap(*x)).collect();
-        let method = match &self.config.geometry {
-            Geometry::Pcp { method, .. } => method.clone(),
-            Geometry::ColorField => {
-                let context = PcpContext { pointer: "/geometry", dimension: D, default_ratio: RATIO };
-                PcpSpec::default().plan(context)?.0
-            }
-        };
-        let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.config.spacing)));
-        let never = Interrupt::default();
-        let fitted =
-            surface.detect(&points, &level, &never).and_then(|()| surface.fit_samples(&points, &level, None, &never));
-        if fitted.is_err() || surface.is_lost() {
-            let detail = "phi of the points has no zero between them".to_owned();
-            return Err(Violation::new("/shape", "data", detail, Value::Null, json!("PointData/phi of both signs")));
-        }
-        let distance = |x: &Vector<D>| {
-            let foot = surface.query(x, f64::INFINITY)?;
-            Some(if surface.is_inside(x, &foot) { -foot.distance } else { foot.distance })
-        };
-        Ok(positions.par_iter().map(|x| distance(x).unwrap_or(f64::INFINITY)).collect())
+        self.lattice.count() as u64
     }
 }
 
@@ -414,7 +379,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         if self.config.has_tension() {
             work.push(PhaseWork::every_step("droplets", particles * steps_done));
             match &self.config.geometry {
-                Geometry::Pcp { method, half_band } => {
+                Geometry::Pcp { method, half_band, .. } => {
                     let band = self.near(2.0 * half_band);
                     let reach_h = half_band / self.config.spacing;
                     work.extend(work_estimate::redistancing::<D>(
@@ -442,7 +407,7 @@ impl<const D: usize> Scene for DropletScene<D> {
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
         let lengths = self.lengths();
         let domain = domain_of(&self.low, &lengths);
-        let positions = self.positions();
+        let positions = self.lattice.positions(&self.low, &lengths);
         let (level, measure) = if self.clouds.is_empty() {
             let surface = self.shape.surface::<D>("/shape")?;
             (self.levels(surface.as_ref(), &positions), surface.area_or_volume())

@@ -56,10 +56,51 @@ crate::group! {
 crate::words! {
     /// The force of surface tension.
     pub enum TensionWord {
-        /// −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet
+        /// −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet, without the sum over each droplet
         Balanced = "balanced",
+        /// the balanced force of version 0.1, with its volumes, pressures, redistancing and lattice, for comparison
+        Balanced01 = "balanced_0_1",
         /// κ₀ = 0 (the paper)
         Csf = "csf",
+    }
+}
+
+crate::words! {
+    /// The lattice of the particles at the start.
+    pub enum LatticeWord {
+        /// squares, cubes in space
+        Cubic = "cubic",
+        /// equilateral triangles, in the plane alone
+        Hexagonal = "hexagonal",
+        /// cubes with a particle in each center, in space alone
+        BodyCentered = "body_centered",
+        /// cubes with a particle in each face, in space alone
+        FaceCentered = "face_centered",
+    }
+}
+
+crate::words! {
+    /// How volumes follow from sums of kernels, V = a/Σ W.
+    pub enum VolumesWord {
+        /// a such that the volumes of the start fill the box: a lattice at rest has no pressure
+        Calibrated = "calibrated",
+        /// a = 1 (the paper)
+        Plain = "plain",
+    }
+}
+
+crate::choice! {
+    /// What becomes of the level that particles carry when closest points are found.
+    pub enum RedistancingChoice {
+        /// long waves of the interface move with the particles alone; short waves and slopes are repaired
+        Transparent = "transparent" {
+            /// share of a deviation that is repaired in the time ½ √(ρh³/(2πτ)), about a step
+            relaxation: f64 = 0.1, in POSITIVE.and_at_most(1.0);
+            /// radius of the surface filter in h
+            radius_h: f64 = 6.0, in Interval::at_least(2.0).and_at_most(20.0);
+        }
+        /// the signed distance replaces the level at every evaluation (the paper)
+        Overwrite = "overwrite",
     }
 }
 
@@ -140,6 +181,16 @@ crate::words! {
     }
 }
 
+crate::words! {
+    /// What balances a constant force.
+    pub enum Balance {
+        /// nothing: everything falls freely
+        None = "none",
+        /// the mean force is taken out, which leaves buoyancy: (1 − ρ̄/ρ) g with the mean density ρ̄ of the box
+        Mean = "mean",
+    }
+}
+
 crate::choice! {
     /// A force from outside.
     pub enum ForceChoice {
@@ -162,6 +213,8 @@ crate::choice! {
         Constant = "constant" {
             /// acceleration
             acceleration: Coordinates;
+            /// what balances the force in the periodic box; fluids of two densities need mean
+            balance: Balance = Balance::None;
         }
     }
 }
@@ -211,7 +264,8 @@ crate::group! {
         fluids: Fluids = Fluids::default();
         /// surface tension τ; by case when not given; with 0 no interface is computed
         surface_tension: Option<f64>, in NOT_NEGATIVE;
-        /// balanced: −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet; csf: κ₀ = 0 (the paper)
+        /// balanced: −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet; balanced_0_1: that of version 0.1;
+        /// csf: κ₀ = 0 (the paper)
         tension_force: TensionWord = TensionWord::Balanced;
         /// where normals and curvatures come from
         geometry: GeometryChoice = with_defaults("pcp");
@@ -219,10 +273,26 @@ crate::group! {
         discretization: DiscretizationChoice = with_defaults("sph");
         /// where densities come from; by case when not given
         density_method: Option<DensityChoice>;
+        /// lattice of the particles at the start; by tension_force and dimension when not given
+        lattice: Option<LatticeWord>;
+        /// how volumes follow from sums of kernels, for densities by summation; by tension_force when not given
+        volumes: Option<VolumesWord>;
+        /// pressure p_b in τκ₀, κ₀ the curvature of the smallest drop at the start, for densities by summation; it keeps particles
+        /// apart, and acts as a weak elasticity; by tension_force when not given
+        background_pressure: Option<f64>, in NOT_NEGATIVE.and_at_most(100.0);
+        /// coefficient β of the pressure −β ρ c ε ∇·u, for densities by summation and kick_drift_kick; by tension_force when not
+        /// given
+        bulk_damping: Option<f64>, in NOT_NEGATIVE.and_at_most(10.0);
+        /// what becomes of the level that particles carry, for geometry pcp; by tension_force when not given
+        redistancing: Option<RedistancingChoice>;
+        /// radius in h of the surface filter of the curvature, 0 for none, for geometry pcp; by tension_force when not given
+        curvature_filter_h: Option<f64>, in NOT_NEGATIVE.and_at_most(20.0);
         /// particle shifting; by case when not given
         shifting: Option<Shifting>;
         /// a force from outside; by case when not given
         body_force: Option<ForceChoice>;
+        /// whether a speed of sound below half of that which keeps the fluids nearly incompressible is let through
+        allow_soft: bool = false;
         /// kick_drift_kick: one evaluation a step; predictor_corrector: two (the paper's)
         integrator: IntegratorWord = IntegratorWord::KickDriftKick;
         /// an end before the end time

@@ -2,7 +2,7 @@
 
 use super::system::{AdvectedSystem, FieldChoice};
 use crate::particles::Particles;
-use crate::simulation::fields::{COMMON_FIELDS, FrameField, SURFACE_FIELDS, shown_quantities};
+use crate::simulation::fields::{COMMON_FIELDS, FrameField, SURFACE_FIELDS, always_shown, shown_by_choice};
 use crate::simulation::quantity::without_repetition;
 use crate::simulation::{FieldValues, Fields, Quantity, Selection};
 
@@ -35,7 +35,8 @@ fn table<'a, const D: usize>() -> [FrameField<FieldChoice, Snapshot<'a, D>>; 2] 
 /// Fields that frames show with a choice.
 #[must_use]
 pub fn shown(choice: FieldChoice) -> Vec<&'static Quantity> {
-    without_repetition(&[SURFACE_FIELDS, &shown_quantities(&table::<2>(), &choice), COMMON_FIELDS])
+    let table = table::<2>();
+    without_repetition(&[SURFACE_FIELDS, &always_shown(&table), COMMON_FIELDS, &shown_by_choice(&table, &choice)])
 }
 
 /// The selected fields at redistanced particles.

@@ -4,7 +4,7 @@ use super::grid::Grid;
 use super::segments::Segments;
 use super::system::FrontSystem;
 use crate::geometry::Vector;
-use crate::simulation::fields::{COMMON_FIELDS, FrameField, quantities_of, shown_quantities};
+use crate::simulation::fields::{COMMON_FIELDS, FrameField, always_shown, quantities_of, shown_by_choice};
 use crate::simulation::quantity::without_repetition;
 use crate::simulation::{FieldValues, Fields, Quantity, Selection};
 use crate::time::Clock;
@@ -110,7 +110,8 @@ pub fn all() -> Vec<&'static Quantity> {
 #[must_use]
 pub fn shown(dimension: usize, is_curve_in_space: bool, segments: &Segments) -> Vec<&'static Quantity> {
     let shape = Shape::new(dimension, is_curve_in_space, segments);
-    without_repetition(&[&shown_quantities(&table::<2, 1>(), &shape), COMMON_FIELDS])
+    let table = table::<2, 1>();
+    without_repetition(&[&always_shown(&table), COMMON_FIELDS, &shown_by_choice(&table, &shape)])
 }
 
 /// The selected fields at the particles.

@@ -3,9 +3,47 @@
 use super::interactions::surface_tension::SurfaceTension;
 use super::interactions::{BodyForce, TensionForce};
 use super::kernel_choice::KernelChoice;
+use super::level_update::LevelUpdate;
 use super::species::Fluids;
 use crate::closest_point::PcpMethod;
 use crate::operators::Support;
+
+/// Form of the pressure force between particles with densities by summation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PressureForm {
+    /// (V_i² + V_j²) P̄ with the mean P̄ of PCP eq. B.2.
+    Mean,
+    /// P_i V_i² + P_j V_j²: minus the gradient of the elastic energy, so that pressure creates no energy.
+    Hamiltonian,
+}
+
+/// How volumes follow from sums of kernels, V_i = a/Σ_j W_ij.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Volumes {
+    /// a = 1 (PCP eq. B.1). A lattice at rest then has a small pressure.
+    Plain,
+    /// a such that the volumes of the start fill the box. A lattice at rest has no pressure.
+    Calibrated,
+}
+
+/// How pressures act between particles with densities by summation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressureConfig {
+    /// Form of the pair force.
+    pub form: PressureForm,
+    /// Volumes of particles.
+    pub volumes: Volumes,
+    /// Background pressure p_b in τκ₀, with the curvature κ₀ of the smallest droplet at the start.
+    pub background: f64,
+    /// Bulk damping β: the pressure −β ρ c ε (∇·u) that opposes compression.
+    pub bulk_damping: f64,
+}
+
+impl PressureConfig {
+    /// The pressures of the PCP paper (eqs. B.1 and B.2).
+    pub const PAPER: Self =
+        Self { form: PressureForm::Mean, volumes: Volumes::Plain, background: 0.0, bulk_damping: 0.0 };
+}
 
 /// Distance in spacings h that the neighbor lists reach beyond the kernel's support. A wider skin means longer loops over
 /// pairs, a thinner one lists that are made more often.
@@ -20,6 +58,10 @@ pub enum Geometry {
         method: PcpMethod,
         /// Half the width of the band.
         half_band: f64,
+        /// What becomes of the level that particles carry.
+        level_update: LevelUpdate,
+        /// Radius of the surface filter of the curvature; None for curvatures as fitted.
+        curvature_filter: Option<f64>,
     },
     /// The smoothed color of the species (PCP eqs. B.5 to B.10).
     ColorField,
@@ -76,12 +118,16 @@ pub struct SphConfig<const D: usize> {
     pub discretization: Discretization,
     /// Method for densities.
     pub density: DensityMethod,
+    /// Pressures, where densities are summed.
+    pub pressure: PressureConfig,
     /// Whether particles are shifted towards an even distribution (PCP eqs. B.15, B.16).
     pub is_shifted: bool,
     /// A force from outside.
     pub body_force: Option<BodyForce<D>>,
     /// The time integrator.
     pub integrator: Integrator,
+    /// The speed that the longest step is chosen for; faster particles cut steps into parts.
+    pub expected_speed: f64,
     /// Whether a step beyond the stability limits is cut into parts; false where the user gave the time step.
     pub is_adaptive: bool,
     /// The run ends when all particles are slower than this speed.
@@ -99,6 +145,14 @@ impl<const D: usize> SphConfig<D> {
     #[must_use]
     pub fn cutoff(&self) -> f64 {
         self.kernel.support() * self.smoothing_length + self.skin()
+    }
+
+    /// The time ½ √(ρh³/(2πτ)) of capillary waves as long as the spacing, in which a carried level is repaired by its share.
+    /// ρ is the mean density of the two fluids.
+    #[must_use]
+    pub fn repair_time(&self) -> f64 {
+        let density = 0.5 * (self.fluids.inside.density + self.fluids.outside.density);
+        0.5 * (density * self.spacing.powi(3) / (2.0 * std::f64::consts::PI * self.tension)).sqrt()
     }
 
     /// Whether there is an interface to compute.

@@ -29,7 +29,8 @@ pub(super) struct Droplets<const D: usize> {
     pub label: Vec<u8>,
     /// The curvature κ₀ of each droplet as a ball.
     pub ball_curvatures: Vec<f64>,
-    /// Particles of each droplet when their number last changed.
+    /// Particles of each droplet when their number last changed; 0 of a layer, which reaches across the box and has no
+    /// curvature as a ball.
     sizes: Vec<usize>,
     /// The area or volume that was enclosed at the start.
     pub initial_measure: f64,
@@ -82,8 +83,16 @@ impl<const D: usize> Droplets<D> {
     pub fn renew_ball_curvatures(&mut self) {
         let all = self.sizes.iter().sum::<usize>().max(1) as f64;
         self.ball_curvatures.clear();
-        let share = |size: &usize| ball_curvature::<D>(self.initial_measure * *size as f64 / all);
+        let share = |size: &usize| match size {
+            0 => 0.0,
+            size => ball_curvature::<D>(self.initial_measure * *size as f64 / all),
+        };
         self.ball_curvatures.extend(self.sizes.iter().map(share));
+    }
+
+    /// Whether a component reaches across the box: a layer, or a fluid with holes.
+    pub fn has_layer(&self) -> bool {
+        self.ball_curvatures.contains(&0.0)
     }
 
     /// The curvature κ₀ of the droplet that a particle belongs to.
@@ -102,7 +111,11 @@ struct Components<const D: usize> {
     inside: Vec<usize>,
     component: Vec<usize>,
     stack: Vec<usize>,
+    /// Position of each particle inside, from the first of its component along links.
+    offset: Vec<Vector<D>>,
     sizes: Vec<usize>,
+    /// Whether each component links with its own image.
+    is_layer: Vec<bool>,
     ranks: Vec<usize>,
 }
 
@@ -113,7 +126,9 @@ impl<const D: usize> Components<D> {
             inside: Vec::new(),
             component: Vec::new(),
             stack: Vec::new(),
+            offset: Vec::new(),
             sizes: Vec::new(),
+            is_layer: Vec::new(),
             ranks: Vec::new(),
         }
     }
@@ -137,6 +152,9 @@ impl<const D: usize> Components<D> {
                 }
             }
         }
+        for (size, is_layer) in self.sizes.iter_mut().zip(&self.is_layer) {
+            *size = if *is_layer { 0 } else { *size };
+        }
         let mut rank = self.ranks.iter();
         self.sizes.retain(|_| rank.next().is_some_and(|rank| *rank != usize::from(FRAGMENT)));
         &self.sizes
@@ -149,25 +167,34 @@ impl<const D: usize> Components<D> {
         self.component.clear();
         self.component.resize(self.inside.len(), usize::MAX);
         self.sizes.clear();
+        self.is_layer.clear();
+        self.offset.clear();
+        self.offset.resize(self.inside.len(), Vector::<D>::zeros());
         for seed in 0..self.inside.len() {
             if self.component[seed] != usize::MAX {
                 continue;
             }
             let name = self.sizes.len();
-            let mut size = 0;
+            let (mut size, mut is_layer) = (0, false);
             self.component[seed] = name;
             self.stack.push(seed);
             while let Some(k) = self.stack.pop() {
                 size += 1;
-                let (component, stack) = (&mut self.component, &mut self.stack);
-                self.cells.for_each_within(&positions[self.inside[k]], link, |other, _, _| {
+                let (component, stack, offset) = (&mut self.component, &mut self.stack, &mut self.offset);
+                self.cells.for_each_within(&positions[self.inside[k]], link, |other, dx, _| {
+                    let place = offset[k] + dx;
                     if component[other] == usize::MAX {
                         component[other] = name;
+                        offset[other] = place;
                         stack.push(other);
+                    } else {
+                        // Two ways to one particle that differ by a period.
+                        is_layer |= (place - offset[other]).norm() > link;
                     }
                 });
             }
             self.sizes.push(size);
+            self.is_layer.push(is_layer);
         }
     }
 

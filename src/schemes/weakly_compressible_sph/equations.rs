@@ -1,6 +1,6 @@
 //! The equations of the flow: which form the interactions between particles take. It is chosen once a run.
 
-use super::config::{DensityMethod, Discretization, SphConfig};
+use super::config::{DensityMethod, Discretization, PressureForm, SphConfig};
 use super::dcpse::DcpseFlow;
 use super::flow_state::{FlowState, Rates};
 use super::pair_workspace::PairWorkspace;
@@ -11,7 +11,7 @@ use crate::parallel::{Interrupt, Interrupted};
 /// The form of the equations.
 pub(super) enum FlowEquations<const D: usize> {
     /// Densities by summation, forces in the volume form.
-    VolumeForm,
+    VolumeForm { pressure: PressureForm },
     /// Densities by continuity with a diffusion ξ̂, forces in the mass form.
     MassForm { diffusion: f64 },
     /// Derivatives by fits, densities by continuity with a diffusion ξ̂ ε.
@@ -30,7 +30,7 @@ impl<const D: usize> FlowEquations<D> {
                 spread: diffusion.unwrap_or(0.0) * config.smoothing_length,
             },
             (Discretization::Kernels, Some(diffusion)) => Self::MassForm { diffusion },
-            (Discretization::Kernels, None) => Self::VolumeForm,
+            (Discretization::Kernels, None) => Self::VolumeForm { pressure: config.pressure.form },
         }
     }
 
@@ -38,7 +38,7 @@ impl<const D: usize> FlowEquations<D> {
     pub fn fits(&self) -> Option<&DcpseFlow<D>> {
         match self {
             Self::Fits { fits, .. } => Some(fits),
-            Self::VolumeForm | Self::MassForm { .. } => None,
+            Self::VolumeForm { .. } | Self::MassForm { .. } => None,
         }
     }
 
@@ -46,7 +46,7 @@ impl<const D: usize> FlowEquations<D> {
     pub fn fits_mut(&mut self) -> Option<&mut DcpseFlow<D>> {
         match self {
             Self::Fits { fits, .. } => Some(fits),
-            Self::VolumeForm | Self::MassForm { .. } => None,
+            Self::VolumeForm { .. } | Self::MassForm { .. } => None,
         }
     }
 
@@ -60,7 +60,7 @@ impl<const D: usize> FlowEquations<D> {
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         match self {
-            Self::VolumeForm => volume_form::accelerate(flow, pairs, &mut rates.acceleration),
+            Self::VolumeForm { pressure } => volume_form::accelerate(flow, *pressure, pairs, &mut rates.acceleration),
             Self::MassForm { diffusion } => mass_form::find_rates(flow, *diffusion, pairs, rates),
             Self::Fits { fits, spread } => fits.find_rates(positions, flow, *spread, rates, interrupt),
         }
@@ -69,7 +69,7 @@ impl<const D: usize> FlowEquations<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{DensityMethod, Discretization, FlowEquations, SphConfig};
+    use super::{DensityMethod, Discretization, FlowEquations, PressureForm, SphConfig};
     use crate::operators::Support;
     use crate::schemes::weakly_compressible_sph::KernelChoice;
     use crate::schemes::weakly_compressible_sph::test_setting::setting;
@@ -79,7 +79,7 @@ mod tests {
         let config = setting::<2>(KernelChoice::WendlandC2, 1.0).config;
         let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
         let equations = |config: &SphConfig<2>| FlowEquations::new(config, &this.domain, 4);
-        assert!(matches!(equations(&config), FlowEquations::VolumeForm));
+        assert!(matches!(equations(&config), FlowEquations::VolumeForm { pressure: PressureForm::Mean }));
         let mass = SphConfig { density: DensityMethod::Continuity { diffusion: 0.1 }, ..config };
         assert!(matches!(equations(&mass), FlowEquations::MassForm { diffusion: 0.1 }));
         let discretization = Discretization::Dcpse(Support { degree: 3, radius: 0.35 });

@@ -18,8 +18,16 @@ pub(super) struct FlowState<const D: usize> {
     pub density: Vec<f64>,
     /// Derived from densities, or summed.
     pub volume: Vec<f64>,
-    /// Derived from densities.
+    /// Derived from densities by the equation of state.
     pub pressure: Vec<f64>,
+    /// The factor a of volumes by summation, V_i = a/Σ_j W_ij.
+    pub calibration: f64,
+    /// The background pressure p_b, the same for both fluids.
+    pub background: f64,
+    /// Pressures of the bulk damping; empty without it.
+    pub bulk_pressure: Vec<f64>,
+    /// Volumes at the last evaluation, for the bulk damping; empty without it.
+    pub last_volume: Vec<f64>,
 }
 
 /// Rates of change, one entry a particle.
@@ -41,10 +49,36 @@ impl<const D: usize> FlowState<D> {
             predicted: vec![Vector::<D>::zeros(); count],
             volume: vec![cell; count],
             pressure: vec![0.0; count],
+            calibration: 1.0,
+            background: 0.0,
+            bulk_pressure: Vec::new(),
+            last_volume: Vec::new(),
             fluids,
             cell,
             species,
         }
+    }
+
+    /// The pressure with which particles act on each other: equation of state, background and bulk damping.
+    pub fn pair_pressure(&self, i: usize) -> f64 {
+        self.pressure[i] + self.background + self.bulk_pressure.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Sets the pressures of the bulk damping, −β ρ c ε (V − V_last)/(Δt V), from the volumes now and those a time `elapsed`
+    /// ago. `damping` is β ε. Without a last evaluation they are 0.
+    pub fn damp_bulk(&mut self, damping: f64, elapsed: f64) {
+        let count = self.count();
+        if self.last_volume.len() != count || elapsed <= 0.0 {
+            self.bulk_pressure.clear();
+            self.bulk_pressure.resize(count, 0.0);
+        } else {
+            for i in 0..count {
+                let (volume, density) = (self.volume[i], self.density[i]);
+                let expansion = (volume - self.last_volume[i]) / (elapsed * volume);
+                self.bulk_pressure[i] = -damping * density * self.fluid(i).sound_speed * expansion;
+            }
+        }
+        self.last_volume.clone_from(&self.volume);
     }
 
     /// The number of particles.

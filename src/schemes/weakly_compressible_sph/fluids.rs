@@ -28,6 +28,15 @@ impl Fluid {
         self.sound_speed * self.sound_speed * self.density / self.polytropic * (power - 1.0)
     }
 
+    /// The elastic energy of a unit of mass at a density, e = ∫ P/ρ² dρ from ρ₀:
+    /// c²/γ ((x^(γ−1) − 1)/(γ − 1) + 1/x − 1) with x = ρ/ρ₀.
+    #[must_use]
+    pub fn elastic_energy(&self, density: f64) -> f64 {
+        let (x, power) = (density / self.density, self.polytropic - 1.0);
+        let compressed = if power < 1e-9 { x.ln() } else { (x.powf(power) - 1.0) / power };
+        self.sound_speed * self.sound_speed / self.polytropic * (compressed + 1.0 / x - 1.0)
+    }
+
     /// The kinematic viscosity ν = η/ρ₀.
     #[must_use]
     pub fn kinematic_viscosity(&self) -> f64 {
@@ -46,6 +55,11 @@ mod tests {
             assert_eq!(fluid.pressure(1.3), 0.0);
             let slope = (fluid.pressure(1.3 + 1e-6) - fluid.pressure(1.3 - 1e-6)) / 2e-6;
             assert!((slope - 400.0).abs() < 1e-3, "{slope}");
+            assert_eq!(fluid.elastic_energy(1.3), 0.0);
+            let density = 1.42;
+            let slope = (fluid.elastic_energy(density + 1e-4) - fluid.elastic_energy(density - 1e-4)) / 2e-4;
+            let expected = fluid.pressure(density) / (density * density);
+            assert!((slope - expected).abs() < 1e-4 * expected, "{slope} {expected}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The reader for checkpoints of format 1.
 
-use super::monitors::{names, save_row};
+use super::guard::Guard;
+use super::monitors::{names, names_of_version_0_1, save_row};
 use super::summary::{Late, Shape, Summary};
 use crate::particles::Particles;
 use crate::simulation::format_1::{copy, copy_particles, fit_soundness, from_bits, numbers, soundness};
@@ -15,6 +16,7 @@ use crate::time::Clock;
 pub(super) fn translate<const D: usize>(
     arrays: &Section,
     particles: &Particles<D>,
+    guard: &Guard<D>,
     (has_interface, has_flow_fits): (bool, bool),
 ) -> Result<Section, LoadError> {
     let mut state = Section::default();
@@ -39,17 +41,28 @@ pub(super) fn translate<const D: usize>(
         interface.put("redistancing", soundness(arrays.counts("rescues")?, condition)?);
         interface.put_count("bounded_curvatures", bounded);
         copy(arrays, &["candidate"], &mut interface)?;
+        interface.put_count("is_begun", 1);
+        interface.put_counts("sides", [0, 0]);
         state.put("interface", Entry::Section(interface));
     }
     if has_flow_fits {
         let [least_pivot] = numbers("flow_pivot", arrays.reals("flow_pivot")?)?;
         state.put_component("flow_fits", &fit_soundness(arrays.counts("flow")?, least_pivot)?);
     }
+    state.put_section("guard", |section| guard.save(section));
+    state.put_section("pressure", |section| {
+        section.put_real("calibration", 1.0);
+        section.put_real("background", 0.0);
+        section.put_reals("last_volume", &[]);
+    });
     state.put_count("absorbed_strays", absorbed);
+    state.put_real("lost_particles", 0.0);
     state.put_real("max_cfl", max_cfl);
     state.put_count("resting_steps", resting);
     let row = from_bits(arrays.counts("row")?);
-    check_length("row", row.len(), names(D).len())?;
+    check_length("row", row.len(), names_of_version_0_1(D))?;
+    let mut row = row;
+    row.resize(names(D).len(), f64::NAN);
     state.put_section("row", |section| save_row::<D>(&row, section));
     let summary = summary(&from_bits(arrays.counts("summary")?))?;
     state.put_section("summary", |section| summary.save(section));

@@ -4,7 +4,7 @@ use super::config::{Geometry, SphConfig};
 use super::system::SphSystem;
 use crate::geometry::Vector;
 use crate::simulation::fields::{
-    COMMON_FIELDS, CURVATURE, FrameField, NORMAL, SURFACE_FIELDS, quantities_of, shown_quantities,
+    COMMON_FIELDS, CURVATURE, FrameField, NORMAL, SURFACE_FIELDS, always_shown, quantities_of, shown_by_choice,
 };
 use crate::simulation::quantity::without_repetition;
 use crate::simulation::{FieldValues, Fields, Quantity, Selection};
@@ -61,7 +61,8 @@ pub fn shown<const D: usize>(config: &SphConfig<D>) -> Vec<&'static Quantity> {
         Geometry::Pcp { .. } => SURFACE_FIELDS,
         Geometry::ColorField => &[&NORMAL, &CURVATURE],
     };
-    without_repetition(&[surface, &shown_quantities(&table(), config), COMMON_FIELDS])
+    let table = table();
+    without_repetition(&[surface, &always_shown(&table), &shown_by_choice(&table, config), COMMON_FIELDS])
 }
 
 /// The selected fields at the particles.

@@ -39,6 +39,28 @@ use crate::particles::Particles;
 pub(super) trait PairTerm<P, B>: Copy + Sync {
     /// Adds the share of this term.
     fn add_to(self, sum: B, pair: &P) -> B;
+
+    /// Whether the term adds nothing to any pair.
+    #[inline(always)]
+    fn is_none(self) -> bool {
+        false
+    }
+}
+
+/// The sum of no terms.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NoTerm;
+
+impl<P, B> PairTerm<P, B> for NoTerm {
+    #[inline(always)]
+    fn add_to(self, sum: B, _pair: &P) -> B {
+        sum
+    }
+
+    #[inline(always)]
+    fn is_none(self) -> bool {
+        true
+    }
 }
 
 impl<P, B, First: PairTerm<P, B>, Second: PairTerm<P, B>> PairTerm<P, B> for (First, Second) {

@@ -2,6 +2,7 @@
 
 pub mod color_field;
 pub mod level_set;
+mod surface_filter;
 
 pub use color_field::ColorField;
 pub use level_set::LevelSet;

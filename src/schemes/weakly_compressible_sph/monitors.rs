@@ -1,5 +1,7 @@
 //! What a series shows of two fluids, and what a report makes of it.
 
+use super::budget::Contents;
+use super::interactions::surface_tension::{smoothed_delta, smoothed_step};
 use super::quantities;
 use super::species::Species;
 use super::system::SphSystem;
@@ -10,6 +12,8 @@ use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::Interrupted;
 use crate::simulation::section::known;
 use crate::simulation::{LoadError, Quantity, Section};
+use nalgebra::Matrix3;
+use std::f64::consts::PI;
 
 /// Numbers of one state, in the order of [`names`].
 pub(super) type Row = Vec<f64>;
@@ -32,8 +36,24 @@ pub(super) fn names(dimension: usize) -> Vec<&'static Quantity> {
         &quantities::MACH,
         &quantities::CFL,
         &quantities::LEAST_PAIR_DISTANCE_H,
+        &quantities::SPEED_MAX,
+        if dimension == 2 { &quantities::PERIMETER } else { &quantities::SURFACE_AREA },
+        &quantities::SURFACE_ENERGY,
+        &quantities::ELASTIC_ENERGY,
+        &quantities::WORK,
+        &quantities::ELONGATION,
     ]);
+    names.extend((dimension == 2).then_some(&quantities::ELONGATION_ANGLE));
+    names.push(&quantities::CIRCULARITY);
+    if dimension == 2 {
+        names.extend([&quantities::MODE_2, &quantities::MODE_3, &quantities::MODE_4]);
+    }
     names
+}
+
+/// Numbers of a row in version 0.1, whose checkpoints have the first of [`names`] alone.
+pub(super) fn names_of_version_0_1(dimension: usize) -> usize {
+    12 + 3 * dimension
 }
 
 /// Saves a row by the names of its quantities; what is not known is left open.
@@ -116,38 +136,44 @@ impl<const D: usize> SphSystem<D> {
         })
     }
 
-    /// The least distance of two particles, in h.
-    fn least_distance(&self) -> f64 {
+    /// The least distance of two particles, in h, and the share of particles that have another closer than `crowded`, in h.
+    fn pair_distances(&self, crowded: f64) -> (f64, f64) {
         let positions = self.particles.positions();
         let mut cells = CellList::new(self.domain.clone());
         let reach = self.config.spacing;
         cells.rebuild(positions.iter().copied(), reach);
         let mut least = reach * reach;
+        let limit = (crowded * reach) * (crowded * reach);
+        let mut close = 0_usize;
         for (i, x) in positions.iter().enumerate() {
+            let mut nearest = f64::INFINITY;
             cells.for_each_within(x, reach, |j, _, r2| {
                 if j != i {
-                    least = least.min(r2);
+                    nearest = nearest.min(r2);
                 }
             });
+            least = least.min(nearest);
+            close += usize::from(nearest < limit);
         }
-        least.sqrt() / self.config.spacing
+        (least.sqrt() / self.config.spacing, close as f64 / positions.len() as f64)
     }
 
-    /// Everything a row of the series shows.
-    pub(super) fn row(&self, time_step: f64, moments: Option<&EnclosedMoments<D>>) -> Row {
-        let mut energy = 0.0;
-        let mut momentum = Vector::<D>::zeros();
-        for (i, u) in self.flow.velocity.iter().enumerate() {
-            let mass = self.flow.mass(i);
-            energy += 0.5 * mass * u.norm_squared();
-            momentum += u * mass;
-        }
-        let mut row = vec![energy];
-        row.extend(momentum.iter());
+    /// Everything a row of the series shows, and the share of particles that are closer than `crowded`, in h.
+    pub(super) fn row(
+        &self,
+        time_step: f64,
+        moments: Option<&EnclosedMoments<D>>,
+        (contents, work): (&Contents<D>, f64),
+        crowded: f64,
+    ) -> (Row, f64) {
+        let mut row = vec![contents.kinetic];
+        row.extend(contents.momentum.iter());
         let (mean, deviation) = self.curvature_spread();
         row.extend([mean, deviation]);
         let nothing = Vector::<D>::repeat(f64::NAN);
-        row.push(moments.map_or(f64::NAN, |m| m.area_or_volume));
+        row.push(self.enclosed_measure(moments));
+        // A layer has neither a center nor extents.
+        let moments = moments.filter(|_| !self.droplets.has_layer());
         row.extend(moments.map_or(nothing, EnclosedMoments::center).iter());
         row.extend(moments.map_or(nothing, |m| m.high - m.low).iter());
         row.push(moments.map_or(f64::NAN, deformation));
@@ -156,9 +182,80 @@ impl<const D: usize> SphSystem<D> {
         let speed = self.flow.largest_speed();
         let sound = self.config.fluids.least_sound_speed();
         row.extend([inside_full, outside, inside - outside, droplets, speed / sound]);
-        row.extend([speed * time_step / self.config.spacing, self.least_distance()]);
-        row
+        let (least, close) = self.pair_distances(crowded);
+        row.extend([speed * time_step / self.config.spacing, least, speed, contents.interface]);
+        row.extend([self.config.tension * contents.interface, contents.elastic, work]);
+        let (elongation, angle) = moments.map_or((f64::NAN, f64::NAN), elongation);
+        row.push(elongation);
+        row.extend((D == 2).then_some(angle));
+        row.push(moments.map_or(f64::NAN, |m| circularity::<D>(m.area_or_volume, contents.interface)));
+        if D == 2 {
+            row.extend(self.modes(moments));
+        }
+        (row, close)
     }
+
+    /// Area or volume inside: by quadrature on the fits, of a layer by a smoothed sum over the particles.
+    fn enclosed_measure(&self, moments: Option<&EnclosedMoments<D>>) -> f64 {
+        if !self.droplets.has_layer() || self.interface.level_set().is_none() {
+            return moments.map_or(f64::NAN, |m| m.area_or_volume);
+        }
+        let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
+        let share = |i: usize| match self.flow.species[i] {
+            _ if band[i] == 1 => smoothed_step(-phi[i], self.config.smoothing_length),
+            species => species.color(),
+        };
+        (0..phi.len()).map(|i| self.flow.volume[i] * share(i)).sum()
+    }
+
+    /// Sizes of the modes 2 to 4 of the distance from the centroid over the angle, by its mean: |∮ r e^{inθ} dθ|/∮ r dθ times 2,
+    /// with dθ = (r·n)/r² V δ at the foot points. Only of a single drop in the plane.
+    fn modes(&self, moments: Option<&EnclosedMoments<D>>) -> [f64; 3] {
+        let (Some(moments), Some(level_set)) = (moments, self.interface.level_set()) else { return [f64::NAN; 3] };
+        if self.droplets.number() != 1 {
+            return [f64::NAN; 3];
+        }
+        let (particles, columns) = (&self.particles, &self.columns);
+        let (phi, band) = (particles.scalar(columns.phi), particles.flag(columns.in_band));
+        let (foot, normal) = (particles.vector(columns.closest_point), particles.vector(columns.normal));
+        let center = self.domain.wrap(moments.center());
+        let mut sums = [[0.0; 2]; 4];
+        for i in level_set.candidates().iter().copied().filter(|i| band[*i] == 1) {
+            let r = self.domain.displacement(&center, &foot[i]);
+            let square = r.norm_squared();
+            let length = self.flow.volume[i] * smoothed_delta(phi[i], self.config.smoothing_length);
+            let angle = r[1].atan2(r[0]);
+            // r dθ
+            let share = r.dot(&normal[i]) / square * length * square.sqrt();
+            for (sum, n) in sums.iter_mut().zip([0.0, 2.0, 3.0, 4.0]) {
+                sum[0] += share * (n * angle).cos();
+                sum[1] += share * (n * angle).sin();
+            }
+        }
+        std::array::from_fn(|k| 2.0 * sums[k + 1][0].hypot(sums[k + 1][1]) / sums[0][0])
+    }
+}
+
+/// (a − b)/(a + b) of the largest and the least eigenvalue of the central second moments, and the angle of the longest axis
+/// with x.
+fn elongation<const D: usize>(moments: &EnclosedMoments<D>) -> (f64, f64) {
+    let covariance = moments.covariance();
+    if D == 2 {
+        let (mean, half) =
+            (0.5 * (covariance[(0, 0)] + covariance[(1, 1)]), 0.5 * (covariance[(0, 0)] - covariance[(1, 1)]));
+        let mixed = covariance[(0, 1)];
+        return (half.hypot(mixed) / mean, 0.5 * mixed.atan2(half));
+    }
+    let full = Matrix3::from_fn(|d, e| covariance[(d.min(D - 1), e.min(D - 1))]);
+    let values = full.symmetric_eigenvalues();
+    let (most, least) = (values.max(), values.min());
+    ((most - least) / (most + least), f64::NAN)
+}
+
+/// Perimeter of the disk of the same area by that of the interface, in space the area of the ball of the same volume.
+fn circularity<const D: usize>(measure: f64, interface: f64) -> f64 {
+    let ball = if D == 2 { 2.0 * (PI * measure).sqrt() } else { (36.0 * PI * measure * measure).cbrt() };
+    ball / interface
 }
 
 /// (Qxx − Qyy)/(Qxx + Qyy) of the central second moments; in space with the mean of Qyy and Qzz for Qyy.

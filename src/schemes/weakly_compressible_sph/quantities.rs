@@ -31,6 +31,18 @@ quantities! {
         MACH = "mach", "", "Largest speed by the lower speed of sound.";
         CFL = "cfl", "spacings", "Longest way of a particle in a part of the last step.";
         LEAST_PAIR_DISTANCE_H = "least_pair_distance_h", "spacings", "Least distance of two particles.";
+        SPEED_MAX = "speed_max", "length/time", "Largest speed of a particle.";
+        PERIMETER = "perimeter", "length", "Length of the interface, as the sum of V delta over the particles.";
+        SURFACE_AREA = "surface_area", "length^2", "Area of the interface, as the sum of V delta over the particles.";
+        SURFACE_ENERGY = "surface_energy", "mass*length^2/time^2", "Surface tension times perimeter or surface area.";
+        ELASTIC_ENERGY = "elastic_energy", "mass*length^2/time^2", "Energy of compression of both fluids.";
+        WORK = "work", "mass*length^2/time^2", "Work of the body force since the start.";
+        ELONGATION = "elongation", "", "(a - b)/(a + b) of the largest and the least eigenvalue of the central second moments.";
+        ELONGATION_ANGLE = "elongation_angle", "radians", "Angle of the longest axis with x, from -pi/2 to pi/2, in the plane.";
+        CIRCULARITY = "circularity", "", "Perimeter (in space, area) of the ball of the same area (volume) by that of the interface.";
+        MODE_2 = "mode_2", "", "Size of mode 2 of the distance from the centroid over the angle, by its mean, in the plane.";
+        MODE_3 = "mode_3", "", "Size of mode 3 of the distance from the centroid over the angle, by its mean, in the plane.";
+        MODE_4 = "mode_4", "", "Size of mode 4 of the distance from the centroid over the angle, by its mean, in the plane.";
     }
 }
 

@@ -1,27 +1,24 @@
 //! Two fluids step by step.
 
+use super::checks::LIMITS;
 use super::droplets::ball_curvature;
 use super::format_1;
 use super::frame_fields;
-use super::interface::LevelSet;
+use super::guard::Guard;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
 use super::quantities::{TIME, TIME_STEP};
-use super::species::Species;
 use super::stepping::Stepper;
 use super::summary::Summary;
-use super::system::{EvaluationError, SphSystem};
-use super::time_step::{REFERENCE_SPEED, StepLimit, longest_step};
-use crate::closest_point::FitDiagnostics;
-use crate::operators::SupportDiagnostics;
+use super::system::{EvaluationError, Instant, SphSystem};
+use super::time_step::{StepLimit, longest_step};
 use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, support_diagnostics};
-use crate::simulation::components::{check_particles, load_particles, save_particles};
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
-use crate::simulation::section::{copy_vectors, known};
 use crate::simulation::{
     Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Report,
     Section, Selection, Simulation, StepError,
 };
+use crate::time::clock::TIME_SLACK;
 use crate::time::{Clock, FixedStep, Pace};
 use std::collections::BTreeMap;
 
@@ -39,6 +36,7 @@ pub struct WeaklyCompressibleSph<const D: usize> {
     /// Failure of the first evaluation.
     failure: Option<StepError>,
     row: Row,
+    guard: Guard<D>,
     summary: Summary,
     course: Course,
 }
@@ -64,6 +62,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
+            guard: Guard::new(&system),
             system,
             plan,
             end_time,
@@ -82,16 +81,21 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let start = Clock { step: 0, time: 0.0 };
         // A row of the right length, whatever happens.
         self.row = vec![f64::NAN; names(D).len()];
-        self.system.evaluate(0.0, false, &mut self.course.phases).map_err(|error| failed(error, start))?;
+        let instant = Instant::default();
+        self.system.evaluate(instant, &mut self.course.phases).map_err(|error| failed(error, start))?;
         if self.system.droplets.initial_measure.is_nan()
             && let Some(moments) = self.system.moments()?
         {
             // Of a drop that is known by its particles alone, the first quadrature says what is to be kept.
             self.system.droplets.initial_measure = moments.area_or_volume;
             self.system.droplets.renew_ball_curvatures();
-            self.system.evaluate(0.0, false, &mut self.course.phases).map_err(|error| failed(error, start))?;
+            self.system.evaluate(instant, &mut self.course.phases).map_err(|error| failed(error, start))?;
+        }
+        if self.system.calibrate() {
+            self.system.evaluate(instant, &mut self.course.phases).map_err(|error| failed(error, start))?;
         }
         self.summary.droplets = self.system.droplets.number() as f64;
+        self.guard = Guard::new(&self.system);
         self.take_row()
     }
 
@@ -109,21 +113,54 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let time_step = self.time_of_part();
         let system = &self.system;
         let moments = self.course.phases.measure("measure", || system.moments())?;
-        self.row = self.course.phases.measure("measure", || system.row(time_step, moments.as_ref()));
+        let contents = system.contents();
+        let (row, crowded) = self.course.phases.measure("measure", || {
+            let supply = (&contents, self.guard.budget.work);
+            system.row(time_step, moments.as_ref(), supply, LIMITS.pair_distance)
+        });
+        self.row = row;
         let Clock { step, time } = self.clock();
-        let of =
-            |name: &str| names(D).iter().position(|quantity| quantity.name == name).map_or(f64::NAN, |k| self.row[k]);
+        let of = |name: &str| self.row_value(name);
         let jump = of("pressure_inside") - of("pressure_outside");
         let momentum = self.row[1..=D].iter().map(|m| m * m).sum::<f64>().sqrt();
         let numbers = [jump, of("pressure_eos_jump"), of("curvature_mean"), of("curvature_std"), momentum];
         self.summary.take(time >= 0.8 * self.end().time, numbers);
-        if let Some(moments) = moments {
+        let is_closed = !system.droplets.has_layer();
+        if let Some(moments) = moments.filter(|_| is_closed) {
             let turned = self.summary.take_shape(time, moments.area_or_volume, deformation(&moments));
             if let Some((code, message)) = turned {
                 self.course.findings.push(Finding::info(code, message, (step, time)));
             }
         }
+        let clock = self.clock();
+        let measured = (crowded, self.row_value(if D == 2 { "area" } else { "volume" }));
+        self.guard.measure(&self.system, &contents, measured, clock)?;
+        let Fastest { speed, sound_speed, .. } = fastest(&self.system);
+        self.course.findings.extend(self.guard.new_doubts(&self.system, speed / sound_speed, clock));
         Ok(())
+    }
+
+    /// The steps of a run that goes on at a clock, after steps of a length since `origin` to an end.
+    ///
+    /// Steps that the scene chose go on as they were; to another end they are as long as lands on it. Of steps that were given,
+    /// those of another length begin at the restart.
+    fn pace_after(&self, clock: Clock, (time_step, origin): (f64, Clock), end_time: f64) -> Pace {
+        if self.system.config.is_adaptive {
+            if end_time.to_bits() == self.end_time.to_bits() {
+                return Pace::new(time_step, self.end_time, origin);
+            }
+            let left = self.end_time - clock.time;
+            let length = if left > 0.0 { left / (left / time_step - TIME_SLACK).ceil() } else { time_step };
+            return Pace::new(length, self.end_time, clock);
+        }
+        let given = self.course.pace.time_step;
+        let is_same = time_step.to_bits() == given.to_bits();
+        Pace::new(given, self.end_time, if is_same { origin } else { clock })
+    }
+
+    /// A number of the row; NaN without one.
+    fn row_value(&self, name: &str) -> f64 {
+        names(D).iter().position(|quantity| quantity.name == name).map_or(f64::NAN, |k| self.row[k])
     }
 
     fn is_row_due(&self, step: u64) -> bool {
@@ -156,7 +193,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         self.max_cfl = self.max_cfl.max(speed * self.time_of_part() / system.config.spacing);
         if speed > sound_speed {
             // What would have held at the speeds that a sound run has.
-            let StepLimit { length: stable, cause: bound } = longest_step(&system.config, REFERENCE_SPEED);
+            let StepLimit { length: stable, cause: bound } = longest_step(&system.config, system.config.expected_speed);
             let time_step = self.time_of_part();
             let Clock { step, time } = next;
             return Err(StepError::TooFast { particle, speed, sound_speed, time_step, stable, bound, step, time });
@@ -234,6 +271,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
                 self.course.findings.push(finding.with_count(droplets as u64));
                 self.summary.droplets = droplets as f64;
             }
+            self.guard.advance(&self.system, time + part, part, changed.is_some());
         }
         self.check(next)?;
         self.course.step = next.step;
@@ -254,38 +292,14 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     fn save(&self, state: &mut Section) {
-        let system = &self.system;
         self.course.save(state);
         state.put_section("pace", |section| {
             section.put_real("time_step", self.course.pace.time_step);
             section.put_component("origin", &self.course.pace.origin);
             section.put_count("parts_of_step", self.parts_of_step);
         });
-        state.put_section("particles", |section| {
-            save_particles(&system.particles, section);
-            section.put_counts("phase", system.flow.species.iter().map(|species| u64::from(species.code())));
-            section.put_vectors("velocity", &system.flow.velocity);
-            section.put_vectors("acceleration", &system.rates.acceleration);
-            section.put_vectors("reference", &system.pairs.lists.reference);
-            section.put_reals("density", &system.flow.density);
-            section.put_reals("density_rate", &system.rates.density);
-        });
-        state.put_section("droplets", |section| {
-            section.put_flags("droplet", &system.droplets.label);
-            section.put_reals("ball_curvatures", &system.droplets.ball_curvatures);
-            section.put_optional("initial_measure", known(system.droplets.initial_measure));
-        });
-        if let Some(level_set) = system.interface.level_set() {
-            state.put_section("interface", |section| {
-                section.put_component("redistancing", level_set.surface.fit_diagnostics());
-                section.put_count("bounded_curvatures", level_set.bounded);
-                section.put_flags("candidate", &level_set.is_candidate);
-            });
-        }
-        if let Some(flow) = system.equations.fits() {
-            state.put_component("flow_fits", &flow.fit_diagnostics);
-        }
-        state.put_count("absorbed_strays", system.strays.absorbed);
+        state.put_section("guard", |section| self.guard.save(section));
+        self.system.save(state);
         state.put_real("max_cfl", self.max_cfl);
         state.put_count("resting_steps", self.resting);
         state.put_section("row", |section| save_row::<D>(&self.row, section));
@@ -295,48 +309,23 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
         // 1. Everything is read, and checked against this scene.
         let clock: Clock = state.component("clock")?;
+        let summary: Summary = state.component("summary")?;
         let (pace, parts_of_step) = state.section("pace", |section| {
             let (time_step, origin) = (section.real("time_step")?, section.component("origin")?);
-            // Steps of another length begin at the restart.
-            let is_same = time_step.to_bits() == self.course.pace.time_step.to_bits();
-            let pace = Pace::new(self.course.pace.time_step, self.end_time, if is_same { origin } else { clock });
+            let pace = self.pace_after(clock, (time_step, origin), summary.late.end_time);
             Ok((pace, section.count("parts_of_step")?))
         })?;
         if clock.step > pace.last {
             return Err(LoadError::Beyond { step: clock.step, last: pace.last });
         }
-        let interface = match self.system.interface.level_set() {
-            Some(level_set) => Some(state.section("interface", |section| load_interface(level_set, section))?),
-            None => None,
-        };
-        let flow_fits: Option<SupportDiagnostics> = match self.system.equations.fits() {
-            Some(_) => Some(state.component("flow_fits")?),
-            None => None,
-        };
-        let species = state.section("particles", species_of)?;
-        let (absorbed, max_cfl) = (state.count("absorbed_strays")?, state.real("max_cfl")?);
+        let max_cfl = state.real("max_cfl")?;
         let (resting, row) = (state.count("resting_steps")?, state.section("row", load_row::<D>)?);
-        let summary: Summary = state.component("summary")?;
-        state.section("particles", |section| check_columns(&self.system, section))?;
-        state.section("droplets", |section| check_droplets(&self.system, section))?;
+        let guard = state.section("guard", |section| self.guard.load(section))?;
+        self.system.load(state)?;
         // 2. From here on nothing fails.
-        state.section("particles", |section| load_columns(&mut self.system, section))?;
-        state.section("droplets", |section| load_droplets(&mut self.system, section))?;
-        let system = &mut self.system;
-        system.flow.species = species;
-        if let (Some((diagnostics, bounded, candidates)), Some(level_set)) =
-            (interface, system.interface.level_set_mut())
-        {
-            *level_set.surface.fit_diagnostics_mut() = diagnostics;
-            level_set.bounded = bounded;
-            copy_flags(candidates, &mut level_set.is_candidate);
-        }
-        if let (Some(soundness), Some(flow)) = (flow_fits, system.equations.fits_mut()) {
-            flow.fit_diagnostics = soundness;
-        }
-        system.strays.absorbed = absorbed;
         // An interrupt ends the run before its next step.
-        let _ = system.derive();
+        let _ = self.system.derive();
+        self.guard = guard;
         self.failure = None;
         (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
         (self.row, self.summary) = (row, summary.with_end(self.end_time));
@@ -348,7 +337,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 
     fn translate_format_1(&self, arrays: &Section) -> Result<Section, LoadError> {
         let has = (self.system.interface.level_set().is_some(), self.system.equations.fits().is_some());
-        format_1::translate(arrays, &self.system.particles, has)
+        format_1::translate(arrays, &self.system.particles, &self.guard, has)
     }
 
     fn report(&self) -> Report {
@@ -367,6 +356,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             self.summary.last_measure().map(|measure| measure / self.system.droplets.initial_measure - 1.0);
         let Fastest { speed, sound_speed, .. } = fastest(&self.system);
         let mut checks = vec![Check::at_most("mach", Some(speed / sound_speed), 1.0, "")];
+        checks.extend(self.guard.checks(&self.system));
         if self.system.interface.level_set().is_some() {
             checks.push(Check::watched(if D == 2 { "area_drift" } else { "volume_drift" }, volume_drift, ""));
             checks.push(Check::watched("absorbed_strays", Some(self.system.strays.absorbed as f64), "particles"));
@@ -394,66 +384,6 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let doc = "Particles without a neighbor of their own fluid that took the side of their neighbors.";
         diagnostics.push(Diagnostic::count("strays.absorbed", self.system.strays.absorbed, doc));
         diagnostics
-    }
-}
-
-/// The soundness of fits, the bounded curvatures and the candidates of a state.
-fn load_interface<'a, const D: usize>(
-    level_set: &LevelSet<D>,
-    section: &'a Section,
-) -> Result<(FitDiagnostics, u64, &'a [u64]), LoadError> {
-    let candidates = section.counts_of("candidate", level_set.is_candidate.len())?;
-    Ok((section.component("redistancing")?, section.count("bounded_curvatures")?, candidates))
-}
-
-/// The species of all particles.
-fn species_of(section: &Section) -> Result<Vec<Species>, LoadError> {
-    let unknown = || LoadError::Kind { name: "phase".to_owned(), expected: "0 or 1 everywhere" };
-    section.counts("phase")?.iter().map(|code| Species::from_code(*code).ok_or_else(unknown)).collect()
-}
-
-/// Checks the columns of particles against this scene.
-fn check_columns<const D: usize>(system: &SphSystem<D>, section: &Section) -> Result<(), LoadError> {
-    let count = system.flow.count();
-    check_particles(&system.particles, section)?;
-    section.counts_of("phase", count)?;
-    for name in ["velocity", "acceleration", "reference"] {
-        section.reals_of(name, count * D)?;
-    }
-    section.reals_of("density", count)?;
-    section.reals_of("density_rate", system.rates.density.len())?;
-    Ok(())
-}
-
-/// Loads the columns of particles, as they were checked.
-fn load_columns<const D: usize>(system: &mut SphSystem<D>, section: &Section) -> Result<(), LoadError> {
-    load_particles(&mut system.particles, section)?;
-    copy_vectors(section.reals("velocity")?, &mut system.flow.velocity);
-    copy_vectors(section.reals("acceleration")?, &mut system.rates.acceleration);
-    copy_vectors(section.reals("reference")?, &mut system.pairs.lists.reference);
-    system.flow.density.copy_from_slice(section.reals("density")?);
-    system.rates.density.copy_from_slice(section.reals("density_rate")?);
-    Ok(())
-}
-
-/// Checks which particle belongs to which droplet.
-fn check_droplets<const D: usize>(system: &SphSystem<D>, section: &Section) -> Result<(), LoadError> {
-    section.counts_of("droplet", system.droplets.label.len())?;
-    section.reals("ball_curvatures")?;
-    section.optional("initial_measure").map(|_| ())
-}
-
-/// Loads which particle belongs to which droplet, as it was checked.
-fn load_droplets<const D: usize>(system: &mut SphSystem<D>, section: &Section) -> Result<(), LoadError> {
-    copy_flags(section.counts("droplet")?, &mut system.droplets.label);
-    system.droplets.ball_curvatures = section.reals("ball_curvatures")?.to_vec();
-    system.droplets.initial_measure = section.optional("initial_measure")?.unwrap_or(f64::NAN);
-    Ok(())
-}
-
-fn copy_flags(from: &[u64], to: &mut [u8]) {
-    for (flag, count) in to.iter_mut().zip(from) {
-        *flag = (*count).min(255) as u8;
     }
 }
 

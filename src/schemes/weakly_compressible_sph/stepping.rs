@@ -1,7 +1,7 @@
 //! Steps in time (PCP section 4.3; kick–drift–kick after Verlet).
 
 use super::config::{Integrator, SphConfig};
-use super::system::{EvaluationError, SphSystem};
+use super::system::{EvaluationError, Instant, SphSystem};
 use crate::geometry::Vector;
 use crate::simulation::Phases;
 
@@ -72,7 +72,7 @@ impl<const D: usize> Stepper<D> {
             self.start.density.clone_from(&flow.density);
             add_scaled(&mut flow.density, half, &system.rates.density);
         });
-        let changed = system.evaluate(time + step, true, phases)?;
+        let changed = system.evaluate(Instant { time: time + step, elapsed: step, may_shift: true }, phases)?;
         phases.measure("sph/advance", || {
             self.density_from_start(system);
             kick(system, half);
@@ -99,7 +99,7 @@ impl<const D: usize> Stepper<D> {
             kick(system, half);
             predict_present(system);
         });
-        let first = system.evaluate(time + half, false, phases)?;
+        let first = system.evaluate(Instant { time: time + half, elapsed: half, may_shift: false }, phases)?;
         phases.measure("sph/advance", || {
             self.drift_from_start(system, step, half);
             system.flow.velocity.copy_from_slice(&self.start.velocity);
@@ -107,7 +107,7 @@ impl<const D: usize> Stepper<D> {
             kick(system, step);
             predict_present(system);
         });
-        Ok(system.evaluate(time + step, true, phases)?.or(first))
+        Ok(system.evaluate(Instant { time: time + step, elapsed: half, may_shift: true }, phases)?.or(first))
     }
 
     /// x = x₀ + Δt (u₀ + `ahead` a).
@@ -147,7 +147,7 @@ fn add_scaled(values: &mut [f64], step: f64, rates: &[f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::Stepper;
+    use super::{Instant, Stepper};
     use crate::geometry::Vector;
     use crate::parallel::Interrupt;
     use crate::schemes::weakly_compressible_sph::test_setting::setting;
@@ -170,7 +170,7 @@ mod tests {
                 let mut system =
                     SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
                 let mut phases = Phases::new(CpuClock::still());
-                system.evaluate(0.0, false, &mut phases).unwrap();
+                system.evaluate(Instant::default(), &mut phases).unwrap();
                 for k in 0..steps {
                     stepper.advance(&mut system, f64::from(k) * step, step, &mut phases).unwrap();
                 }

@@ -20,24 +20,28 @@ pub(super) struct Strays<const D: usize> {
     found: Vec<usize>,
     /// Particles that have changed their species up to now.
     pub absorbed: u64,
+    /// Particles that the fluid inside has lost by that, less those that it gained.
+    pub lost: i64,
+    /// The most particles that the fluid inside may lose or gain; further strays wait for their balance.
+    allowance: i64,
 }
 
 impl<const D: usize> Strays<D> {
-    pub fn new(domain: Domain<D>) -> Self {
-        Self { cells: CellList::new(domain), found: Vec::new(), absorbed: 0 }
+    pub fn new(domain: Domain<D>, allowance: i64) -> Self {
+        Self { cells: CellList::new(domain), found: Vec::new(), absorbed: 0, lost: 0, allowance }
     }
 
-    /// Changes species and level of the particles among `near` that have no neighbor of their own species. All particles are
+    /// Changes species and levels (signed distance and carried level) of the particles among `near` that have no neighbor of their own species. All particles are
     /// judged by the species before the change.
     pub fn absorb(
         &mut self,
         particles: &mut Particles<D>,
-        phi: ScalarKey,
+        levels: [ScalarKey; 2],
         near: &[usize],
         spacing: f64,
         species: &mut [Species],
     ) {
-        let (positions, level) = (particles.positions(), particles.scalar(phi));
+        let (positions, level) = (particles.positions(), particles.scalar(levels[0]));
         let cutoff = NEIGHBORHOOD_H * spacing;
         self.cells.rebuild(near.iter().map(|i| positions[*i]), cutoff);
         self.found.clear();
@@ -50,12 +54,20 @@ impl<const D: usize> Strays<D> {
                 self.found.push(*i);
             }
         }
-        let level = particles.scalar_mut(phi);
         for i in &self.found {
+            let lost = self.lost + if species[*i] == Species::Inside { 1 } else { -1 };
+            if lost.abs() > self.allowance {
+                continue;
+            }
+            self.lost = lost;
+            self.absorbed += 1;
             species[*i] = species[*i].across_interface();
-            level[*i] = -level[*i];
+            let side = -species[*i].color() + 0.5;
+            for key in levels {
+                let level = &mut particles.scalar_mut(key)[*i];
+                *level = level.copysign(side);
+            }
         }
-        self.absorbed += self.found.len() as u64;
     }
 }
 
@@ -81,12 +93,19 @@ mod tests {
         for (level, species) in particles.scalar_mut(phi).iter_mut().zip(&species) {
             *level -= species.color();
         }
-        let mut strays = Strays::new(Domain::unbounded());
-        strays.absorb(&mut particles, phi, &all, 1.0, &mut species);
+        let mut strays = Strays::new(Domain::unbounded(), i64::MAX);
+        strays.absorb(&mut particles, [phi, phi], &all, 1.0, &mut species);
         for (x, (species, level)) in particles.positions().iter().zip(species.iter().zip(particles.scalar(phi))) {
             assert_eq!(*species, by_side(stays(x)), "{x}");
             assert_eq!(*species, Species::from_level(*level));
         }
-        assert_eq!(strays.absorbed, 2);
+        assert_eq!((strays.absorbed, strays.lost), (2, 0));
+        let mut none = Strays::new(Domain::unbounded(), 0);
+        // One more inside in the upper half is not absorbed without a balance.
+        let alone = particles.positions().iter().position(|x| at(x, [-6.0, 8.0])).unwrap();
+        species[alone] = Species::Inside;
+        particles.scalar_mut(phi)[alone] = -0.5;
+        none.absorb(&mut particles, [phi, phi], &all, 1.0, &mut species);
+        assert_eq!((none.absorbed, species[alone]), (0, Species::Inside));
     }
 }

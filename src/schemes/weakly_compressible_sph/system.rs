@@ -1,17 +1,20 @@
 //! The particles of the fluids, and one evaluation: from positions to rates of change.
 
-use super::config::{Geometry, SphConfig};
+use super::config::{Geometry, PressureConfig, SphConfig, Volumes};
 use super::droplets::{Droplets, Searched};
 use super::equations::FlowEquations;
 use super::flow_state::{FlowState, Rates};
-use super::interactions::surface_tension::SurfaceTension;
-use super::interactions::{Moment, ParticleForce, density_summation, shifting};
+use super::interactions::surface_tension::{BandForces, SurfaceTension};
+use super::interactions::{BodyForce, Moment, ParticleForce, TensionForce, density_summation, shifting};
+use super::interface::level_set::{Answering, LevelSetConfig};
 use super::interface::{ColorField, Interface, InterfaceError, LevelSet};
 use super::kernel_choice::ScaledKernel;
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
+use super::species::{Fluids, Species};
 use super::strays::Strays;
 use crate::closest_point::SurfaceColumns;
+use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::pencils::BoxTooSmall;
 use crate::parallel::{Interrupt, Interrupted};
@@ -45,10 +48,22 @@ pub struct SphSystem<const D: usize> {
     pub(super) strays: Strays<D>,
     pub(super) equations: FlowEquations<D>,
     tension: Option<SurfaceTension>,
-    /// Forces on particles, added in this order.
+    /// Accelerations by surface tension of the particles in the band, at the last evaluation.
+    pub(super) band: BandForces<D>,
+    /// Forces on particles, added in this order behind those of the band.
     forces: Vec<Box<dyn ParticleForce<D>>>,
     pub(super) rates: Rates<D>,
     pub(super) interrupt: Interrupt,
+}
+
+/// When an evaluation happens.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Instant {
+    pub time: f64,
+    /// Time since the last evaluation, 0 for the first.
+    pub elapsed: f64,
+    /// Whether particles may be shifted.
+    pub may_shift: bool,
 }
 
 /// The reason why an evaluation did not end.
@@ -60,7 +75,7 @@ impl<const D: usize> SphSystem<D> {
     /// # Errors
     /// [`BoxTooSmall`].
     pub fn new(
-        config: SphConfig<D>,
+        mut config: SphConfig<D>,
         domain: Domain<D>,
         cell: f64,
         drop: Drop<D>,
@@ -68,10 +83,12 @@ impl<const D: usize> SphSystem<D> {
     ) -> Result<Self, BoxTooSmall> {
         let count = drop.positions.len();
         let lists = NeighborLists::new(&domain, config.cutoff(), config.skin(), count)?;
+        config.body_force = config.body_force.map(|force| balance(force, &config.fluids, &drop.level));
         let kernel = ScaledKernel::new(config.kernel, config.smoothing_length, D);
         let mut particles = Particles::new(drop.positions);
         let columns = SurfaceColumns::add(&mut particles);
         particles.scalar_mut(columns.phi).copy_from_slice(&drop.level);
+        let interface = new_interface(&config, &domain, &mut particles, &columns);
         let tension = config.has_tension().then(|| config.surface_tension());
         let mut forces: Vec<Box<dyn ParticleForce<D>>> = Vec::new();
         if let Some(tension) = tension {
@@ -83,14 +100,15 @@ impl<const D: usize> SphSystem<D> {
         Ok(Self {
             flow: FlowState::at_rest(config.fluids, cell, &drop.level),
             pairs: PairWorkspace::new(lists, kernel, cell, interrupt.clone()),
-            interface: new_interface(&config, &domain, count),
+            interface,
             droplets: Droplets::new(domain.clone(), count, drop.measure),
-            strays: Strays::new(domain.clone()),
+            strays: Strays::new(domain.clone(), stray_allowance(&config, &drop.level)),
             equations: FlowEquations::new(&config, &domain, count),
             rates: Rates::none(count, config.is_density_integrated()),
             particles,
             columns,
             tension,
+            band: BandForces::default(),
             forces,
             config,
             domain,
@@ -98,8 +116,8 @@ impl<const D: usize> SphSystem<D> {
         })
     }
 
-    /// One evaluation: from positions, and the velocities in `predicted`, to rates. Returns the number of droplets where it
-    /// changed.
+    /// One evaluation: from positions, and the velocities in `predicted`, to rates. `elapsed` is the time since the last
+    /// evaluation, 0 for the first. Returns the number of droplets where it changed.
     ///
     /// 1. Neighbors, listed anew where a particle has moved too far.
     /// 2. Fits around the interface; particles shifted where the scene says so; closest points at their new positions.
@@ -107,19 +125,22 @@ impl<const D: usize> SphSystem<D> {
     /// 4. Interactions between particles, then forces on particles.
     pub(super) fn evaluate(
         &mut self,
-        time: f64,
-        may_shift: bool,
+        Instant { time, elapsed, may_shift }: Instant,
         phases: &mut Phases,
     ) -> Result<Option<usize>, EvaluationError> {
         let is_listed = self.list_where_stale(phases)?;
         phases.measure("sph/gather", || self.pairs.gather_positions(self.particles.positions()));
-        let changed = self.find_interface(is_listed, may_shift, phases)?;
+        let changed = self.find_interface((is_listed, elapsed), may_shift, phases)?;
         if self.config.is_density_integrated() {
             self.flow.derive_volumes();
         } else {
             phases.measure("sph/density", || self.sum_densities())?;
         }
         self.flow.derive_pressures();
+        let PressureConfig { bulk_damping, .. } = self.config.pressure;
+        if bulk_damping > 0.0 && !self.config.is_density_integrated() {
+            self.flow.damp_bulk(bulk_damping * self.config.smoothing_length, elapsed);
+        }
         if let Interface::ColorField(color) = &mut self.interface {
             phases.measure("sph/color", || {
                 let found = color.find(&self.flow, &mut self.pairs);
@@ -144,9 +165,9 @@ impl<const D: usize> SphSystem<D> {
         if let Interface::LevelSet(level_set) = interface {
             phases.measure("redistancing/detection", || level_set.select(particles, columns));
             if config.is_shifted && config.fluids.are_equal() {
-                let (phi, near) = (columns.phi, level_set.candidates());
+                let (levels, near) = ([columns.phi, level_set.carried()], level_set.candidates());
                 phases.measure("droplets", || {
-                    strays.absorb(particles, phi, near, config.spacing, &mut flow.species);
+                    strays.absorb(particles, levels, near, config.spacing, &mut flow.species);
                 });
             }
         }
@@ -156,7 +177,7 @@ impl<const D: usize> SphSystem<D> {
     /// The interface, with particles shifted between the fits and the closest points, and the count of droplets.
     fn find_interface(
         &mut self,
-        is_listed: bool,
+        (is_listed, elapsed): (bool, f64),
         may_shift: bool,
         phases: &mut Phases,
     ) -> Result<Option<usize>, EvaluationError> {
@@ -164,13 +185,38 @@ impl<const D: usize> SphSystem<D> {
             level_set.rebuild(&self.particles, &self.columns, &self.interrupt, phases)?;
         }
         if self.config.is_shifted && may_shift {
-            phases.measure("sph/shifting", || self.shift())?;
+            phases.measure("sph/shifting", || self.shift(elapsed))?;
         }
         if let Interface::LevelSet(level_set) = &mut self.interface {
-            level_set.answer(&mut self.particles, &self.columns, is_listed, &self.interrupt, phases)?;
+            let droplet = (self.droplets.number() > 1).then_some(self.droplets.label.as_slice());
+            let answering = Answering { is_selection: is_listed, elapsed, droplet };
+            level_set.answer(&mut self.particles, &self.columns, answering, &self.interrupt, phases)?;
         }
         let is_due = is_listed && self.tension.is_some();
         Ok(if is_due { phases.measure("droplets", || self.count_droplets()) } else { None })
+    }
+
+    /// Sets what pressures are measured by: the volumes of the start fill the box, and the background pressure follows from the
+    /// curvature κ₀ of the smallest droplet. A layer has none; 2 by the shortest side of the box stands for it.
+    ///
+    /// Returns whether anything changed, so that the rates have to be found again.
+    pub(super) fn calibrate(&mut self) -> bool {
+        let PressureConfig { volumes, background, .. } = self.config.pressure;
+        if self.config.is_density_integrated() || (volumes == Volumes::Plain && background <= 0.0) {
+            return false;
+        }
+        if volumes == Volumes::Calibrated {
+            let filled: f64 = self.flow.volume.iter().sum();
+            self.flow.calibration *= self.flow.cell * self.flow.count() as f64 / filled;
+        }
+        let sides = self.domain.axes().iter().map(|axis| match axis {
+            Axis::Unbounded => f64::INFINITY,
+            Axis::Periodic { length, .. } => *length,
+        });
+        let kappa = self.droplets.ball_curvatures.iter().copied().fold(0.0, f64::max);
+        let kappa = if kappa > 0.0 { kappa } else { 2.0 / sides.fold(f64::INFINITY, f64::min) };
+        self.flow.background = background * self.config.tension * kappa;
+        true
     }
 
     /// Everything that is derived from columns and not found again at every evaluation, as a restart needs it.
@@ -185,15 +231,26 @@ impl<const D: usize> SphSystem<D> {
 
     /// Moves particles towards an even distribution (PCP eq. B.16). Particles at the interface are moved along it, so that it
     /// keeps its place and no particle changes side.
-    fn shift(&mut self) -> Result<(), Interrupted> {
+    ///
+    /// With the balanced force no particle is shifted farther than the fastest has moved since the last evaluation: at rest,
+    /// shifting stirs.
+    fn shift(&mut self, elapsed: f64) -> Result<(), Interrupted> {
+        let way = match self.config.tension_force {
+            TensionForce::Balanced => self.flow.largest_speed() * elapsed,
+            TensionForce::BalancedUncorrected | TensionForce::Csf => f64::INFINITY,
+        };
         self.flow.derive_volumes();
         let Self { pairs, particles, columns, interface, config, flow, domain, .. } = self;
-        let has_level_set = interface.level_set().is_some();
+        let carried = interface.level_set().map(LevelSet::carried);
         shifting::concentration(pairs, &flow.volume, config.spacing, |i, gradient| {
-            let mut shift = shifting::displacement(gradient, config.smoothing_length);
-            if has_level_set {
+            let mut shift = shifting::displacement(gradient, config.smoothing_length, way);
+            if let Some(carried) = carried {
                 let (phi, normal) = (particles.scalar(columns.phi)[i], particles.vector(columns.normal)[i]);
                 shift -= normal * (normal.dot(&shift) * shifting::share_left_out(phi / config.spacing));
+                if carried != columns.phi {
+                    // The interface stays where it is: a particle takes the level of its new place.
+                    particles.scalar_mut(carried)[i] += normal.dot(&shift);
+                }
             }
             let x = &mut particles.positions_mut()[i];
             *x = domain.wrap(*x + shift);
@@ -203,14 +260,20 @@ impl<const D: usize> SphSystem<D> {
     }
 
     fn sum_densities(&mut self) -> Result<(), Interrupted> {
-        density_summation::sum_volumes(&mut self.pairs, &mut self.flow.volume)?;
+        density_summation::sum_volumes(&mut self.pairs, self.flow.calibration, &mut self.flow.volume)?;
         self.flow.derive_densities();
         Ok(())
     }
 
     fn add_forces(&mut self, time: f64) {
-        let Self { particles, columns, flow, interface, droplets, forces, rates, .. } = self;
+        let Self { particles, columns, flow, interface, droplets, tension, band, forces, rates, .. } = self;
         let moment = Moment { time, particles, columns, flow, interface, droplets };
+        if let Some(tension) = tension {
+            tension.find_band_forces(band, &moment);
+            for (i, force) in &band.forces {
+                rates.acceleration[*i] += force;
+            }
+        }
         for force in forces.iter() {
             force.add_to(&mut rates.acceleration, &moment);
         }
@@ -234,21 +297,49 @@ impl<const D: usize> SphSystem<D> {
     }
 }
 
-fn new_interface<const D: usize>(config: &SphConfig<D>, domain: &Domain<D>, count: usize) -> Interface<D> {
+/// The most particles that drops may lose to strays: half of what ends a run. The forces of version 0.1 and of the paper set none.
+fn stray_allowance<const D: usize>(config: &SphConfig<D>, level: &[f64]) -> i64 {
+    let inside = level.iter().filter(|level| Species::from_level(**level) == Species::Inside).count();
+    match config.tension_force {
+        TensionForce::Balanced => inside as i64 / 200,
+        TensionForce::BalancedUncorrected | TensionForce::Csf => i64::MAX,
+    }
+}
+
+/// The body force with its mean taken out, where it asks for that.
+fn balance<const D: usize>(force: BodyForce<D>, fluids: &Fluids, level: &[f64]) -> BodyForce<D> {
+    let densities = level.iter().map(|level| fluids[Species::from_level(*level)].density);
+    let mean = densities.sum::<f64>() / level.len() as f64;
+    force.without_mean(mean, fluids)
+}
+
+fn new_interface<const D: usize>(
+    config: &SphConfig<D>,
+    domain: &Domain<D>,
+    particles: &mut Particles<D>,
+    columns: &SurfaceColumns,
+) -> Interface<D> {
     if !config.has_tension() {
         return Interface::Absent;
     }
     match &config.geometry {
-        Geometry::Pcp { method, half_band } => {
-            Interface::LevelSet(Box::new(LevelSet::new(method.clone(), domain, config.spacing, *half_band, count)))
+        Geometry::Pcp { method, half_band, level_update, curvature_filter } => {
+            let level_set = LevelSetConfig {
+                spacing: config.spacing,
+                half_band: *half_band,
+                update: *level_update,
+                curvature_filter: *curvature_filter,
+                repair_time: config.repair_time(),
+            };
+            Interface::LevelSet(Box::new(LevelSet::new(method.clone(), domain, level_set, particles, columns)))
         }
-        Geometry::ColorField => Interface::ColorField(ColorField::new(count)),
+        Geometry::ColorField => Interface::ColorField(ColorField::new(particles.len())),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Drop, Interface, SphSystem};
+    use super::{Drop, Instant, Interface, SphSystem};
     use crate::geometry::Vector;
     use crate::parallel::Interrupt;
     use crate::schemes::weakly_compressible_sph::test_setting::{Setting, setting};
@@ -261,7 +352,7 @@ mod tests {
         let drop = Drop { positions: this.positions.clone(), level, measure: 2.0 };
         let mut system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
         system.flow.predicted.clone_from(&this.velocity);
-        system.evaluate(0.0, false, &mut Phases::new(CpuClock::still())).unwrap();
+        system.evaluate(Instant::default(), &mut Phases::new(CpuClock::still())).unwrap();
         system
     }
 

@@ -5,7 +5,7 @@ use super::interactions::TensionForce;
 use super::kernel_choice::{KernelChoice, ScaledKernel};
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
-use super::{DensityMethod, Discretization, Fluid, Fluids, Geometry, Integrator, SphConfig};
+use super::{DensityMethod, Discretization, Fluid, Fluids, Geometry, Integrator, PressureConfig, SphConfig};
 use crate::geometry::domain::Axis;
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Domain, Vector};
@@ -38,9 +38,11 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
         geometry: Geometry::ColorField,
         discretization: Discretization::Kernels,
         density: DensityMethod::Summation,
+        pressure: PressureConfig::PAPER,
         is_shifted: false,
         body_force: None,
         integrator: Integrator::KickDriftKick,
+        expected_speed: 3.0,
         is_adaptive: true,
         rest_below: None,
     };

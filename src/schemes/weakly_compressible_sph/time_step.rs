@@ -8,9 +8,6 @@ use super::species::Species;
 
 pub use super::interactions::StepLimit;
 
-/// The speed that the paper's time steps assume (PCP eq. B.11).
-pub const REFERENCE_SPEED: f64 = 3.0;
-
 /// Kick–drift–kick with sums over kernels: the largest numbers that were measured to hold. The paper's viscous number does not
 /// (errata, PCP B.11).
 const KICK_DRIFT_KICK: StabilityNumbers =

@@ -1,19 +1,22 @@
 //! The momentum equation in the volume form, for densities by summation (PCP eq. B.2):
 //!
-//! m_i du_i/dt = Σ_j (V_i² + V_j²) w'/r · (η_ij u_ij − P̄_ij x_ij)
+//! m_i du_i/dt = Σ_j w'/r · ((V_i² + V_j²) η_ij u_ij − P_ij x_ij)
 //!
 //! | term | item |
 //! | --- | --- |
 //! | viscosity η_ij u_ij | [`UniformViscosity`] or [`SpeciesViscosity`] |
-//! | pressure −P̄_ij x_ij | [`VolumePressure`] |
+//! | pressure P_ij = (V_i² + V_j²) P̄_ij (the paper's) | [`VolumePressure`] |
+//! | pressure P_ij = (P_i V_i² + P_j V_j²)/a (Hamiltonian) | [`HamiltonianPressure`] |
 //!
-//! Forces of a pair are opposite, so that momentum is kept to round-off.
+//! Forces of a pair are opposite, so that momentum is kept to round-off. The Hamiltonian form is minus the gradient of the
+//! elastic energy Σ m e(ρ) for volumes V_i = a/Σ_j W_ij: −∂/∂x_k Σ m_i e_i = Σ_i P_i ∂V_i/∂x_k.
 
+use super::config::PressureForm;
 use super::flow_state::FlowState;
-use super::interactions::PairTerm;
-use super::interactions::pressure::VolumePressure;
+use super::interactions::pressure::{HamiltonianPressure, VolumePressure};
 use super::interactions::viscosity::{SpeciesViscosity, UniformViscosity};
 use super::interactions::volume_pair::{STRESS, VISCOSITY, VOLUME};
+use super::interactions::{NoTerm, PairTerm};
 use super::kernel_choice::with_kernel;
 use super::pair_sums::{Pair, Shares};
 use super::pair_workspace::PairWorkspace;
@@ -25,12 +28,22 @@ use crate::smoothing_kernels::RadialKernel;
 /// Sets accelerations to those of the pair forces.
 pub(super) fn accelerate<const D: usize>(
     flow: &FlowState<D>,
+    form: PressureForm,
     pairs: &mut PairWorkspace<D>,
     acceleration: &mut [Vector<D>],
 ) -> Result<(), Interrupted> {
     let (by_cell, inverse) = (1.0 / pairs.cell, pairs.inverse_smoothing());
     pairs.gather(VOLUME, 1.0, |i| flow.volume[i] * by_cell);
-    pairs.gather(STRESS, 0.0, |i| flow.volume[i] * by_cell * flow.pressure[i]);
+    match form {
+        PressureForm::Mean => pairs.gather(STRESS, 0.0, |i| flow.volume[i] * by_cell * flow.pair_pressure(i)),
+        PressureForm::Hamiltonian => {
+            let by_calibration = 1.0 / flow.calibration;
+            pairs.gather(STRESS, 0.0, |i| {
+                let volume = flow.volume[i] * by_cell;
+                volume * volume * by_calibration * flow.pair_pressure(i)
+            });
+        }
+    }
     let is_uniform = flow.fluids.have_one_viscosity();
     if is_uniform {
         pairs.gather_vectors(flow.fluids.inside.viscosity * inverse, |i| flow.predicted[i]);
@@ -38,10 +51,11 @@ pub(super) fn accelerate<const D: usize>(
         pairs.gather(VISCOSITY, 1.0, |i| flow.fluid(i).viscosity);
         pairs.gather_vectors(inverse, |i| flow.predicted[i]);
     }
-    with_kernel!(pairs.kernel.choice, K => if is_uniform {
-        sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure))
-    } else {
-        sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure))
+    with_kernel!(pairs.kernel.choice, K => match (form, is_uniform) {
+        (PressureForm::Mean, true) => sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure), NoTerm),
+        (PressureForm::Mean, false) => sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure), NoTerm),
+        (PressureForm::Hamiltonian, true) => sum_forces::<K, D, 2>(pairs, UniformViscosity, HamiltonianPressure),
+        (PressureForm::Hamiltonian, false) => sum_forces::<K, D, 3>(pairs, SpeciesViscosity, HamiltonianPressure),
     })?;
     // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
     let kernel = &pairs.kernel;
@@ -52,24 +66,30 @@ pub(super) fn accelerate<const D: usize>(
     Ok(())
 }
 
-/// Sums (V_i² + V_j²) w'/r times the terms over all pairs.
+/// Sums w'/r times the terms over all pairs, `terms` with the factor V_i² + V_j², and `plain_terms` without it.
 fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
     pairs: &mut PairWorkspace<D>,
     terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]>,
+    plain_terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]>,
 ) -> Result<(), Interrupted> {
     pairs.sum_pairs::<2, S, D>(|pair| {
         let slope: Lanes = K::slope_over_q(pair.q());
         let (volume, other_volume) = pair.scalar(VOLUME);
-        let common = slope * Number::mul_add(other_volume, other_volume, volume * volume);
+        let squares = Number::mul_add(other_volume, other_volume, volume * volume);
         // −0 is the sum of no terms: adding it changes no number, and costs nothing.
         let force = terms.add_to([Lanes::splat(-0.0); D], pair);
-        Shares::opposite(force.map(|part| common * part))
+        if plain_terms.is_none() {
+            let common = slope * squares;
+            return Shares::opposite(force.map(|part| common * part));
+        }
+        let force = plain_terms.add_to(force.map(|part| squares * part), pair);
+        Shares::opposite(force.map(|part| slope * part))
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::accelerate;
+    use super::{PressureForm, accelerate};
     use crate::geometry::Vector;
     use crate::schemes::weakly_compressible_sph::KernelChoice;
     use crate::schemes::weakly_compressible_sph::interactions::density_summation::sum_volumes;
@@ -78,11 +98,11 @@ mod tests {
     fn check<const D: usize>(kernel: KernelChoice, ratio: f64) {
         let this = setting::<D>(kernel, ratio);
         let (mut pairs, mut flow) = (this.gathered(), this.flow());
-        sum_volumes(&mut pairs, &mut flow.volume).unwrap();
+        sum_volumes(&mut pairs, 1.0, &mut flow.volume).unwrap();
         flow.derive_densities();
         flow.derive_pressures();
         let mut acceleration = vec![Vector::<D>::zeros(); flow.count()];
-        accelerate(&flow, &mut pairs, &mut acceleration).unwrap();
+        accelerate(&flow, PressureForm::Mean, &mut pairs, &mut acceleration).unwrap();
         let (volume, density, pressure, velocity) = (&flow.volume, &flow.density, &flow.pressure, &flow.predicted);
         let forces: Vec<Vector<D>> = acceleration.iter().enumerate().map(|(i, a)| a * flow.mass(i)).collect();
         for i in this.probes() {
@@ -110,6 +130,47 @@ mod tests {
         let all: Vector<D> = forces.iter().sum();
         let norms: f64 = forces.iter().map(Vector::<D>::norm).sum();
         assert!(all.norm() < 1e-14 * norms, "{} of {norms}", all.norm());
+    }
+
+    /// The Hamiltonian force of a particle against the change of the energy Σ m e(ρ) when it moves, by central differences.
+    fn check_hamiltonian<const D: usize>(ratio: f64) {
+        let mut this = setting::<D>(KernelChoice::WendlandC2, ratio);
+        for velocity in &mut this.velocity {
+            *velocity = Vector::<D>::zeros();
+        }
+        let energy = |this: &crate::schemes::weakly_compressible_sph::test_setting::Setting<D>| {
+            let (mut pairs, mut flow) = (this.gathered(), this.flow());
+            flow.calibration = 1.01;
+            sum_volumes(&mut pairs, flow.calibration, &mut flow.volume).unwrap();
+            flow.derive_densities();
+            (0..flow.count()).map(|i| flow.mass(i) * flow.fluid(i).elastic_energy(flow.density[i])).sum::<f64>()
+        };
+        let (mut pairs, mut flow) = (this.gathered(), this.flow());
+        flow.calibration = 1.01;
+        sum_volumes(&mut pairs, flow.calibration, &mut flow.volume).unwrap();
+        flow.derive_densities();
+        flow.derive_pressures();
+        let mut acceleration = vec![Vector::<D>::zeros(); flow.count()];
+        accelerate(&flow, PressureForm::Hamiltonian, &mut pairs, &mut acceleration).unwrap();
+        let i = 17;
+        let (at, step) = (this.positions[i], 1e-5);
+        let mut gradient = Vector::<D>::zeros();
+        for d in 0..D {
+            for side in [1.0, -1.0] {
+                this.positions[i] = at;
+                this.positions[i][d] += side * step;
+                gradient[d] += side * energy(&this) / (2.0 * step);
+            }
+        }
+        let force = acceleration[i] * flow.mass(i);
+        assert!((force + gradient).norm() < 1e-5 * force.norm(), "{force} {gradient}");
+    }
+
+    #[test]
+    fn the_hamiltonian_force_is_minus_the_gradient_of_the_elastic_energy() {
+        check_hamiltonian::<2>(1.0);
+        check_hamiltonian::<2>(10.0);
+        check_hamiltonian::<3>(3.0);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::{LimitContext, LimitsStep, Moment, ParticleForce, StepLimit};
 use crate::geometry::Vector;
 use crate::schemes::weakly_compressible_sph::fluids::Fluid;
-use crate::schemes::weakly_compressible_sph::species::Species;
+use crate::schemes::weakly_compressible_sph::species::{Fluids, Species};
 use std::f64::consts::PI;
 
 /// A force from outside.
@@ -11,6 +11,16 @@ use std::f64::consts::PI;
 pub enum BodyForce<const D: usize> {
     /// The same acceleration of every particle.
     Constant(Vector<D>),
+    /// An acceleration g of which the mean force is taken out, (1 − ρ̄/ρ) g with the mean density ρ̄ of the box: buoyancy in a
+    /// box without walls. As given, before ρ̄ is known.
+    WithoutMean(Vector<D>),
+    /// An acceleration for each species.
+    BySpecies {
+        /// Of the fluid inside.
+        inside: Vector<D>,
+        /// Of the fluid outside.
+        outside: Vector<D>,
+    },
     /// An acceleration along x of the fluid inside, F sin(π t/T) sin(π x/A) cos(π y/2B), in space times cos(π z/2C)
     /// (PCP eqs. 29, 30).
     Pulse {
@@ -28,7 +38,11 @@ impl<const D: usize> BodyForce<D> {
     #[must_use]
     pub fn acceleration(&self, x: &Vector<D>, time: f64, species: Species) -> Vector<D> {
         match self {
-            Self::Constant(acceleration) => *acceleration,
+            Self::Constant(acceleration) | Self::WithoutMean(acceleration) => *acceleration,
+            Self::BySpecies { inside, outside } => match species {
+                Species::Inside => *inside,
+                Species::Outside => *outside,
+            },
             Self::Pulse { coefficient, duration, lengths } => {
                 let mut acceleration = Vector::<D>::zeros();
                 if species == Species::Inside && time < *duration {
@@ -41,11 +55,20 @@ impl<const D: usize> BodyForce<D> {
         }
     }
 
+    /// The same force in a box of a mean density, where its mean is to be taken out.
+    #[must_use]
+    pub fn without_mean(self, mean_density: f64, fluids: &Fluids) -> Self {
+        let Self::WithoutMean(acceleration) = self else { return self };
+        let share = |species: Species| acceleration * (1.0 - mean_density / fluids[species].density);
+        Self::BySpecies { inside: share(Species::Inside), outside: share(Species::Outside) }
+    }
+
     /// The largest acceleration.
     #[must_use]
     pub fn strength(&self) -> f64 {
         match self {
-            Self::Constant(acceleration) => acceleration.norm(),
+            Self::Constant(acceleration) | Self::WithoutMean(acceleration) => acceleration.norm(),
+            Self::BySpecies { inside, outside } => inside.norm().max(outside.norm()),
             Self::Pulse { coefficient, .. } => coefficient.abs(),
         }
     }

@@ -32,6 +32,20 @@ impl<const D: usize, const S: usize> PairTerm<Pair<'_, D, 2, S>, [Lanes; D]> for
     }
 }
 
+/// Pressure in the volume form, −(P_i V_i² + P_j V_j²)/a x_ij: minus the gradient of the elastic energy. Stresses are gathered
+/// as P V²/a in units of the cell.
+#[derive(Debug, Clone, Copy)]
+pub struct HamiltonianPressure;
+
+impl<const D: usize, const S: usize> PairTerm<Pair<'_, D, 2, S>, [Lanes; D]> for HamiltonianPressure {
+    #[inline(always)]
+    fn add_to(self, sum: [Lanes; D], pair: &Pair<'_, D, 2, S>) -> [Lanes; D] {
+        let (stress, other_stress) = pair.scalar(volume_pair::STRESS);
+        let both = -(stress + other_stress);
+        from_fn(|d| Number::mul_add(both, pair.dx[d], sum[d]))
+    }
+}
+
 /// Pressure in the mass form, P_i/ρ_i² + P_j/ρ_j² (PCP eq. B.13).
 #[derive(Debug, Clone, Copy)]
 pub struct MassPressure;

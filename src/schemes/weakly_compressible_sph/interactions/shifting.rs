@@ -60,11 +60,12 @@ pub fn concentration<const D: usize>(
     Ok(())
 }
 
-/// The displacement for a gradient of the concentration, −0.05 ε² ∇C, at most 0.02 ε long (B.16).
+/// The displacement for a gradient of the concentration, −0.05 ε² ∇C, at most 0.02 ε and `way`
+/// long (B.16).
 #[must_use]
-pub fn displacement<const D: usize>(gradient: Vector<D>, smoothing_length: f64) -> Vector<D> {
+pub fn displacement<const D: usize>(gradient: Vector<D>, smoothing_length: f64, way: f64) -> Vector<D> {
     let full = gradient * (-TUNING.rate * smoothing_length * smoothing_length);
-    let (length, most) = (full.norm(), TUNING.longest * smoothing_length);
+    let (length, most) = (full.norm(), (TUNING.longest * smoothing_length).min(way));
     if length < most { full } else { full * (most / length) }
 }
 
@@ -88,7 +89,7 @@ mod tests {
         let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
         let mut pairs = this.gathered();
         let mut volume = vec![0.0; this.positions.len()];
-        sum_volumes(&mut pairs, &mut volume).unwrap();
+        sum_volumes(&mut pairs, 1.0, &mut volume).unwrap();
         let mut gradients = vec![Vector::<2>::zeros(); volume.len()];
         concentration(&mut pairs, &volume, this.config.spacing, |i, g| gradients[i] = g).unwrap();
         for i in this.probes() {
@@ -99,7 +100,7 @@ mod tests {
             });
             assert!((gradients[i] - expected).norm() < 1e-6 * (1.0 + expected.norm()));
         }
-        let far = displacement(Vector::<2>::new(100.0, 0.0), 0.2);
+        let far = displacement(Vector::<2>::new(100.0, 0.0), 0.2, f64::INFINITY);
         assert!((far + Vector::<2>::new(0.004, 0.0)).norm() < 1e-15, "at most 0.02 ε, against the gradient");
     }
 

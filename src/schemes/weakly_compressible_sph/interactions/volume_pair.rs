@@ -4,7 +4,7 @@
 pub const VELOCITY: usize = 1;
 /// Scalar column: volumes V in units of the cell.
 pub const VOLUME: usize = 0;
-/// Scalar column: V P in units of the cell.
+/// Scalar column: V P in units of the cell, or P V²/a in units of the cell's square for the Hamiltonian form.
 pub const STRESS: usize = 1;
 /// Scalar column: dynamic viscosities η, where they differ.
 pub const VISCOSITY: usize = 2;

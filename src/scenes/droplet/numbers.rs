@@ -1,0 +1,87 @@
+//! The numbers that characterize a droplet scene: its size, its speeds, and the dimensionless numbers of the field.
+
+use super::spec::{Droplet, FluidSpec};
+use crate::scenes::shapes::Shape;
+use crate::spec::Violation;
+use serde_json::json;
+
+/// Factors of the speeds that a scene is expected to reach.
+struct Tuning {
+    /// Of √(2τκ/ρ): balanced forces leave speeds of 0.2 to 0.3 of it (measured).
+    capillary: f64,
+    /// c² in units of the largest of u², τ/(ρR) and gL below which compression shows.
+    stiffness: f64,
+}
+
+const TUNING: Tuning = Tuning { capillary: 0.3, stiffness: 100.0 };
+
+/// Size, tension and acceleration of a scene.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SceneNumbers {
+    /// Radius of the smallest drop as a ball; None for drops that are known by points alone.
+    pub radius: Option<f64>,
+    /// Curvature of a ball of that radius, or of one in the shortest side of the box.
+    curvature: f64,
+    tension: f64,
+    /// Size of a constant body force.
+    gravity: f64,
+    /// Longest side of the box.
+    length: f64,
+}
+
+impl SceneNumbers {
+    pub fn new<const D: usize>(
+        shape: Option<&Shape>,
+        tension: f64,
+        gravity: f64,
+        lengths: &crate::geometry::Vector<D>,
+    ) -> Self {
+        let radius = shape.and_then(smallest_radius::<D>);
+        let curvature = (D - 1) as f64 / radius.unwrap_or(0.5 * lengths.min());
+        Self { radius, curvature, tension, gravity, length: lengths.max() }
+    }
+
+    /// The largest speed that a scene is expected to reach, 0.3 √(2τκ/ρ) + √(2gL).
+    pub fn expected_speed(&self, spec: &Droplet) -> f64 {
+        let density = spec.fluids.inside.density.min(spec.fluids.outside.density);
+        TUNING.capillary * (2.0 * self.tension * self.curvature / density).sqrt() + self.falling_speed()
+    }
+
+    fn falling_speed(&self) -> f64 {
+        (2.0 * self.gravity * self.length).sqrt()
+    }
+
+    /// The least speed of sound of a fluid: c² = 100 max(τ/(ρR), gL).
+    pub fn least_sound_speed(&self, fluid: &FluidSpec) -> f64 {
+        let capillary = self.radius.map_or(0.0, |radius| self.tension / (fluid.density * radius));
+        (TUNING.stiffness * capillary.max(self.gravity * self.length)).sqrt()
+    }
+
+    /// Refuses speeds of sound below half of the least one, unless the scene allows soft fluids.
+    pub fn check_sound_speeds(&self, spec: &Droplet, errors: &mut Vec<Violation>) {
+        for (name, fluid) in [("inside", &spec.fluids.inside), ("outside", &spec.fluids.outside)] {
+            let least = self.least_sound_speed(fluid);
+            if fluid.sound_speed < 0.5 * least && !spec.allow_soft {
+                let detail = format!(
+                    "the fluid would be compressed: c² = 100 max(τ/(ρR), gL) asks for {least:.4}, half of it is the least; \
+                     allow_soft lets it through"
+                );
+                let pointer = format!("/fluids/{name}/sound_speed");
+                let allowed = json!(format!("a number ≥ {:.6e}", 0.5 * least));
+                errors.push(Violation::new(pointer, "range", detail, fluid.sound_speed, allowed));
+            }
+        }
+    }
+}
+
+/// Radius of the smallest ball that has the area or volume of a part of a shape.
+fn smallest_radius<const D: usize>(shape: &Shape) -> Option<f64> {
+    if matches!(shape, Shape::Points { .. }) {
+        return None;
+    }
+    let parts = shape.parts::<D>("/shape").ok()?;
+    let radius = |measure: f64| {
+        if D == 2 { (measure / std::f64::consts::PI).sqrt() } else { (0.75 * measure / std::f64::consts::PI).cbrt() }
+    };
+    parts.iter().map(|part| radius(part.area_or_volume())).filter(|radius| *radius > 0.0).reduce(f64::min)
+}

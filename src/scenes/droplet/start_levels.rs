@@ -1,0 +1,76 @@
+//! Signed distances of the particles at the start from the drop.
+
+use super::plan::{DropletScene, RATIO, domain_of};
+use crate::closest_point::{LevelSurface, Redistancing};
+use crate::geometry::{Surface, Vector};
+use crate::parallel::Interrupt;
+use crate::scene::BuildContext;
+use crate::scene::cloud;
+use crate::scenes::pcp_spec::{PcpContext, PcpSpec};
+use crate::schemes::weakly_compressible_sph::Geometry;
+use crate::spec::Violation;
+use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+use serde_json::{Value, json};
+
+impl<const D: usize> DropletScene<D> {
+    /// Signed distances from the nearest image of a shape.
+    pub(super) fn levels(&self, surface: &dyn Surface<D>, positions: &[Vector<D>]) -> Vec<f64> {
+        let lengths = self.lengths();
+        let (low, high) = surface.bounding_box();
+        let images: Vec<Vector<D>> = (0..3_usize.pow(D as u32))
+            .map(|image| {
+                let turns = Vector::<D>::from_fn(|d, _| (image / 3_usize.pow(d as u32) % 3) as f64 - 1.0);
+                turns.component_mul(&lengths)
+            })
+            .collect();
+        positions
+            .par_iter()
+            .map(|x| {
+                let mut least = f64::INFINITY;
+                for image in &images {
+                    let y = x + image;
+                    // No point of the shape is nearer than its box.
+                    let away = (low - y).sup(&(y - high)).sup(&Vector::<D>::zeros()).norm();
+                    if away < least {
+                        least = least.min(surface.signed_distance(&y));
+                    }
+                }
+                least
+            })
+            .collect()
+    }
+
+    /// Signed distances from the surface of points that came from elsewhere.
+    pub(super) fn levels_of_points(
+        &self,
+        context: &BuildContext,
+        positions: &[Vector<D>],
+    ) -> Result<Vec<f64>, Violation> {
+        let (points, level) = cloud::points_with_levels::<D>(&context.clouds, "/shape")?;
+        if let Some(found) = cloud::check_spacing(&points, self.config.spacing) {
+            return Err(found);
+        }
+        let domain = domain_of(&self.low, &self.lengths());
+        let points: Vec<Vector<D>> = points.iter().map(|x| domain.wrap(*x)).collect();
+        let method = match &self.config.geometry {
+            Geometry::Pcp { method, .. } => method.clone(),
+            Geometry::ColorField => {
+                let context = PcpContext { pointer: "/geometry", dimension: D, default_ratio: RATIO };
+                PcpSpec::default().plan(context)?.0
+            }
+        };
+        let mut surface = LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.config.spacing)));
+        let never = Interrupt::default();
+        let fitted =
+            surface.detect(&points, &level, &never).and_then(|()| surface.fit_samples(&points, &level, None, &never));
+        if fitted.is_err() || surface.is_lost() {
+            let detail = "phi of the points has no zero between them".to_owned();
+            return Err(Violation::new("/shape", "data", detail, Value::Null, json!("PointData/phi of both signs")));
+        }
+        let distance = |x: &Vector<D>| {
+            let foot = surface.query(x, f64::INFINITY)?;
+            Some(if surface.is_inside(x, &foot) { -foot.distance } else { foot.distance })
+        };
+        Ok(positions.par_iter().map(|x| distance(x).unwrap_or(f64::INFINITY)).collect())
+    }
+}

@@ -1,0 +1,136 @@
+//! Budgets of energy and momentum: what a run has, and what came in from outside.
+
+use super::interactions::surface_tension::smoothed_delta;
+use super::interface::Interface;
+use super::system::SphSystem;
+use crate::geometry::Vector;
+use crate::simulation::{Component, LoadError, Section};
+
+/// Energies and momentum of one state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contents<const D: usize> {
+    /// Σ m u²/2.
+    pub kinetic: f64,
+    /// Σ m e(ρ) − p_b Σ (V − V₀).
+    pub elastic: f64,
+    /// Perimeter or surface area, Σ V δ(φ); NaN without a level set.
+    pub interface: f64,
+    /// Σ m u.
+    pub momentum: Vector<D>,
+    /// Σ m |u|.
+    pub momentum_size: f64,
+}
+
+impl<const D: usize> SphSystem<D> {
+    /// Energies and momentum of the present state.
+    pub(super) fn contents(&self) -> Contents<D> {
+        let flow = &self.flow;
+        let mut contents = Contents {
+            kinetic: 0.0,
+            elastic: 0.0,
+            interface: self.interface_measure(),
+            momentum: Vector::<D>::zeros(),
+            momentum_size: 0.0,
+        };
+        for (i, u) in flow.velocity.iter().enumerate() {
+            let mass = flow.mass(i);
+            contents.kinetic += 0.5 * mass * u.norm_squared();
+            contents.momentum += u * mass;
+            contents.momentum_size += mass * u.norm();
+            contents.elastic += mass * flow.fluid(i).elastic_energy(flow.density[i]);
+            contents.elastic -= flow.background * (mass / flow.density[i] - flow.cell);
+        }
+        contents
+    }
+
+    fn interface_measure(&self) -> f64 {
+        let Interface::LevelSet(level_set) = &self.interface else { return f64::NAN };
+        let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
+        let near = level_set.candidates().iter().filter(|i| band[**i] == 1);
+        near.map(|i| self.flow.volume[*i] * smoothed_delta(phi[*i], self.config.smoothing_length)).sum()
+    }
+
+    /// Power Σ m a·u and sum Σ m a of the body force at a time.
+    pub(super) fn body_force_sums(&self, time: f64) -> (f64, Vector<D>) {
+        let mut sums = (0.0, Vector::<D>::zeros());
+        if let Some(force) = &self.config.body_force {
+            for (i, x) in self.particles.positions().iter().enumerate() {
+                let acceleration = force.acceleration(x, time, self.flow.species[i]);
+                let mass = self.flow.mass(i);
+                sums.0 += mass * acceleration.dot(&self.flow.velocity[i]);
+                sums.1 += acceleration * mass;
+            }
+        }
+        sums
+    }
+
+    /// Power Σ m a·u of surface tension.
+    pub(super) fn tension_power(&self) -> f64 {
+        self.band.forces.iter().map(|(i, a)| self.flow.mass(*i) * a.dot(&self.flow.velocity[*i])).sum()
+    }
+}
+
+/// What came in since the start, and what there was then.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Budget<const D: usize> {
+    /// Kinetic and elastic energy at the start.
+    pub start_energy: f64,
+    /// Perimeter or surface area at the start; NaN before the first measurement and without a level set.
+    pub start_interface: f64,
+    /// Work of the body force, ∫ Σ m a·u dt by trapezoids.
+    pub work: f64,
+    /// ∫ Σ m a dt of the body force by trapezoids.
+    pub impulse: Vector<D>,
+    /// Work of surface tension, ∫ Σ m a·u dt by trapezoids.
+    pub tension_work: f64,
+    /// Momentum at the start.
+    pub start_momentum: Vector<D>,
+}
+
+impl<const D: usize> Budget<D> {
+    /// The budget of a state at the start.
+    pub fn new(contents: &Contents<D>) -> Self {
+        Self {
+            start_energy: contents.kinetic + contents.elastic,
+            start_interface: contents.interface,
+            work: 0.0,
+            impulse: Vector::<D>::zeros(),
+            tension_work: 0.0,
+            start_momentum: contents.momentum,
+        }
+    }
+
+    /// Energy gained from nothing: kinetic, elastic and surface energy beyond that of the start and the work done.
+    pub fn gain(&self, contents: &Contents<D>, tension: f64) -> f64 {
+        let surface = tension * (contents.interface - self.start_interface);
+        contents.kinetic + contents.elastic - self.start_energy + surface - self.work
+    }
+
+    /// Momentum gained from nothing.
+    pub fn momentum_gain(&self, contents: &Contents<D>) -> f64 {
+        (contents.momentum - self.start_momentum - self.impulse).norm()
+    }
+}
+
+impl<const D: usize> Component for Budget<D> {
+    fn save(&self, section: &mut Section) {
+        section.put_real("start_energy", self.start_energy);
+        section.put_optional("start_interface", crate::simulation::section::known(self.start_interface));
+        section.put_real("work", self.work);
+        section.put_vectors("impulse", &[self.impulse]);
+        section.put_real("tension_work", self.tension_work);
+        section.put_vectors("start_momentum", &[self.start_momentum]);
+    }
+
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        let vector = |name: &str| Ok::<_, LoadError>(Vector::<D>::from_column_slice(section.reals_of(name, D)?));
+        Ok(Self {
+            start_energy: section.real("start_energy")?,
+            start_interface: section.optional("start_interface")?.unwrap_or(f64::NAN),
+            work: section.real("work")?,
+            impulse: vector("impulse")?,
+            tension_work: section.real("tension_work")?,
+            start_momentum: vector("start_momentum")?,
+        })
+    }
+}

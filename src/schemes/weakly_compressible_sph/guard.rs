@@ -1,0 +1,216 @@
+//! The guard of a run: budgets of energy and momentum, watched invariants, and the doubts that it tells.
+
+use super::budget::{Budget, Contents};
+use super::checks::{LIMITS, Watch, Watched};
+use super::config::Discretization;
+use super::droplets::ball_curvature;
+use super::interactions::TensionForce;
+use super::species::Species;
+use super::system::SphSystem;
+use crate::geometry::Vector;
+use crate::simulation::{Check, Finding, LoadError, Section, Severity, StepError};
+use crate::time::Clock;
+
+/// What comes in from outside, and the power of surface tension, at one moment.
+#[derive(Debug, Clone, Copy)]
+struct Supply<const D: usize> {
+    power: f64,
+    force: Vector<D>,
+    tension_power: f64,
+}
+
+impl<const D: usize> Supply<D> {
+    fn new(system: &SphSystem<D>, time: f64) -> Self {
+        let (power, force) = system.body_force_sums(time);
+        Self { power, force, tension_power: system.tension_power() }
+    }
+}
+
+/// Doubts that are told once a run.
+const DOUBTS: [&str; 5] = ["energy_gain", "crowded_particles", "fast_flow", "wrong_sides", "level_creeps"];
+
+/// What a run watches of itself.
+#[derive(Debug)]
+pub(super) struct Guard<const D: usize> {
+    pub budget: Budget<D>,
+    watched: Watched,
+    /// At the end of the last part of a step.
+    supply: Supply<D>,
+    /// Particles of the drops at the start.
+    start_particles: usize,
+    /// Whether each of [`DOUBTS`] was told.
+    told: [bool; DOUBTS.len()],
+}
+
+impl<const D: usize> Guard<D> {
+    /// The guard of a run that starts from the present state.
+    pub fn new(system: &SphSystem<D>) -> Self {
+        let is_single = system.droplets.number() == 1 && !system.droplets.has_layer();
+        Self {
+            budget: Budget::new(&system.contents()),
+            watched: Watched { is_single, ..Watched::UNKNOWN },
+            supply: Supply::new(system, 0.0),
+            start_particles: system.flow.species.iter().filter(|species| **species == Species::Inside).count(),
+            told: [false; DOUBTS.len()],
+        }
+    }
+
+    /// Adds what came in during a part of a step that ends now, by the trapezoidal rule. `is_divided` says whether the number of
+    /// droplets changed in it.
+    pub fn advance(&mut self, system: &SphSystem<D>, time: f64, length: f64, is_divided: bool) {
+        let (before, now) = (self.supply, Supply::new(system, time));
+        self.budget.work += 0.5 * length * (before.power + now.power);
+        self.budget.impulse += (before.force + now.force) * (0.5 * length);
+        self.budget.tension_work += 0.5 * length * (before.tension_power + now.tension_power);
+        self.supply = now;
+        let is_wrong = system.interface.level_set().is_some_and(|set| set.sides.wrong_share() > LIMITS.sides_doubt);
+        self.watched.sides_steps = if is_wrong { self.watched.sides_steps + 1 } else { 0 };
+        self.watched.is_single &= !is_divided;
+    }
+
+    /// Measures the watched invariants. `crowded` is the share of particles that are too close to another, `measure` the
+    /// enclosed area or volume.
+    ///
+    /// # Errors
+    /// [`StepError::CheckFailed`] where an invariant is broken.
+    pub fn measure(
+        &mut self,
+        system: &SphSystem<D>,
+        contents: &Contents<D>,
+        (crowded, measure): (f64, f64),
+        Clock { step, time }: Clock,
+    ) -> Result<(), StepError> {
+        let tension = system.config.tension;
+        let scale = tension * self.budget.start_interface;
+        let lost = system.strays.lost.unsigned_abs() as f64 / self.start_particles.max(1) as f64;
+        self.watched = Watched {
+            energy: self.budget.gain(contents, tension) / scale,
+            momentum: self.budget.momentum_gain(contents) / contents.momentum_size.max(f64::MIN_POSITIVE),
+            crowded,
+            area: (measure / system.droplets.initial_measure - 1.0).abs(),
+            sides: system.interface.level_set().map_or(f64::NAN, |set| set.sides.wrong_share()),
+            strays: lost,
+            creep: self.creep(system, contents, time),
+            crowded_measurements: if crowded > LIMITS.crowded { self.watched.crowded_measurements + 1 } else { 0 },
+            ..self.watched
+        };
+        let broken = self.watches(system).into_iter().find(Watch::is_broken);
+        broken.map_or(Ok(()), |Watch { name, value, limit, divergence }| {
+            let limit = limit.unwrap_or(f64::NAN);
+            Err(StepError::CheckFailed { check: name, divergence, value, limit, step, time })
+        })
+    }
+
+    /// Work of surface tension, beyond that of the shrinking interface, in a capillary time √(ρR³/τ) by the surface energy at
+    /// the start; NaN where the drop is not at rest.
+    fn creep(&self, system: &SphSystem<D>, contents: &Contents<D>, time: f64) -> f64 {
+        let tension = system.config.tension;
+        let scale = tension * self.budget.start_interface;
+        let radius = (D - 1) as f64 / ball_curvature::<D>(system.droplets.initial_measure);
+        let capillary = (system.config.fluids.inside.density * radius.powi(3) / tension).sqrt();
+        if contents.kinetic > LIMITS.rest * scale || time < capillary {
+            return f64::NAN;
+        }
+        let released = tension * (contents.interface - self.budget.start_interface);
+        (self.budget.tension_work + released).abs() / scale * capillary / time
+    }
+
+    fn watches(&self, system: &SphSystem<D>) -> Vec<Watch> {
+        let config = &system.config;
+        let has_level_set = system.interface.level_set().is_some();
+        let closes = config.tension_force == TensionForce::Balanced
+            && has_level_set
+            && !config.is_density_integrated()
+            && config.discretization == Discretization::Kernels;
+        self.watched.watches(closes && !config.is_shifted, has_level_set)
+    }
+
+    /// The checks of the report.
+    pub fn checks(&self, system: &SphSystem<D>) -> Vec<Check> {
+        self.watches(system).iter().map(Watch::check).collect()
+    }
+
+    /// Doubts of the last measurement that were not told before. `mach` is the largest Mach number.
+    pub fn new_doubts(&mut self, system: &SphSystem<D>, mach: f64, Clock { step, time }: Clock) -> Vec<Finding> {
+        let watched = self.watched;
+        let has_limit = self.watches(system).iter().any(|watch| watch.name == DOUBTS[0] && watch.limit.is_some());
+        let percent = |share: f64| 100.0 * share;
+        let doubts: [(bool, String, &'static str); DOUBTS.len()] = [
+            (
+                has_limit && watched.energy > LIMITS.energy_doubt,
+                format!("energy grew from nothing by {:.2e} of the surface energy at the start", watched.energy),
+                "a finer spacing or a smaller time step helps",
+            ),
+            (
+                watched.crowded > 0.0,
+                format!(
+                    "{:.2} % of the particles are closer than {} h to another",
+                    percent(watched.crowded),
+                    LIMITS.pair_distance
+                ),
+                "where drops merge this passes; otherwise a smaller time step or a higher speed of sound helps",
+            ),
+            (
+                mach > LIMITS.mach_doubt,
+                format!("the largest Mach number is {mach:.2}, so the fluids are compressed"),
+                "a higher speed of sound helps",
+            ),
+            (
+                watched.sides > LIMITS.sides_doubt && watched.sides_last(),
+                format!(
+                    "{:.1} % of the particles next to the interface lie on its wrong side by the fits",
+                    percent(watched.sides)
+                ),
+                "where drops merge or part this passes; otherwise a finer spacing helps",
+            ),
+            (
+                watched.creep > LIMITS.creep,
+                format!(
+                    "surface tension works at rest: {:.1e} of the surface energy in a capillary time, so the level creeps",
+                    watched.creep
+                ),
+                "redistancing transparent and a curvature filter keep it still",
+            ),
+        ];
+        let mut findings = Vec::new();
+        for (k, (is_so, message, advice)) in doubts.into_iter().enumerate() {
+            if is_so && !self.told[k] {
+                self.told[k] = true;
+                let doubt = Finding::warning(DOUBTS[k], message, (step, time)).with_advice(advice);
+                // A creeping level is a hint; the budget of energy says when it matters.
+                let severity = if DOUBTS[k] == "level_creeps" { Severity::Info } else { Severity::Warning };
+                findings.push(Finding { severity, ..doubt });
+            }
+        }
+        findings
+    }
+
+    /// Saves everything that later checks depend on.
+    pub fn save(&self, section: &mut Section) {
+        section.put_component("budget", &self.budget);
+        section.put_component("watched", &self.watched);
+        section.put_counts("told", self.told.map(u64::from));
+        section.put_real("power", self.supply.power);
+        section.put_vectors("force", &[self.supply.force]);
+        section.put_real("tension_power", self.supply.tension_power);
+    }
+
+    /// The guard of a state that was saved.
+    ///
+    /// # Errors
+    /// [`LoadError`].
+    pub fn load(&self, section: &Section) -> Result<Self, LoadError> {
+        let told = section.counts_of("told", DOUBTS.len())?;
+        Ok(Self {
+            budget: section.component("budget")?,
+            watched: section.component("watched")?,
+            supply: Supply {
+                power: section.real("power")?,
+                force: Vector::<D>::from_column_slice(section.reals_of("force", D)?),
+                tension_power: section.real("tension_power")?,
+            },
+            start_particles: self.start_particles,
+            told: std::array::from_fn(|k| told[k] == 1),
+        })
+    }
+}
