@@ -4,6 +4,7 @@
 mod case_files;
 mod droplets;
 mod fronts;
+mod linear_theory;
 mod ring;
 mod hard_cases;
 mod surfaces;
