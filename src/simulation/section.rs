@@ -192,6 +192,12 @@ impl Section {
         }
     }
 
+    /// Whether there is an entry of a name. States of earlier versions lack what came later.
+    #[must_use]
+    pub fn has(&self, name: &str) -> bool {
+        self.entry(name).is_ok()
+    }
+
     /// The entry of a name.
     ///
     /// # Errors

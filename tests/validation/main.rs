@@ -3,6 +3,7 @@
 
 mod case_files;
 mod droplets;
+mod droplets_in_balance;
 mod fronts;
 mod linear_theory;
 mod ring;

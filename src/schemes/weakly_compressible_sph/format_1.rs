@@ -2,7 +2,7 @@
 
 use super::guard::Guard;
 use super::monitors::{names, names_of_version_0_1, save_row};
-use super::summary::{Late, Shape, Summary};
+use super::summary::{Late, Shape, Summary, ThirdMeans};
 use crate::particles::Particles;
 use crate::simulation::format_1::{copy, copy_particles, fit_soundness, from_bits, numbers, soundness};
 use crate::simulation::section::{check_length, known};
@@ -86,6 +86,7 @@ fn summary(values: &[f64]) -> Result<Summary, LoadError> {
             pressure_eos_jump: head[3],
             curvature: head[4],
         },
+        kinetic: ThirdMeans::default(),
         curvature_mean: head[5],
         curvature_std: head[6],
         least_curvature_std: head[7],

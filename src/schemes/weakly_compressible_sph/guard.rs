@@ -91,7 +91,11 @@ impl<const D: usize> Guard<D> {
             sides: system.interface.level_set().map_or(f64::NAN, |set| set.sides.wrong_share()),
             strays: lost,
             creep: self.creep(system, contents, time),
-            crowded_measurements: if crowded > LIMITS.crowded { self.watched.crowded_measurements + 1 } else { 0 },
+            crowded_measurements: if crowded > self.watched.most_crowded() {
+                self.watched.crowded_measurements + 1
+            } else {
+                0
+            },
             ..self.watched
         };
         let broken = self.watches(system).into_iter().find(Watch::is_broken);

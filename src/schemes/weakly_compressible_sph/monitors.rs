@@ -68,7 +68,13 @@ pub(super) fn save_row<const D: usize>(row: &Row, section: &mut Section) {
 /// # Errors
 /// [`LoadError`] where a number is missing.
 pub(super) fn load_row<const D: usize>(section: &Section) -> Result<Row, LoadError> {
-    names(D).into_iter().map(|quantity| Ok(section.optional(quantity.name)?.unwrap_or(f64::NAN))).collect()
+    let known_before = names_of_version_0_1(D);
+    let value = |(k, quantity): (usize, &'static Quantity)| match k < known_before || section.has(quantity.name) {
+        true => Ok(section.optional(quantity.name)?.unwrap_or(f64::NAN)),
+        // Version 0.2.0 did not measure it.
+        false => Ok(f64::NAN),
+    };
+    names(D).into_iter().enumerate().map(value).collect()
 }
 
 /// Mean and standard deviation.

@@ -53,6 +53,10 @@ quantities! {
         STD = "std", "of the quantity", "Standard deviation over the band.";
         STD_LEAST = "std_least", "of the quantity", "Least standard deviation over the band in the run.";
         OF_MEASURE = "of_measure", "", "Relative difference from the curvature of a ball of the present area or volume.";
+        SCALED = "scaled", "", "By sqrt(tau/(rho D)), the capillary speed of the drop.";
+        RATIO = "ratio", "", "Mean of the last third of the run by that of the middle third.";
+        FREQUENCY = "frequency", "1/time", "Angular frequency of the oscillation.";
+        DECAY = "decay", "1/time", "Rate of decay of the oscillation.";
         COUNT = "count", "", "Number of items, no error.";
         ZERO_1 = "zero_1", "time", "First time at which the quantity passed zero.";
         ZERO_2 = "zero_2", "time", "Second time at which the quantity passed zero.";

@@ -63,11 +63,16 @@ impl<const D: usize> SphSystem<D> {
             None => None,
         };
         let species = state.section("particles", species_of)?;
-        let (absorbed, lost) = (state.count("absorbed_strays")?, state.real("lost_particles")? as i64);
-        let (calibration, background, last_volume) = state.section("pressure", |section| {
-            let last_volume = section.reals_of("last_volume", self.flow.last_volume.len())?.to_vec();
-            Ok((section.real("calibration")?, section.real("background")?, last_volume))
-        })?;
+        let absorbed = state.count("absorbed_strays")?;
+        // Version 0.2.0 had none of these.
+        let lost = if state.has("lost_particles") { state.real("lost_particles")? as i64 } else { 0 };
+        let (calibration, background, last_volume) = match state.has("pressure") {
+            true => state.section("pressure", |section| {
+                let last_volume = section.reals_of("last_volume", self.flow.last_volume.len())?.to_vec();
+                Ok((section.real("calibration")?, section.real("background")?, last_volume))
+            })?,
+            false => (1.0, 0.0, Vec::new()),
+        };
         state.section("particles", |section| check_columns(self, section))?;
         state.section("droplets", |section| check_droplets(self, section))?;
         // 2. From here on nothing fails.
@@ -101,8 +106,14 @@ fn load_interface<'a, const D: usize>(
     section: &'a Section,
 ) -> Result<LoadedInterface<'a>, LoadError> {
     let candidates = section.counts_of("candidate", level_set.is_candidate.len())?;
-    let sides = section.counts_of("sides", 2)?;
-    let repair = (section.count("is_begun")? == 1, Sides { near: sides[0], wrong: sides[1] });
+    // Version 0.2.0 repaired no level.
+    let repair = match section.has("sides") {
+        true => {
+            let sides = section.counts_of("sides", 2)?;
+            (section.count("is_begun")? == 1, Sides { near: sides[0], wrong: sides[1] })
+        }
+        false => (true, Sides::default()),
+    };
     Ok((section.component("redistancing")?, section.count("bounded_curvatures")?, candidates, repair))
 }
 

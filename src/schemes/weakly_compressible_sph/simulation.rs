@@ -12,11 +12,11 @@ use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, Instant, SphSystem};
 use super::time_step::{StepLimit, longest_step};
-use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, support_diagnostics};
+use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, entry, support_diagnostics};
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
 use crate::simulation::{
-    Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Report,
-    Section, Selection, Simulation, StepError,
+    Check, Course, CpuClock, Diagnostic, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan,
+    Phases, Report, Section, Selection, Simulation, StepError,
 };
 use crate::time::clock::TIME_SLACK;
 use crate::time::{Clock, FixedStep, Pace};
@@ -120,6 +120,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         });
         self.row = row;
         let Clock { step, time } = self.clock();
+        self.summary.take_energy(time, contents.kinetic);
         let of = |name: &str| self.row_value(name);
         let jump = of("pressure_inside") - of("pressure_outside");
         let momentum = self.row[1..=D].iter().map(|m| m * m).sum::<f64>().sqrt();
@@ -138,6 +139,16 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let Fastest { speed, sound_speed, .. } = fastest(&self.system);
         self.course.findings.extend(self.guard.new_doubts(&self.system, speed / sound_speed, clock));
         Ok(())
+    }
+
+    /// The largest speed u as u √(ρD/τ), with the diameter D of the ball of the measure at the start.
+    fn scaled_speed(&self) -> Option<ErrorEntry> {
+        let diameter = 2.0 * (D - 1) as f64 / self.whole_curvature();
+        let config = &self.system.config;
+        let scaled =
+            self.system.flow.largest_speed() * (config.fluids.inside.density * diameter / config.tension).sqrt();
+        let reference = "0 for a drop at rest; u sqrt(rho D/tau)";
+        scaled.is_finite().then(|| entry("speed", "scaled", scaled, self.clock().time, reference))
     }
 
     /// The steps of a run that goes on at a clock, after steps of a length since `origin` to an end.
@@ -320,12 +331,16 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         }
         let max_cfl = state.real("max_cfl")?;
         let (resting, row) = (state.count("resting_steps")?, state.section("row", load_row::<D>)?);
-        let guard = state.section("guard", |section| self.guard.load(section))?;
+        // A state of version 0.2.0 has no guard: its budgets begin at the restart.
+        let guard = match state.has("guard") {
+            true => Some(state.section("guard", |section| self.guard.load(section))?),
+            false => None,
+        };
         self.system.load(state)?;
         // 2. From here on nothing fails.
         // An interrupt ends the run before its next step.
         let _ = self.system.derive();
-        self.guard = guard;
+        self.guard = guard.unwrap_or_else(|| Guard::new(&self.system));
         self.failure = None;
         (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
         (self.row, self.summary) = (row, summary.with_end(self.end_time));
@@ -343,12 +358,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     fn report(&self) -> Report {
         let whole = self.whole_curvature();
         let expected = (self.system.config.tension * whole, whole, self.system.droplets.initial_measure);
-        Report {
-            errors: self.summary.entries(D, self.clock().time, expected),
-            health: self.health(),
-            diagnostics: self.diagnostics(),
-            method: self.course.method.clone(),
-        }
+        let mut errors = self.summary.entries(D, self.clock().time, expected);
+        errors.extend(self.scaled_speed());
+        Report { errors, health: self.health(), diagnostics: self.diagnostics(), method: self.course.method.clone() }
     }
 
     fn health(&self) -> Health {

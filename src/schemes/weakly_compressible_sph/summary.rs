@@ -9,6 +9,7 @@ use crate::simulation::{Component, ErrorEntry, LoadError, Section};
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Summary {
     pub late: Late,
+    pub kinetic: ThirdMeans,
     /// Mean and standard deviation of the curvature in the last measured state; NaN before.
     pub curvature_mean: f64,
     pub curvature_std: f64,
@@ -41,6 +42,46 @@ pub(super) struct Late {
     pub pressure_jump: f64,
     pub pressure_eos_jump: f64,
     pub curvature: f64,
+}
+
+/// Kinetic energy over the middle and the last third of a run.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct ThirdMeans {
+    /// Counts and sums of both thirds.
+    pub counts: [f64; 2],
+    pub sums: [f64; 2],
+    /// Largest of the last third.
+    pub largest: f64,
+}
+
+impl ThirdMeans {
+    /// Takes a value at a part of the run from 0 to 1.
+    fn take(&mut self, part: f64, value: f64) {
+        let Some(third) = (part >= 1.0 / 3.0).then_some(usize::from(part >= 2.0 / 3.0)) else { return };
+        self.counts[third] += 1.0;
+        self.sums[third] += value;
+        if third == 1 {
+            self.largest = self.largest.max(value);
+        }
+    }
+
+    /// Means of the middle and the last third; NaN where nothing was measured.
+    fn means(&self) -> [f64; 2] {
+        std::array::from_fn(|third| self.sums[third] / self.counts[third])
+    }
+}
+
+impl Component for ThirdMeans {
+    fn save(&self, section: &mut Section) {
+        section.put_reals("counts", &self.counts);
+        section.put_reals("sums", &self.sums);
+        section.put_real("largest", self.largest);
+    }
+
+    fn load(section: &Section) -> Result<Self, LoadError> {
+        let two = |name: &str| Ok::<_, LoadError>([section.reals_of(name, 2)?[0], section.reals_of(name, 2)?[1]]);
+        Ok(Self { counts: two("counts")?, sums: two("sums")?, largest: section.real("largest")? })
+    }
 }
 
 /// The deformation at a time; NaN where nothing was measured.
@@ -101,6 +142,7 @@ impl Component for Shape {
 impl Component for Summary {
     fn save(&self, section: &mut Section) {
         section.put_component("late", &self.late);
+        section.put_component("kinetic", &self.kinetic);
         section.put_optional("curvature_mean", known(self.curvature_mean));
         section.put_optional("curvature_std", known(self.curvature_std));
         section.put_optional("least_curvature_std", known(self.least_curvature_std));
@@ -127,6 +169,8 @@ impl Component for Summary {
         let extreme = |(time, deformation): (&f64, &f64)| Shape { time: *time, deformation: *deformation };
         Ok(Self {
             late: section.component("late")?,
+            // Version 0.2.0 did not measure it.
+            kinetic: if section.has("kinetic") { section.component("kinetic")? } else { ThirdMeans::default() },
             curvature_mean: or_nan("curvature_mean")?,
             curvature_std: or_nan("curvature_std")?,
             least_curvature_std: section.optional("least_curvature_std")?.unwrap_or(f64::INFINITY),
@@ -148,6 +192,7 @@ impl Summary {
     pub fn new(end_time: f64) -> Self {
         Self {
             late: Late::new(end_time),
+            kinetic: ThirdMeans::default(),
             curvature_mean: f64::NAN,
             curvature_std: f64::NAN,
             least_curvature_std: f64::INFINITY,
@@ -166,7 +211,7 @@ impl Summary {
     /// The same for a run to an end; sums for another end are forgotten.
     pub fn with_end(mut self, end_time: f64) -> Self {
         if self.late.end_time.to_bits() != end_time.to_bits() {
-            self.late = Late::new(end_time);
+            (self.late, self.kinetic) = (Late::new(end_time), ThirdMeans::default());
         }
         self
     }
@@ -182,6 +227,26 @@ impl Summary {
         (self.curvature_mean, self.curvature_std) = (mean, deviation);
         self.least_curvature_std = self.least_curvature_std.min(deviation);
         self.momentum = self.momentum.max(momentum);
+    }
+
+    /// Takes the kinetic energy at a time.
+    pub fn take_energy(&mut self, time: f64, kinetic: f64) {
+        self.kinetic.take(time / self.late.end_time, kinetic);
+    }
+
+    /// Angular frequency and rate of decay of an oscillation, from the times and the differences of successive extremes of the
+    /// deformation; None with fewer than four.
+    fn oscillation(&self) -> Option<(f64, f64)> {
+        let (first, last) = (self.extremes.first()?, self.extremes.last()?);
+        let swings: Vec<f64> =
+            self.extremes.windows(2).map(|two| (two[1].deformation - two[0].deformation).abs()).collect();
+        let halves = swings.len() as f64;
+        if swings.len() < 3 {
+            return None;
+        }
+        let half_period = (last.time - first.time) / halves;
+        let decay = (swings[0] / swings[swings.len() - 1]).ln() / ((halves - 1.0) * half_period);
+        Some((std::f64::consts::PI / half_period, decay))
     }
 
     /// Takes the enclosed measure and the deformation; code and message of a turn that has just been passed.
@@ -252,6 +317,14 @@ impl Summary {
             add("curvature", "of_measure", (self.curvature_mean / of_measure - 1.0).abs(), time, "ball of the measure");
         }
         add("momentum", "max", self.momentum, time, "conservation");
+        let [middle, last] = self.kinetic.means();
+        add("kinetic_energy", "mean", last, time, "mean of the last third");
+        add("kinetic_energy", "max", self.kinetic.largest, time, "largest of the last third");
+        add("kinetic_energy", "ratio", last / middle, time, "mean of the last third by that of the middle third");
+        if let Some((frequency, decay)) = self.oscillation() {
+            add("deformation", "frequency", frequency, time, "angular frequency, from the extremes");
+            add("deformation", "decay", decay, time, "rate of decay, from the extremes");
+        }
         add("droplets", "count", self.droplets, time, "connected components");
         for (k, crossing) in self.crossings.iter().enumerate() {
             add("deformation", CROSSINGS[k].name, *crossing, *crossing, "time of the passage");
@@ -284,6 +357,8 @@ mod tests {
         assert_eq!(section.find_non_finite(), None);
         let again = Summary::load(&section).unwrap();
         assert_eq!(again, summary);
+        let (frequency, decay) = summary.oscillation().unwrap();
+        assert!((frequency - 20.0).abs() < 1e-3 && decay.abs() < 1e-3, "{frequency} {decay}");
         assert_eq!(again.clone().with_end(1.0), summary);
         assert_eq!(again.with_end(2.0).late.count.to_bits(), 0_f64.to_bits(), "sums for another end are forgotten");
         section.put_reals("extreme_values", &[0.0]);
