@@ -204,8 +204,8 @@ fn advice(time_step: f64, stable: f64, bound: &str) -> String {
         return format!("the step was {time_step:.3e}, {bound} allows {stable:.3e}");
     }
     format!(
-        "the step of {time_step:.3e} is within the limits ({bound} allows {stable:.3e}), so particles have crowded: shifting, a \
-         higher speed of sound or a finer spacing is needed"
+        "the step of {time_step:.3e} is within the limits ({bound} allows {stable:.3e}), so particles have crowded: a higher \
+         speed of sound or a finer spacing is needed"
     )
 }
 

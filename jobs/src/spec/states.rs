@@ -263,7 +263,7 @@ impl Reason {
                 "the run made momentum out of nothing; the message has the numbers: a smaller time step or spacing may do"
             }
             Self::DivergedCrowded => {
-                "particles crowded; the message has the numbers: shifting, a higher speed of sound or a finer spacing may do"
+                "particles crowded; the message has the numbers: the balanced force, a higher speed of sound or a finer spacing may do"
             }
             Self::DivergedPhaseLost => {
                 "area or volume of a phase was lost; the message has the numbers: a smaller spacing may do"

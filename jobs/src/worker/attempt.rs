@@ -105,6 +105,8 @@ fn attempt(
     let ResolvedBody { scene, options, .. } =
         ResolvedBody::deserialize(&spec.body).map_err(|error| internal(&error))?;
     let scene_sha256 = digest::of_bytes(scene.to_string().as_bytes());
+    // A job that an earlier version resolved goes on to mean the same.
+    let scene = scene::of_earlier_version(scene, SCENES);
     let scene = scene::parse(&scene, SCENES).map_err(|violations| {
         Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
     })?;

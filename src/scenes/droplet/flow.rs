@@ -54,11 +54,17 @@ pub(super) fn body_force<const D: usize>(
             let (inside, outside) = (fluids.inside.density, fluids.outside.density);
             if *balance == Balance::None && inside != outside && acceleration_vector.norm() > 0.0 {
                 let detail = "in a periodic box two fluids fall freely together, whatever their densities; balance mean takes the \
-                              mean force out and leaves buoyancy";
-                errors.push(Violation::new("/body_force/balance", "conflict", detail, "none", json!(["mean"])));
+                              mean force out and leaves buoyancy; free_fall lets it through";
+                errors.push(Violation::new(
+                    "/body_force/balance",
+                    "conflict",
+                    detail,
+                    "none",
+                    json!(["mean", "free_fall"]),
+                ));
             }
             Some(match balance {
-                Balance::None => BodyForce::Constant(acceleration_vector),
+                Balance::None | Balance::FreeFall => BodyForce::Constant(acceleration_vector),
                 Balance::Mean => BodyForce::WithoutMean(acceleration_vector),
             })
         }

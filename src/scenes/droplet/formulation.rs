@@ -3,7 +3,8 @@
 //! balance, the others have that of the paper.
 
 use super::spec::{
-    CaseName, Droplet, GeometryChoice, IntegratorWord, LatticeWord, RedistancingChoice, TensionWord, VolumesWord,
+    Balance, CaseName, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, RedistancingChoice,
+    TensionWord, VolumesWord,
 };
 use crate::schemes::weakly_compressible_sph::{LevelUpdate, PressureConfig, PressureForm, Volumes};
 use crate::spec::choice::with_defaults;
@@ -73,17 +74,27 @@ impl Start {
     }
 }
 
+/// A force with the balance that forces of earlier versions had: none.
+fn falling_freely(force: ForceChoice) -> ForceChoice {
+    match force {
+        ForceChoice::Constant { acceleration, balance: Balance::None } => {
+            ForceChoice::Constant { acceleration, balance: Balance::FreeFall }
+        }
+        other => other,
+    }
+}
+
 /// A resolved scene without a lattice is of version 0.1 or 0.2.0: its balanced force is what is called `balanced_0_1` now,
 /// and no speed of sound was too low for it.
 pub(super) fn of_earlier_version(given: Given) -> Preset {
     let is_earlier =
         !given.has(Droplet::lattice()) && given.read(Droplet::tension_force()) == Some(TensionWord::Balanced);
     let is_without_lattice = !given.has(Droplet::lattice());
-    Preset::default().set_if(is_earlier, Droplet::tension_force(), TensionWord::Balanced01).set_if(
-        is_without_lattice,
-        Droplet::allow_soft(),
-        true,
-    )
+    let force = given.read(Droplet::body_force()).flatten();
+    Preset::default()
+        .set_if(is_earlier, Droplet::tension_force(), TensionWord::Balanced01)
+        .set_if(is_without_lattice, Droplet::allow_soft(), true)
+        .set_if(is_without_lattice && force.is_some(), Droplet::body_force(), force.map(falling_freely))
 }
 
 /// Pressures of a scene; the spec gets what was left open. Densities by continuity have none of these parameters.

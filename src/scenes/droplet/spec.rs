@@ -184,8 +184,10 @@ crate::words! {
 crate::words! {
     /// What balances a constant force.
     pub enum Balance {
-        /// nothing: everything falls freely
+        /// nothing, which is refused for fluids of two densities
         None = "none",
+        /// nothing, even for fluids of two densities: everything falls freely
+        FreeFall = "free_fall",
         /// the mean force is taken out, which leaves buoyancy: (1 − ρ̄/ρ) g with the mean density ρ̄ of the box
         Mean = "mean",
     }
@@ -251,7 +253,7 @@ crate::group! {
         shape: Option<Shape>;
         /// the box, periodic along every axis; by case when not given
         domain: Option<Corners>;
-        /// distance h of neighboring particles; every side has round(L/h) of them
+        /// distance h of neighboring particles: the volume of a particle is about h^D, whatever the lattice
         spacing: f64 = 0.031_25, in POSITIVE;
         /// scene time at the end
         end_time: f64 = 1.0, in POSITIVE => restart_safe;

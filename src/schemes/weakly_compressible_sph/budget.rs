@@ -4,6 +4,7 @@ use super::interactions::surface_tension::smoothed_delta;
 use super::interface::Interface;
 use super::system::SphSystem;
 use crate::geometry::Vector;
+use crate::simulation::section::known;
 use crate::simulation::{Component, LoadError, Section};
 
 /// Energies and momentum of one state.
@@ -77,6 +78,8 @@ pub(super) struct Budget<const D: usize> {
     pub start_energy: f64,
     /// Perimeter or surface area at the start; NaN before the first measurement and without a level set.
     pub start_interface: f64,
+    /// Enclosed area or volume at the first measurement; NaN before.
+    pub start_measure: f64,
     /// Work of the body force, ∫ Σ m a·u dt by trapezoids.
     pub work: f64,
     /// ∫ Σ m a dt of the body force by trapezoids.
@@ -93,6 +96,7 @@ impl<const D: usize> Budget<D> {
         Self {
             start_energy: contents.kinetic + contents.elastic,
             start_interface: contents.interface,
+            start_measure: f64::NAN,
             work: 0.0,
             impulse: Vector::<D>::zeros(),
             tension_work: 0.0,
@@ -115,7 +119,8 @@ impl<const D: usize> Budget<D> {
 impl<const D: usize> Component for Budget<D> {
     fn save(&self, section: &mut Section) {
         section.put_real("start_energy", self.start_energy);
-        section.put_optional("start_interface", crate::simulation::section::known(self.start_interface));
+        section.put_optional("start_interface", known(self.start_interface));
+        section.put_optional("start_measure", known(self.start_measure));
         section.put_real("work", self.work);
         section.put_vectors("impulse", &[self.impulse]);
         section.put_real("tension_work", self.tension_work);
@@ -127,6 +132,7 @@ impl<const D: usize> Component for Budget<D> {
         Ok(Self {
             start_energy: section.real("start_energy")?,
             start_interface: section.optional("start_interface")?.unwrap_or(f64::NAN),
+            start_measure: section.optional("start_measure")?.unwrap_or(f64::NAN),
             work: section.real("work")?,
             impulse: vector("impulse")?,
             tension_work: section.real("tension_work")?,

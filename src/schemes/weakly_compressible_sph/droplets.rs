@@ -29,9 +29,10 @@ pub(super) struct Droplets<const D: usize> {
     pub label: Vec<u8>,
     /// The curvature κ₀ of each droplet as a ball.
     pub ball_curvatures: Vec<f64>,
-    /// Particles of each droplet when their number last changed; 0 of a layer, which reaches across the box and has no
-    /// curvature as a ball.
+    /// Particles of each droplet when their number last changed.
     sizes: Vec<usize>,
+    /// Whether each is a layer: it reaches across the box and has no curvature as a ball.
+    is_layer: Vec<bool>,
     /// The area or volume that was enclosed at the start.
     pub initial_measure: f64,
 }
@@ -57,6 +58,7 @@ impl<const D: usize> Droplets<D> {
             label: vec![FRAGMENT; count],
             ball_curvatures: Vec::new(),
             sizes: Vec::new(),
+            is_layer: Vec::new(),
             initial_measure,
         }
     }
@@ -69,12 +71,15 @@ impl<const D: usize> Droplets<D> {
     /// Counts the droplets. Returns their number where it changed; each then gets the curvature of a ball of its share of the
     /// measure that was enclosed at the start.
     pub fn count(&mut self, searched: &Searched<'_, D>) -> Option<usize> {
-        let sizes = self.components.find(searched, &mut self.label);
-        if sizes.len() == self.ball_curvatures.len() {
+        let (sizes, is_layer) = self.components.find(searched, &mut self.label);
+        let were_layers = self.ball_curvatures.iter().map(|kappa| *kappa == 0.0);
+        if sizes.len() == self.ball_curvatures.len() && were_layers.eq(is_layer.iter().copied()) {
             return None;
         }
         self.sizes.clear();
         self.sizes.extend_from_slice(sizes);
+        self.is_layer.clear();
+        self.is_layer.extend_from_slice(is_layer);
         self.renew_ball_curvatures();
         Some(self.number())
     }
@@ -83,11 +88,11 @@ impl<const D: usize> Droplets<D> {
     pub fn renew_ball_curvatures(&mut self) {
         let all = self.sizes.iter().sum::<usize>().max(1) as f64;
         self.ball_curvatures.clear();
-        let share = |size: &usize| match size {
-            0 => 0.0,
-            size => ball_curvature::<D>(self.initial_measure * *size as f64 / all),
+        let share = |(size, is_layer): (&usize, &bool)| match is_layer {
+            true => 0.0,
+            false => ball_curvature::<D>(self.initial_measure * *size as f64 / all),
         };
-        self.ball_curvatures.extend(self.sizes.iter().map(share));
+        self.ball_curvatures.extend(self.sizes.iter().zip(&self.is_layer).map(share));
     }
 
     /// Whether a component reaches across the box: a layer, or a fluid with holes.
@@ -134,8 +139,8 @@ impl<const D: usize> Components<D> {
     }
 
     /// Labels the particles of the fluid inside and, of the others, those near a droplet. Droplets count from 0 by their first
-    /// particle. Returns the number of particles of each droplet.
-    fn find(&mut self, searched: &Searched<'_, D>, label: &mut [u8]) -> &[usize] {
+    /// particle. Returns the number of particles of each droplet, and whether it is a layer.
+    fn find(&mut self, searched: &Searched<'_, D>, label: &mut [u8]) -> (&[usize], &[bool]) {
         self.inside.clear();
         let species = searched.species;
         self.inside.extend((0..searched.positions.len()).filter(|i| species[*i] == Species::Inside));
@@ -152,12 +157,12 @@ impl<const D: usize> Components<D> {
                 }
             }
         }
-        for (size, is_layer) in self.sizes.iter_mut().zip(&self.is_layer) {
-            *size = if *is_layer { 0 } else { *size };
-        }
+        let is_droplet = |rank: Option<&usize>| rank.is_some_and(|rank| *rank != usize::from(FRAGMENT));
         let mut rank = self.ranks.iter();
-        self.sizes.retain(|_| rank.next().is_some_and(|rank| *rank != usize::from(FRAGMENT)));
-        &self.sizes
+        self.sizes.retain(|_| is_droplet(rank.next()));
+        let mut rank = self.ranks.iter();
+        self.is_layer.retain(|_| is_droplet(rank.next()));
+        (&self.sizes, &self.is_layer)
     }
 
     /// Numbers the connected components of the fluid inside and counts their particles.

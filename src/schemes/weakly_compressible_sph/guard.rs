@@ -2,12 +2,13 @@
 
 use super::budget::{Budget, Contents};
 use super::checks::{LIMITS, Watch, Watched};
-use super::config::Discretization;
+use super::config::{Discretization, Integrator};
 use super::droplets::ball_curvature;
 use super::interactions::TensionForce;
 use super::species::Species;
 use super::system::SphSystem;
 use crate::geometry::Vector;
+use crate::simulation::section::known;
 use crate::simulation::{Check, Finding, LoadError, Section, Severity, StepError};
 use crate::time::Clock;
 
@@ -27,7 +28,8 @@ impl<const D: usize> Supply<D> {
 }
 
 /// Doubts that are told once a run.
-const DOUBTS: [&str; 5] = ["energy_gain", "crowded_particles", "fast_flow", "wrong_sides", "level_creeps"];
+const DOUBTS: [&str; 6] =
+    ["energy_gain", "crowded_particles", "fast_flow", "wrong_sides", "level_creeps", "shape_unresolved"];
 
 /// What a run watches of itself.
 #[derive(Debug)]
@@ -38,8 +40,16 @@ pub(super) struct Guard<const D: usize> {
     supply: Supply<D>,
     /// Particles of the drops at the start.
     start_particles: usize,
+    /// Time at which the drop came to rest, and the work of surface tension with the surface energy then; NaN in motion.
+    rest: [f64; 2],
     /// Whether each of [`DOUBTS`] was told.
     told: [bool; DOUBTS.len()],
+}
+
+/// Σ m |u| below which speeds are round-off of the pressures: that of 1e-6 of the least speed of sound.
+fn least_momentum<const D: usize>(system: &SphSystem<D>) -> f64 {
+    let mass: f64 = (0..system.flow.count()).map(|i| system.flow.mass(i)).sum();
+    1e-6 * system.config.fluids.least_sound_speed() * mass
 }
 
 impl<const D: usize> Guard<D> {
@@ -51,21 +61,26 @@ impl<const D: usize> Guard<D> {
             watched: Watched { is_single, ..Watched::UNKNOWN },
             supply: Supply::new(system, 0.0),
             start_particles: system.flow.species.iter().filter(|species| **species == Species::Inside).count(),
+            rest: [f64::NAN; 2],
             told: [false; DOUBTS.len()],
         }
     }
 
-    /// Adds what came in during a part of a step that ends now, by the trapezoidal rule. `is_divided` says whether the number of
+    /// Adds what came in during a part of a step that ends now, by the trapezoidal rule. `is_changed` says whether the number of
     /// droplets changed in it.
-    pub fn advance(&mut self, system: &SphSystem<D>, time: f64, length: f64, is_divided: bool) {
+    pub fn advance(&mut self, system: &SphSystem<D>, time: f64, length: f64, is_changed: bool) {
         let (before, now) = (self.supply, Supply::new(system, time));
         self.budget.work += 0.5 * length * (before.power + now.power);
         self.budget.impulse += (before.force + now.force) * (0.5 * length);
         self.budget.tension_work += 0.5 * length * (before.tension_power + now.tension_power);
         self.supply = now;
+        self.watched.is_single &= !is_changed;
+    }
+
+    /// Counts a whole step with or without particles on the wrong side.
+    pub fn count_step(&mut self, system: &SphSystem<D>) {
         let is_wrong = system.interface.level_set().is_some_and(|set| set.sides.wrong_share() > LIMITS.sides_doubt);
         self.watched.sides_steps = if is_wrong { self.watched.sides_steps + 1 } else { 0 };
-        self.watched.is_single &= !is_divided;
     }
 
     /// Measures the watched invariants. `crowded` is the share of particles that are too close to another, `measure` the
@@ -83,14 +98,18 @@ impl<const D: usize> Guard<D> {
         let tension = system.config.tension;
         let scale = tension * self.budget.start_interface;
         let lost = system.strays.lost.unsigned_abs() as f64 / self.start_particles.max(1) as f64;
+        if self.budget.start_measure.is_nan() {
+            self.budget.start_measure = measure;
+        }
+        let creep = self.creep(system, contents, time);
         self.watched = Watched {
             energy: self.budget.gain(contents, tension) / scale,
-            momentum: self.budget.momentum_gain(contents) / contents.momentum_size.max(f64::MIN_POSITIVE),
+            momentum: self.budget.momentum_gain(contents) / contents.momentum_size.max(least_momentum(system)),
             crowded,
-            area: (measure / system.droplets.initial_measure - 1.0).abs(),
+            area: (measure / self.budget.start_measure - 1.0).abs(),
             sides: system.interface.level_set().map_or(f64::NAN, |set| set.sides.wrong_share()),
             strays: lost,
-            creep: self.creep(system, contents, time),
+            creep,
             crowded_measurements: if crowded > self.watched.most_crowded() {
                 self.watched.crowded_measurements + 1
             } else {
@@ -105,18 +124,24 @@ impl<const D: usize> Guard<D> {
         })
     }
 
-    /// Work of surface tension, beyond that of the shrinking interface, in a capillary time √(ρR³/τ) by the surface energy at
-    /// the start; NaN where the drop is not at rest.
-    fn creep(&self, system: &SphSystem<D>, contents: &Contents<D>, time: f64) -> f64 {
+    /// Work of surface tension since the drop came to rest, beyond that of the shrinking interface, in a capillary time
+    /// √(ρR³/τ) by the surface energy at the start; NaN in motion, and for the first capillary time of rest.
+    fn creep(&mut self, system: &SphSystem<D>, contents: &Contents<D>, time: f64) -> f64 {
         let tension = system.config.tension;
         let scale = tension * self.budget.start_interface;
         let radius = (D - 1) as f64 / ball_curvature::<D>(system.droplets.initial_measure);
         let capillary = (system.config.fluids.inside.density * radius.powi(3) / tension).sqrt();
-        if contents.kinetic > LIMITS.rest * scale || time < capillary {
+        if contents.kinetic > LIMITS.rest * scale || contents.kinetic <= 0.0 {
+            self.rest = [f64::NAN; 2];
             return f64::NAN;
         }
-        let released = tension * (contents.interface - self.budget.start_interface);
-        (self.budget.tension_work + released).abs() / scale * capillary / time
+        let balance = self.budget.tension_work + tension * contents.interface;
+        let [since, balance_then] = self.rest;
+        if since.is_nan() {
+            self.rest = [time, balance];
+        }
+        let elapsed = time - since;
+        if elapsed > capillary { (balance - balance_then).abs() / scale * capillary / elapsed } else { f64::NAN }
     }
 
     fn watches(&self, system: &SphSystem<D>) -> Vec<Watch> {
@@ -125,7 +150,9 @@ impl<const D: usize> Guard<D> {
         let closes = config.tension_force == TensionForce::Balanced
             && has_level_set
             && !config.is_density_integrated()
-            && config.discretization == Discretization::Kernels;
+            && config.discretization == Discretization::Kernels
+            // The impulse of another integrator is not the trapezoidal rule.
+            && config.integrator == Integrator::KickDriftKick;
         self.watched.watches(closes && !config.is_shifted, has_level_set)
     }
 
@@ -134,12 +161,28 @@ impl<const D: usize> Guard<D> {
         self.watches(system).iter().map(Watch::check).collect()
     }
 
-    /// Doubts of the last measurement that were not told before. `mach` is the largest Mach number.
+    /// Warnings of the last measurement that were not issued before. `mach` is the largest Mach number.
     pub fn new_doubts(&mut self, system: &SphSystem<D>, mach: f64, Clock { step, time }: Clock) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        for (k, (is_so, message, advice)) in self.doubts(system, mach).into_iter().enumerate() {
+            if is_so && !self.told[k] {
+                self.told[k] = true;
+                let doubt = Finding::warning(DOUBTS[k], message, (step, time)).with_advice(advice);
+                // A creeping level is a hint; the budget of energy says when it matters.
+                let severity = if DOUBTS[k] == "level_creeps" { Severity::Info } else { Severity::Warning };
+                findings.push(Finding { severity, ..doubt });
+            }
+        }
+        findings
+    }
+
+    /// Whether each of [`DOUBTS`] is there, its message and what helps.
+    fn doubts(&self, system: &SphSystem<D>, mach: f64) -> [(bool, String, &'static str); DOUBTS.len()] {
         let watched = self.watched;
         let has_limit = self.watches(system).iter().any(|watch| watch.name == DOUBTS[0] && watch.limit.is_some());
         let percent = |share: f64| 100.0 * share;
-        let doubts: [(bool, String, &'static str); DOUBTS.len()] = [
+        let unresolved = (self.budget.start_measure / system.droplets.initial_measure - 1.0).abs();
+        [
             (
                 has_limit && watched.energy > LIMITS.energy_doubt,
                 format!("energy grew from nothing by {:.2e} of the surface energy at the start", watched.energy),
@@ -168,25 +211,22 @@ impl<const D: usize> Guard<D> {
                 "where drops merge or part this passes; otherwise a finer spacing helps",
             ),
             (
-                watched.creep > LIMITS.creep,
+                has_limit && watched.creep > LIMITS.creep,
                 format!(
                     "surface tension works at rest: {:.1e} of the surface energy in a capillary time, so the level creeps",
                     watched.creep
                 ),
                 "redistancing transparent and a curvature filter keep it still",
             ),
-        ];
-        let mut findings = Vec::new();
-        for (k, (is_so, message, advice)) in doubts.into_iter().enumerate() {
-            if is_so && !self.told[k] {
-                self.told[k] = true;
-                let doubt = Finding::warning(DOUBTS[k], message, (step, time)).with_advice(advice);
-                // A creeping level is a hint; the budget of energy says when it matters.
-                let severity = if DOUBTS[k] == "level_creeps" { Severity::Info } else { Severity::Warning };
-                findings.push(Finding { severity, ..doubt });
-            }
-        }
-        findings
+            (
+                unresolved > LIMITS.area,
+                format!(
+                    "at the start {:.1} % of the area or volume are missing in the fits or too much",
+                    percent(unresolved)
+                ),
+                "a finer spacing resolves the shape",
+            ),
+        ]
     }
 
     /// Saves everything that later checks depend on.
@@ -194,6 +234,8 @@ impl<const D: usize> Guard<D> {
         section.put_component("budget", &self.budget);
         section.put_component("watched", &self.watched);
         section.put_counts("told", self.told.map(u64::from));
+        section.put_optional("rest_since", known(self.rest[0]));
+        section.put_optional("rest_balance", known(self.rest[1]));
         section.put_real("power", self.supply.power);
         section.put_vectors("force", &[self.supply.force]);
         section.put_real("tension_power", self.supply.tension_power);
@@ -214,6 +256,10 @@ impl<const D: usize> Guard<D> {
                 tension_power: section.real("tension_power")?,
             },
             start_particles: self.start_particles,
+            rest: [
+                section.optional("rest_since")?.unwrap_or(f64::NAN),
+                section.optional("rest_balance")?.unwrap_or(f64::NAN),
+            ],
             told: std::array::from_fn(|k| told[k] == 1),
         })
     }

@@ -133,16 +133,23 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
                 self.course.findings.push(Finding::info(code, message, (step, time)));
             }
         }
+        // At fixed steps, so that the end of a run does not depend on what the series shows.
         let clock = self.clock();
-        let measured = (crowded, self.row_value(if D == 2 { "area" } else { "volume" }));
-        self.guard.measure(&self.system, &contents, measured, clock)?;
-        let Fastest { speed, sound_speed, .. } = fastest(&self.system);
-        self.course.findings.extend(self.guard.new_doubts(&self.system, speed / sound_speed, clock));
+        let last = self.course.pace.last;
+        if clock.step.is_multiple_of(measurement_interval(last)) || clock.step >= last {
+            let measured = (crowded, self.row_value(if D == 2 { "area" } else { "volume" }));
+            self.guard.measure(&self.system, &contents, measured, clock)?;
+            let Fastest { speed, sound_speed, .. } = fastest(&self.system);
+            self.course.findings.extend(self.guard.new_doubts(&self.system, speed / sound_speed, clock));
+        }
         Ok(())
     }
 
     /// The largest speed u as u √(ρD/τ), with the diameter D of the ball of the measure at the start.
     fn scaled_speed(&self) -> Option<ErrorEntry> {
+        if self.system.droplets.has_layer() {
+            return None;
+        }
         let diameter = 2.0 * (D - 1) as f64 / self.whole_curvature();
         let config = &self.system.config;
         let scaled =
@@ -161,7 +168,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
                 return Pace::new(time_step, self.end_time, origin);
             }
             let left = self.end_time - clock.time;
-            let length = if left > 0.0 { left / (left / time_step - TIME_SLACK).ceil() } else { time_step };
+            let length = if left > 0.0 { left / (left / time_step - TIME_SLACK).ceil().max(1.0) } else { time_step };
             return Pace::new(length, self.end_time, clock);
         }
         let given = self.course.pace.time_step;
@@ -284,6 +291,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             }
             self.guard.advance(&self.system, time + part, part, changed.is_some());
         }
+        self.guard.count_step(&self.system);
         self.check(next)?;
         self.course.step = next.step;
         if self.is_row_due(next.step) || self.is_finished() {
@@ -357,7 +365,12 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 
     fn report(&self) -> Report {
         let whole = self.whole_curvature();
-        let expected = (self.system.config.tension * whole, whole, self.system.droplets.initial_measure);
+        let measure = self.system.droplets.initial_measure;
+        let expected = match self.system.droplets.has_layer() {
+            false => (self.system.config.tension * whole, whole, measure),
+            // A layer has no curvature as a ball.
+            true => (f64::NAN, f64::NAN, measure),
+        };
         let mut errors = self.summary.entries(D, self.clock().time, expected);
         errors.extend(self.scaled_speed());
         Report { errors, health: self.health(), diagnostics: self.diagnostics(), method: self.course.method.clone() }

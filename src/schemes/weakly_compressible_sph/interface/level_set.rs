@@ -271,7 +271,6 @@ impl<const D: usize> LevelSet<D> {
             }
             // No particle changes side. A particle whose closest point is a mere sample keeps the level that it carries.
             let phi = if answer.is_sample { level } else { answer.distance.copysign(level) };
-            particles.scalar_mut(columns.phi)[i] = phi;
             particles.vector_mut(columns.closest_point)[i] = answer.point;
             particles.vector_mut(columns.normal)[i] = answer.normal;
             let curvature = answer.curvature.clamp(-steepest, steepest);
@@ -283,7 +282,10 @@ impl<const D: usize> LevelSet<D> {
                 self.sides.near += 1;
                 self.sides.wrong += u64::from(is_wrong);
             }
-            let deviation = if answer.is_sample { f64::NAN } else { level - phi };
+            // Shifted particles have taken the level of their new place since the fits.
+            let carried = particles.scalar(self.carried)[i];
+            let deviation = if answer.is_sample { f64::NAN } else { carried - phi };
+            particles.scalar_mut(columns.phi)[i] = phi;
             let values = [deviation, curvature];
             let sample = self.answers.nearest_sample(k);
             self.places.push(Place { foot: answer.point, sample, normal: answer.normal, distance: phi, values });
