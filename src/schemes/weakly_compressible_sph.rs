@@ -5,7 +5,7 @@
 //!
 //! | concept | files |
 //! | --- | --- |
-//! | configuration | [`config`], [`species`], [`fluids`], `kernel_choice` |
+//! | configuration | [`config`], [`level_update`], [`species`], [`fluids`], `kernel_choice` |
 //! | the flow and its rates | `flow_state` |
 //! | sums over pairs | `neighbor_lists`, `pair_workspace`, `pair_sums`, `column` |
 //! | terms of the equations | `interactions` |
@@ -13,7 +13,8 @@
 //! | the interface and what it encloses | `interface`, `droplets`, `strays` |
 //! | one evaluation | `system` |
 //! | steps in time | `stepping`, [`time_step`] |
-//! | the simulation and what it shows | `simulation`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
+//! | what a run watches | `budget`, `checks`, `guard` |
+//! | the simulation and what it shows | `simulation`, `saved_state`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
 
 mod budget;
 mod checks;
