@@ -283,8 +283,8 @@ crate::group! {
         /// apart, and acts as a weak elasticity; by tension_force when not given
         background_pressure: Option<f64>, in NOT_NEGATIVE.and_at_most(100.0);
         /// coefficient β of the pressure −β ρ c ε ∇·u, for densities by summation and kick_drift_kick; by tension_force when not
-        /// given
-        bulk_damping: Option<f64>, in NOT_NEGATIVE.and_at_most(10.0);
+        /// given; 2 holds, 5 does not
+        bulk_damping: Option<f64>, in NOT_NEGATIVE.and_at_most(2.0);
         /// what becomes of the level that particles carry, for geometry pcp; by tension_force when not given
         redistancing: Option<RedistancingChoice>;
         /// radius in h of the surface filter of the curvature, 0 for none, for geometry pcp; by tension_force when not given
