@@ -52,6 +52,7 @@ mod volume_form;
 pub use config::{
     DensityMethod, Discretization, Geometry, Integrator, PressureConfig, PressureForm, SphConfig, Volumes,
 };
+pub use droplets::ball_curvature;
 pub use fluids::Fluid;
 pub use interactions::{BodyForce, TensionForce};
 pub use kernel_choice::KernelChoice;

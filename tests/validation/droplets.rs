@@ -112,7 +112,11 @@ fn fluids_may_differ() {
 fn two_drops_rest_side_by_side() {
     let circle = |x: f64, radius: f64| json!({"type": "circle", "center": [x, 0], "radius": radius});
     let shape = json!({"type": "union", "of": [circle(-0.6, 0.35), circle(0.6, 0.45)]});
-    let (simulation, findings) = finish(&droplet(&json!({"case": "custom", "end_time": 0.05, "shape": shape})));
+    // c² = 100 τ/(ρR) for the smaller drop.
+    let fluid = json!({"sound_speed": 120});
+    let fluids = json!({"inside": fluid, "outside": fluid});
+    let body = json!({"case": "custom", "end_time": 0.05, "shape": shape, "fluids": fluids});
+    let (simulation, findings) = finish(&droplet(&body));
     assert_eq!(last(simulation.as_ref(), "droplets"), 2.0);
     assert!(findings.is_empty(), "{findings:?}");
     assert!(last(simulation.as_ref(), "kinetic_energy") < 1e-3);

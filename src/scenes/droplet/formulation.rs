@@ -24,6 +24,9 @@ struct Balanced {
 const BALANCED: Balanced =
     Balanced { background_at_rest: 0.2, background: 0.05, bulk_damping: 0.2, curvature_filter_h: 6.0 };
 
+/// Least radius of the filter of the curvature in h, that of the filter of the level.
+const LEAST_FILTER_H: f64 = 2.0;
+
 /// What of a formulation applies to a scene.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scope {
@@ -164,6 +167,11 @@ pub(super) fn level_and_curvature(
         RedistancingChoice::Overwrite => LevelUpdate::Overwrite,
     };
     let default = if is_balanced { BALANCED.curvature_filter_h } else { 0.0 };
-    let filter = *spec.curvature_filter_h.get_or_insert(default) * spec.spacing;
+    let filter_h = *spec.curvature_filter_h.get_or_insert(default);
+    if filter_h > 0.0 && filter_h < LEAST_FILTER_H {
+        let (detail, allowed) = ("there are too few particles within the radius", json!("0, or a number ≥ 2"));
+        errors.push(Violation::new("/curvature_filter_h", "range", detail, filter_h, allowed));
+    }
+    let filter = filter_h * spec.spacing;
     (update, (filter > 0.0).then_some(filter))
 }

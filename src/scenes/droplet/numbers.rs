@@ -1,7 +1,10 @@
-//! The numbers that characterize a droplet scene: its size, its speeds, and the dimensionless numbers of the field.
+//! The numbers that characterize a droplet scene: its size and its speeds.
 
 use super::spec::{Droplet, FluidSpec};
+use crate::geometry::Vector;
 use crate::scenes::shapes::Shape;
+use crate::schemes::weakly_compressible_sph::ball_curvature;
+use crate::simulation::Finding;
 use crate::spec::Violation;
 use serde_json::json;
 
@@ -30,12 +33,7 @@ pub(super) struct SceneNumbers {
 }
 
 impl SceneNumbers {
-    pub fn new<const D: usize>(
-        shape: Option<&Shape>,
-        tension: f64,
-        gravity: f64,
-        lengths: &crate::geometry::Vector<D>,
-    ) -> Self {
+    pub fn new<const D: usize>(shape: Option<&Shape>, tension: f64, gravity: f64, lengths: &Vector<D>) -> Self {
         let radius = shape.and_then(smallest_radius::<D>);
         let curvature = (D - 1) as f64 / radius.unwrap_or(0.5 * lengths.min());
         Self { radius, curvature, tension, gravity, length: lengths.max() }
@@ -55,6 +53,20 @@ impl SceneNumbers {
     pub fn least_sound_speed(&self, fluid: &FluidSpec) -> f64 {
         let capillary = self.radius.map_or(0.0, |radius| self.tension / (fluid.density * radius));
         (TUNING.stiffness * capillary.max(self.gravity * self.length)).sqrt()
+    }
+
+    /// A warning for each fluid that is softer than c² = 100 max(τ/(ρR), gL).
+    pub fn soft_fluids(&self, spec: &Droplet) -> Vec<Finding> {
+        let fluids = [("inside", &spec.fluids.inside), ("outside", &spec.fluids.outside)];
+        let soft = fluids.into_iter().map(|(name, fluid)| (name, fluid.sound_speed, self.least_sound_speed(fluid)));
+        let soft = soft.filter(|(_, sound_speed, least)| sound_speed < least);
+        soft.map(|(name, sound_speed, least)| {
+            let message = format!(
+                "the fluid {name} is compressed: its speed of sound is {sound_speed}, 100 max(τ/(ρR), gL) asks for {least:.4}"
+            );
+            Finding::warning("soft_fluid", message, (0, 0.0)).with_advice("a higher speed of sound helps")
+        })
+        .collect()
     }
 
     /// Refuses speeds of sound below half of the least one, unless the scene allows soft fluids.
@@ -80,8 +92,6 @@ fn smallest_radius<const D: usize>(shape: &Shape) -> Option<f64> {
         return None;
     }
     let parts = shape.parts::<D>("/shape").ok()?;
-    let radius = |measure: f64| {
-        if D == 2 { (measure / std::f64::consts::PI).sqrt() } else { (0.75 * measure / std::f64::consts::PI).cbrt() }
-    };
+    let radius = |measure: f64| (D - 1) as f64 / ball_curvature::<D>(measure);
     parts.iter().map(|part| radius(part.area_or_volume())).filter(|radius| *radius > 0.0).reduce(f64::min)
 }

@@ -21,8 +21,8 @@ use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, SphConfig, SphSystem, TensionForce,
-    WeaklyCompressibleSph, measurement_interval,
+    DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem,
+    TensionForce, WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{OutputPlan, Quantity, Simulation};
 use crate::spec::{Coordinates, Parameter, Violation};
@@ -35,6 +35,7 @@ pub(super) struct DropletScene<const D: usize> {
     pub(super) low: Vector<D>,
     pub(super) high: Vector<D>,
     lattice: StartLattice<D>,
+    numbers: SceneNumbers,
     pub(super) config: SphConfig<D>,
     time_step: f64,
     steps: u64,
@@ -72,7 +73,7 @@ fn geometry(
     spec: &mut Droplet,
     case: &Case,
     scope: Scope,
-    smoothing_h: f64,
+    (smoothing_h, smoothing_length): (f64, f64),
     errors: &mut Vec<Violation>,
 ) -> Result<Geometry, Violation> {
     let (level_update, curvature_filter) = level_and_curvature(spec, scope, errors);
@@ -86,9 +87,10 @@ fn geometry(
         return Err(error);
     }
     *method = full;
-    let least_band_h = 4.0 * smoothing_h;
-    let band_h = *band_h.get_or_insert(least_band_h + 1.0);
-    if band_h < least_band_h {
+    let band_h = *band_h.get_or_insert(4.0 * smoothing_h + 1.0);
+    let least_band_h = 4.0 * smoothing_length / spec.spacing;
+    // Up to rounding: a width that is given as 4 ε/h is wide enough.
+    if band_h < least_band_h * (1.0 - 1e-12) {
         let detail = "the smoothed tension reaches 2 ε to both sides";
         let allowed = format!("a number ≥ {least_band_h}");
         return Err(Violation::new("/geometry/band_h", "range", detail, band_h, allowed));
@@ -161,14 +163,13 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let shape = drop_shape(&mut spec, &case, &lengths, &mut errors);
     let flow = FlowPlan::new(&mut spec, &case, D, &mut errors);
     let lattice = start_lattice(&spec, flow.lattice, &lengths, is_box, &mut errors);
-    let geometry = geometry(&mut spec, &case, flow.scope, flow.smoothing_h, &mut errors);
-    let geometry = geometry.map_err(|error| errors.push(error)).ok();
     let given_step = spec.time_step.or(if spec.steps.is_none() { case.time_step } else { None });
     // ε is measured by the volume of a particle; version 0.1 and the paper take the spacing as it was given.
+    let is_by_volume = spec.tension_force == TensionWord::Balanced && is_box && lattice.count() >= 1.0;
     let volume = lengths.product() / lattice.count();
-    let is_given = spec.tension_force != TensionWord::Balanced;
-    let length = if is_given { spec.spacing } else { volume.powf(1.0 / D as f64) };
-    let smoothing_length = flow.smoothing_h * length;
+    let smoothing_length = flow.smoothing_h * if is_by_volume { volume.powf(1.0 / D as f64) } else { spec.spacing };
+    let geometry = geometry(&mut spec, &case, flow.scope, (flow.smoothing_h, smoothing_length), &mut errors);
+    let geometry = geometry.map_err(|error| errors.push(error)).ok();
     let tension = *spec.surface_tension.get_or_insert(case.tension);
     let gravity = match spec.body_force.as_ref() {
         Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().map(|g| g * g).sum::<f64>().sqrt(),
@@ -200,7 +201,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         spec.time_step = given_step;
     }
     let clouds = points.into_iter().collect();
-    Ok(Box::new(DropletScene { spec, shape, low, high, lattice, config, time_step, steps, chosen, clouds }))
+    Ok(Box::new(DropletScene { spec, shape, low, high, lattice, numbers, config, time_step, steps, chosen, clouds }))
 }
 
 /// What the scheme is made of; the spec gets what was left open.
@@ -379,8 +380,17 @@ impl<const D: usize> Scene for DropletScene<D> {
         if self.config.has_tension() {
             work.push(PhaseWork::every_step("droplets", particles * steps_done));
             match &self.config.geometry {
-                Geometry::Pcp { method, half_band, .. } => {
+                Geometry::Pcp { method, half_band, level_update, curvature_filter } => {
                     let band = self.near(2.0 * half_band);
+                    let carried = match level_update {
+                        LevelUpdate::Transparent { radius, .. } => Some(*radius),
+                        LevelUpdate::Overwrite => None,
+                    };
+                    if let Some(radius) = carried.or(*curvature_filter) {
+                        // Each place sums over the clusters within the radius along the interface.
+                        let clusters = (radius / self.config.spacing).powi(D as i32 - 1);
+                        work.push(PhaseWork::every_step("redistancing/filter", band * clusters * evaluations));
+                    }
                     let reach_h = half_band / self.config.spacing;
                     work.extend(work_estimate::redistancing::<D>(
                         method,
@@ -421,7 +431,10 @@ impl<const D: usize> Scene for DropletScene<D> {
         })?;
         let (plan, clock) = (context.plan, context.cpu_clock);
         let chosen = self.chosen.clone();
-        Ok(Box::new(WeaklyCompressibleSph::new(system, self.time_step, self.spec.end_time, plan, clock, chosen)))
+        let end_time = self.spec.end_time;
+        let mut simulation = WeaklyCompressibleSph::new(system, self.time_step, end_time, plan, clock, chosen);
+        simulation.course_mut().findings.extend(self.numbers.soft_fluids(&self.spec));
+        Ok(Box::new(simulation))
     }
 }
 

@@ -10,7 +10,7 @@ use crate::geometry::Vector;
 #[derive(Debug, Clone)]
 pub(super) struct StartLattice<const D: usize> {
     /// Cells along each axis.
-    pub cells: [usize; D],
+    cells: [usize; D],
     /// Particles of a cell, in parts of its edges.
     basis: &'static [[f64; 3]],
 }
@@ -23,13 +23,13 @@ struct Cell {
 }
 
 fn cell(word: LatticeWord) -> Cell {
-    let whole: f64 = 3.0;
+    let root = 3.0_f64.sqrt();
     match word {
         LatticeWord::Cubic => Cell { edges: [1.0; 3], basis: &[[0.5, 0.5, 0.5]] },
         LatticeWord::Hexagonal => {
             // Triangles of edge a = (2/√3)^½, in rows a √3/2 apart.
-            let a = (2.0 / whole.sqrt()).sqrt();
-            Cell { edges: [a, a * whole.sqrt(), 1.0], basis: &[[0.25, 0.25, 0.5], [0.75, 0.75, 0.5]] }
+            let a = (2.0 / root).sqrt();
+            Cell { edges: [a, a * root, 1.0], basis: &[[0.25, 0.25, 0.5], [0.75, 0.75, 0.5]] }
         }
         LatticeWord::BodyCentered => {
             Cell { edges: [2.0_f64.cbrt(); 3], basis: &[[0.25, 0.25, 0.25], [0.75, 0.75, 0.75]] }
@@ -42,8 +42,7 @@ fn cell(word: LatticeWord) -> Cell {
 }
 
 impl<const D: usize> StartLattice<D> {
-    /// The lattice of cells that are nearest to a spacing in a box with these edge lengths; along an axis there are at least
-    /// `0` and at most `most` cells.
+    /// The lattice with the cells nearest to a spacing that fill a box with these edge lengths, at most `most` along an axis.
     pub fn new(word: LatticeWord, lengths: &Vector<D>, spacing: f64, most: f64) -> Self {
         let Cell { edges, basis } = cell(word);
         let counts = |d: usize| (lengths[d] / (edges[d] * spacing)).round().clamp(0.0, most) as usize;

@@ -1,8 +1,9 @@
 //! The invariants that a run of two fluids watches: their values, limits and reasons.
 //!
-//! The limits were set on runs known to be good and bad (docs/results/droplet-notes.md). They end a run only with the balanced
-//! force on densities by summation, whose budgets close; otherwise the values are shown without a limit.
+//! The limits were set on runs known to be good and bad (docs/results/droplet-notes.md). Budgets and the area have limits only
+//! with the balanced force on densities by summation, whose budgets close; otherwise their values are shown without a limit.
 
+use crate::simulation::section::known;
 use crate::simulation::{Check, Component, Divergence, LoadError, Section};
 
 /// Limits of the checks.
@@ -63,6 +64,8 @@ pub(super) struct Watch {
     pub value: f64,
     /// The limit; None where the value is only shown.
     pub limit: Option<f64>,
+    /// Whether a value beyond the limit has lasted long enough to end the run.
+    pub is_lasting: bool,
     pub divergence: Divergence,
 }
 
@@ -70,14 +73,17 @@ impl Watch {
     /// The check of the report.
     pub fn check(&self) -> Check {
         match self.limit {
-            Some(limit) => Check::at_most(self.name, Some(self.value), limit, ""),
+            Some(limit) => {
+                let check = Check::at_most(self.name, Some(self.value), limit, "");
+                Check { holds: check.holds.map(|_| !self.is_broken()), ..check }
+            }
             None => Check::watched(self.name, Some(self.value), ""),
         }
     }
 
     /// Whether the value is beyond its limit.
     pub fn is_broken(&self) -> bool {
-        self.limit.is_some_and(|limit| self.value > limit)
+        self.is_lasting && self.limit.is_some_and(|limit| self.value > limit)
     }
 }
 
@@ -127,48 +133,24 @@ impl Watched {
     /// and area are known.
     pub fn watches(&self, closes: bool, has_level_set: bool) -> Vec<Watch> {
         let closed = |limit: f64| closes.then_some(limit);
-        let lasts = self.sides_last() && self.is_single;
+        // Most end a run at their first value beyond the limit.
+        let watch = |name, value, limit, divergence| Watch { name, value, limit, divergence, is_lasting: true };
+        let crowded_lasts = self.crowded_measurements >= LIMITS.crowded_measurements;
+        let crowded = watch("crowded_particles", self.crowded, Some(self.most_crowded()), Divergence::Crowded);
         let mut watches = vec![
-            Watch {
-                name: "energy_gain",
-                value: self.energy,
-                limit: closed(LIMITS.energy),
-                divergence: Divergence::Energy,
-            },
-            Watch {
-                name: "momentum_gain",
-                value: self.momentum,
-                limit: closed(LIMITS.momentum),
-                divergence: Divergence::Momentum,
-            },
-            Watch {
-                name: "crowded_particles",
-                value: self.crowded,
-                limit: (self.crowded_measurements >= LIMITS.crowded_measurements).then_some(self.most_crowded()),
-                divergence: Divergence::Crowded,
-            },
+            watch("energy_gain", self.energy, closed(LIMITS.energy), Divergence::Energy),
+            watch("momentum_gain", self.momentum, closed(LIMITS.momentum), Divergence::Momentum),
+            Watch { is_lasting: crowded_lasts, ..crowded },
         ];
         if has_level_set {
+            let area = closed(LIMITS.area).filter(|_| self.is_single);
+            let sides = self.is_single.then_some(LIMITS.sides);
+            let sides = watch("wrong_sides", self.sides, sides, Divergence::Unresolved);
             watches.extend([
-                Watch {
-                    name: "area_change",
-                    value: self.area,
-                    limit: (closes && self.is_single).then_some(LIMITS.area),
-                    divergence: Divergence::PhaseLost,
-                },
-                Watch {
-                    name: "wrong_sides",
-                    value: self.sides,
-                    limit: lasts.then_some(LIMITS.sides),
-                    divergence: Divergence::Unresolved,
-                },
-                Watch {
-                    name: "lost_particles",
-                    value: self.strays,
-                    limit: Some(LIMITS.strays),
-                    divergence: Divergence::PhaseLost,
-                },
-                Watch { name: "creep", value: self.creep, limit: None, divergence: Divergence::Energy },
+                watch("area_change", self.area, area, Divergence::PhaseLost),
+                Watch { is_lasting: self.sides_last(), ..sides },
+                watch("lost_particles", self.strays, Some(LIMITS.strays), Divergence::PhaseLost),
+                watch("creep", self.creep, None, Divergence::Energy),
             ]);
         }
         watches
@@ -177,7 +159,6 @@ impl Watched {
 
 impl Component for Watched {
     fn save(&self, section: &mut Section) {
-        use crate::simulation::section::known;
         for (name, value) in self.values() {
             section.put_optional(name, known(value));
         }
@@ -238,6 +219,14 @@ mod tests {
         let turned = Watched { sides: 0.3, sides_steps: LIMITS.sides_steps, ..good };
         assert_eq!(broken(turned, false), None);
         assert_eq!(broken(Watched { sides_steps: LIMITS.sides_steps + 1, ..turned }, false), Some("wrong_sides"));
+        let check =
+            turned.watches(false, true).iter().map(super::Watch::check).find(|check| check.name == "wrong_sides");
+        let check = check.unwrap();
+        assert_eq!(
+            (check.limit, check.holds),
+            (Some(LIMITS.sides), Some(true)),
+            "the limit is shown before it has lasted"
+        );
     }
 
     #[test]

@@ -95,6 +95,16 @@ impl<const D: usize> Droplets<D> {
         self.ball_curvatures.extend(self.sizes.iter().zip(&self.is_layer).map(share));
     }
 
+    /// Number of groups that sums over droplets have: one, or one for each label where there are several.
+    pub fn groups(&self) -> usize {
+        if self.number() > 1 { usize::from(u8::MAX) + 1 } else { 1 }
+    }
+
+    /// The group that a particle belongs to.
+    pub fn group(&self, i: usize) -> usize {
+        if self.number() > 1 { usize::from(self.label[i]) } else { 0 }
+    }
+
     /// Whether a component reaches across the box: a layer, or a fluid with holes.
     pub fn has_layer(&self) -> bool {
         self.ball_curvatures.contains(&0.0)
@@ -219,7 +229,7 @@ impl<const D: usize> Components<D> {
 
 /// The curvature of a ball of a given area or volume: √(π/A), 2 (4π/3V)^⅓.
 #[must_use]
-pub(super) fn ball_curvature<const D: usize>(measure: f64) -> f64 {
+pub fn ball_curvature<const D: usize>(measure: f64) -> f64 {
     if D == 2 { (PI / measure).sqrt() } else { 2.0 * (4.0 * PI / (3.0 * measure)).cbrt() }
 }
 
@@ -252,6 +262,31 @@ mod tests {
         let shares: f64 = droplets.ball_curvatures.iter().map(|kappa| std::f64::consts::PI / (kappa * kappa)).sum();
         assert!((shares - 30.0).abs() < 1e-12);
         assert!(droplets.ball_curvature(200) < droplets.ball_curvature(210), "the larger droplet is less curved");
+    }
+
+    #[test]
+    fn a_layer_has_no_curvature_and_leaves_a_drop_its_share() {
+        let domain = Domain::new([Axis::Periodic { start: 0.0, length: 20.0 }; 2]);
+        let positions: Vec<Vector<2>> =
+            (0..400).map(|k| Vector::<2>::new(f64::from(k % 20) + 0.5, f64::from(k / 20) + 0.5)).collect();
+        let all: Vec<usize> = (0..400).collect();
+        let is_drop = |x: &Vector<2>| (x - Vector::<2>::new(10.0, 13.0)).norm() < 3.0;
+        let by = |is_inside: &dyn Fn(&Vector<2>) -> bool| -> Vec<Species> {
+            positions.iter().map(|x| if is_inside(x) { Species::Inside } else { Species::Outside }).collect()
+        };
+        let pool = by(&|x| x[1] < 5.0 || is_drop(x));
+        let inside = pool.iter().filter(|species| **species == Species::Inside).count();
+        let mut droplets = Droplets::new(domain, 400, inside as f64);
+        let searched = |species| Searched { positions: &positions, species, near: &all, spacing: 1.0, cutoff: 3.0 };
+        assert_eq!(droplets.count(&searched(&pool)), Some(2));
+        assert!(droplets.has_layer() && droplets.ball_curvatures[0] == 0.0);
+        // The drop has the curvature of its own particles.
+        let expected = ball_curvature::<2>((inside - 100) as f64);
+        assert!((droplets.ball_curvatures[1] - expected).abs() < 1e-12);
+        // The same number of components, but the drop has become a second layer.
+        let layers = by(&|x| x[1] < 5.0 || (x[1] - 13.0).abs() < 1.0);
+        assert_eq!(droplets.count(&searched(&layers)), Some(2), "a layer is no drop");
+        assert!(droplets.ball_curvatures.iter().all(|kappa| *kappa == 0.0));
     }
 
     #[test]

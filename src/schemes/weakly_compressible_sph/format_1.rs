@@ -57,6 +57,7 @@ pub(super) fn translate<const D: usize>(
     });
     state.put_count("absorbed_strays", absorbed);
     state.put_real("lost_particles", 0.0);
+    state.put_count("waiting_strays", 0);
     state.put_real("max_cfl", max_cfl);
     state.put_count("resting_steps", resting);
     let row = from_bits(arrays.counts("row")?);

@@ -1,4 +1,4 @@
-//! The guard of a run: budgets of energy and momentum, watched invariants, and the doubts that it tells.
+//! The guard of a run: budgets of energy and momentum, watched invariants, and the warnings that it issues.
 
 use super::budget::{Budget, Contents};
 use super::checks::{LIMITS, Watch, Watched};
@@ -27,9 +27,9 @@ impl<const D: usize> Supply<D> {
     }
 }
 
-/// Doubts that are told once a run.
-const DOUBTS: [&str; 6] =
-    ["energy_gain", "crowded_particles", "fast_flow", "wrong_sides", "level_creeps", "shape_unresolved"];
+/// Codes of the doubts; each is issued once a run.
+const DOUBTS: [&str; 7] =
+    ["energy_gain", "crowded_particles", "fast_flow", "wrong_sides", "level_creeps", "shape_unresolved", "strays_left"];
 
 /// What a run watches of itself.
 #[derive(Debug)]
@@ -42,8 +42,8 @@ pub(super) struct Guard<const D: usize> {
     start_particles: usize,
     /// Time at which the drop came to rest, and the work of surface tension with the surface energy then; NaN in motion.
     rest: [f64; 2],
-    /// Whether each of [`DOUBTS`] was told.
-    told: [bool; DOUBTS.len()],
+    /// Whether each of [`DOUBTS`] was issued.
+    issued: [bool; DOUBTS.len()],
 }
 
 /// Σ m |u| below which speeds are round-off of the pressures: that of 1e-6 of the least speed of sound.
@@ -62,7 +62,7 @@ impl<const D: usize> Guard<D> {
             supply: Supply::new(system, 0.0),
             start_particles: system.flow.species.iter().filter(|species| **species == Species::Inside).count(),
             rest: [f64::NAN; 2],
-            told: [false; DOUBTS.len()],
+            issued: [false; DOUBTS.len()],
         }
     }
 
@@ -118,7 +118,7 @@ impl<const D: usize> Guard<D> {
             ..self.watched
         };
         let broken = self.watches(system).into_iter().find(Watch::is_broken);
-        broken.map_or(Ok(()), |Watch { name, value, limit, divergence }| {
+        broken.map_or(Ok(()), |Watch { name, value, limit, divergence, .. }| {
             let limit = limit.unwrap_or(f64::NAN);
             Err(StepError::CheckFailed { check: name, divergence, value, limit, step, time })
         })
@@ -165,8 +165,8 @@ impl<const D: usize> Guard<D> {
     pub fn new_doubts(&mut self, system: &SphSystem<D>, mach: f64, Clock { step, time }: Clock) -> Vec<Finding> {
         let mut findings = Vec::new();
         for (k, (is_so, message, advice)) in self.doubts(system, mach).into_iter().enumerate() {
-            if is_so && !self.told[k] {
-                self.told[k] = true;
+            if is_so && !self.issued[k] {
+                self.issued[k] = true;
                 let doubt = Finding::warning(DOUBTS[k], message, (step, time)).with_advice(advice);
                 // A creeping level is a hint; the budget of energy says when it matters.
                 let severity = if DOUBTS[k] == "level_creeps" { Severity::Info } else { Severity::Warning };
@@ -185,7 +185,7 @@ impl<const D: usize> Guard<D> {
         [
             (
                 has_limit && watched.energy > LIMITS.energy_doubt,
-                format!("energy grew from nothing by {:.2e} of the surface energy at the start", watched.energy),
+                format!("the energy budget does not close: {:.2e} of the surface energy appeared", watched.energy),
                 "a finer spacing or a smaller time step helps",
             ),
             (
@@ -226,6 +226,14 @@ impl<const D: usize> Guard<D> {
                 ),
                 "a finer spacing resolves the shape",
             ),
+            (
+                system.strays.waiting > 0,
+                format!(
+                    "{} particles have no neighbor of their own fluid and stay, since a drop may not lose more",
+                    system.strays.waiting
+                ),
+                "a finer spacing resolves the neck",
+            ),
         ]
     }
 
@@ -233,7 +241,7 @@ impl<const D: usize> Guard<D> {
     pub fn save(&self, section: &mut Section) {
         section.put_component("budget", &self.budget);
         section.put_component("watched", &self.watched);
-        section.put_counts("told", self.told.map(u64::from));
+        section.put_counts("issued", self.issued.map(u64::from));
         section.put_optional("rest_since", known(self.rest[0]));
         section.put_optional("rest_balance", known(self.rest[1]));
         section.put_real("power", self.supply.power);
@@ -246,7 +254,7 @@ impl<const D: usize> Guard<D> {
     /// # Errors
     /// [`LoadError`].
     pub fn load(&self, section: &Section) -> Result<Self, LoadError> {
-        let told = section.counts_of("told", DOUBTS.len())?;
+        let issued = section.counts_of("issued", DOUBTS.len())?;
         Ok(Self {
             budget: section.component("budget")?,
             watched: section.component("watched")?,
@@ -260,7 +268,7 @@ impl<const D: usize> Guard<D> {
                 section.optional("rest_since")?.unwrap_or(f64::NAN),
                 section.optional("rest_balance")?.unwrap_or(f64::NAN),
             ],
-            told: std::array::from_fn(|k| told[k] == 1),
+            issued: std::array::from_fn(|k| issued[k] == 1),
         })
     }
 }

@@ -201,8 +201,14 @@ impl<const D: usize> SphSystem<D> {
         (row, close)
     }
 
+    /// Sum of the volumes of the particles inside, where there is no level set to measure by.
+    pub(super) fn volume_inside(&self) -> f64 {
+        let inside = (0..self.flow.count()).filter(|i| self.flow.species[*i] == Species::Inside);
+        inside.map(|i| self.flow.volume[i]).sum()
+    }
+
     /// Area or volume inside: by quadrature on the fits, of a layer by a smoothed sum over the particles.
-    fn enclosed_measure(&self, moments: Option<&EnclosedMoments<D>>) -> f64 {
+    pub(super) fn enclosed_measure(&self, moments: Option<&EnclosedMoments<D>>) -> f64 {
         if !self.droplets.has_layer() || self.interface.level_set().is_none() {
             return moments.map_or(f64::NAN, |m| m.area_or_volume);
         }

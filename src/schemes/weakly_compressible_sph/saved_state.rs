@@ -46,6 +46,7 @@ impl<const D: usize> SphSystem<D> {
         }
         state.put_count("absorbed_strays", self.strays.absorbed);
         state.put_real("lost_particles", self.strays.lost as f64);
+        state.put_count("waiting_strays", self.strays.waiting);
     }
 
     /// Loads a state of this scene.
@@ -66,6 +67,7 @@ impl<const D: usize> SphSystem<D> {
         let absorbed = state.count("absorbed_strays")?;
         // Version 0.2.0 had none of these.
         let lost = if state.has("lost_particles") { state.real("lost_particles")? as i64 } else { 0 };
+        let waiting = if state.has("waiting_strays") { state.count("waiting_strays")? } else { 0 };
         let (calibration, background, last_volume) = match state.has("pressure") {
             true => state.section("pressure", |section| {
                 let last_volume = section.reals_of("last_volume", self.flow.last_volume.len())?.to_vec();
@@ -92,7 +94,7 @@ impl<const D: usize> SphSystem<D> {
         if let (Some(soundness), Some(flow)) = (flow_fits, self.equations.fits_mut()) {
             flow.fit_diagnostics = soundness;
         }
-        (self.strays.absorbed, self.strays.lost) = (absorbed, lost);
+        (self.strays.absorbed, self.strays.lost, self.strays.waiting) = (absorbed, lost, waiting);
         Ok(())
     }
 }

@@ -83,11 +83,13 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         self.row = vec![f64::NAN; names(D).len()];
         let instant = Instant::default();
         self.system.evaluate(instant, &mut self.course.phases).map_err(|error| failed(error, start))?;
-        if self.system.droplets.initial_measure.is_nan()
-            && let Some(moments) = self.system.moments()?
-        {
-            // Of a drop that is known by its particles alone, the first quadrature says what is to be kept.
-            self.system.droplets.initial_measure = moments.area_or_volume;
+        if self.system.droplets.initial_measure.is_nan() && self.system.config.has_tension() {
+            // Of a drop that is known by its particles alone, the first measurement says what is to be kept.
+            let moments = self.system.moments()?;
+            self.system.droplets.initial_measure = match &moments {
+                Some(_) => self.system.enclosed_measure(moments.as_ref()),
+                None => self.system.volume_inside(),
+            };
             self.system.droplets.renew_ball_curvatures();
             self.system.evaluate(instant, &mut self.course.phases).map_err(|error| failed(error, start))?;
         }
@@ -207,8 +209,9 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         check_finite_vectors("velocity", &system.flow.velocity, next)?;
         check_finite("density", &system.flow.density, next)?;
         first_broken(system.columns.find_broken(&system.particles), next)?;
+        let largest_speed = system.flow.largest_speed();
         let Fastest { particle, speed, sound_speed } = fastest(system);
-        self.max_cfl = self.max_cfl.max(speed * self.time_of_part() / system.config.spacing);
+        self.max_cfl = self.max_cfl.max(largest_speed * self.time_of_part() / system.config.spacing);
         if speed > sound_speed {
             // What would have held at the speeds that a sound run has.
             let StepLimit { length: stable, cause: bound } = longest_step(&system.config, system.config.expected_speed);
@@ -217,18 +220,19 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             return Err(StepError::TooFast { particle, speed, sound_speed, time_step, stable, bound, step, time });
         }
         self.resting = match system.config.rest_below {
-            Some(limit) if speed < limit => self.resting + 1,
+            Some(limit) if largest_speed < limit => self.resting + 1,
             _ => 0,
         };
         if self.resting == PACING.steps_of_rest {
-            let message = format!("no particle has been faster than {speed:.3e} for {} steps", PACING.steps_of_rest);
+            let message =
+                format!("no particle has been faster than {largest_speed:.3e} for {} steps", PACING.steps_of_rest);
             self.course.findings.push(Finding::info("came_to_rest", message, (next.step, next.time)));
         }
         Ok(())
     }
 }
 
-/// The fastest particle.
+/// The particle that is fastest by the speed of sound in its fluid.
 struct Fastest {
     particle: usize,
     speed: f64,
@@ -239,12 +243,13 @@ struct Fastest {
 fn fastest<const D: usize>(system: &SphSystem<D>) -> Fastest {
     let mut fastest = (0, 0.0);
     for (i, u) in system.flow.velocity.iter().enumerate() {
-        let square = u.norm_squared();
+        let square = u.norm_squared() / system.flow.fluid(i).sound_speed.powi(2);
         if square > fastest.1 {
             fastest = (i, square);
         }
     }
-    let (particle, speed) = (fastest.0, fastest.1.sqrt());
+    let particle = fastest.0;
+    let speed = system.flow.velocity[particle].norm();
     Fastest { particle, speed, sound_speed: system.flow.fluid(particle).sound_speed }
 }
 

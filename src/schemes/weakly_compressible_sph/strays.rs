@@ -24,14 +24,17 @@ pub(super) struct Strays<const D: usize> {
     pub lost: i64,
     /// The most particles that the fluid inside may lose or gain; further strays wait for their balance.
     allowance: i64,
+    /// Strays that waited when neighbors were last listed.
+    pub waiting: u64,
 }
 
 impl<const D: usize> Strays<D> {
     pub fn new(domain: Domain<D>, allowance: i64) -> Self {
-        Self { cells: CellList::new(domain), found: Vec::new(), absorbed: 0, lost: 0, allowance }
+        Self { cells: CellList::new(domain), found: Vec::new(), absorbed: 0, lost: 0, allowance, waiting: 0 }
     }
 
-    /// Changes species and levels (signed distance and carried level) of the particles among `near` that have no neighbor of their own species. All particles are
+    /// Changes species and levels (signed distance and carried level) of the particles among `near` that have no neighbor of
+    /// their own species, as far as the allowance lets them. All particles are
     /// judged by the species before the change.
     pub fn absorb(
         &mut self,
@@ -54,9 +57,11 @@ impl<const D: usize> Strays<D> {
                 self.found.push(*i);
             }
         }
+        self.waiting = 0;
         for i in &self.found {
             let lost = self.lost + if species[*i] == Species::Inside { 1 } else { -1 };
             if lost.abs() > self.allowance {
+                self.waiting += 1;
                 continue;
             }
             self.lost = lost;
@@ -106,6 +111,6 @@ mod tests {
         species[alone] = Species::Inside;
         particles.scalar_mut(phi)[alone] = -0.5;
         none.absorb(&mut particles, [phi, phi], &all, 1.0, &mut species);
-        assert_eq!((none.absorbed, species[alone]), (0, Species::Inside));
+        assert_eq!((none.absorbed, none.waiting, species[alone]), (0, 1, Species::Inside));
     }
 }

@@ -188,8 +188,7 @@ impl<const D: usize> SphSystem<D> {
             phases.measure("sph/shifting", || self.shift(elapsed))?;
         }
         if let Interface::LevelSet(level_set) = &mut self.interface {
-            let droplet = (self.droplets.number() > 1).then_some(self.droplets.label.as_slice());
-            let answering = Answering { is_selection: is_listed, elapsed, droplet };
+            let answering = Answering { is_selection: is_listed, elapsed, droplets: &self.droplets };
             level_set.answer(&mut self.particles, &self.columns, answering, &self.interrupt, phases)?;
         }
         let is_due = is_listed && self.tension.is_some();

@@ -112,17 +112,15 @@ impl SurfaceTension {
     ) {
         let (flow, droplets) = (moment.flow, moment.droplets);
         let phi = moment.particles.scalar(moment.columns.phi);
-        let label = |i: usize| if droplets.number() > 1 { usize::from(droplets.label[i]) } else { 0 };
-        let labels = if droplets.number() > 1 { usize::from(u8::MAX) + 1 } else { 1 };
         sums.clear();
-        sums.resize(labels, (Vector::<D>::zeros(), 0.0));
+        sums.resize(droplets.groups(), (Vector::<D>::zeros(), 0.0));
         for (i, force) in forces.iter() {
-            let (net, shares) = &mut sums[label(*i)];
+            let (net, shares) = &mut sums[droplets.group(*i)];
             *net += force * flow.mass(*i);
             *shares += flow.volume[*i] * self.profile(phi[*i]);
         }
         for (i, force) in forces {
-            let (net, shares) = sums[label(*i)];
+            let (net, shares) = sums[droplets.group(*i)];
             *force -= net * (flow.volume[*i] * self.profile(phi[*i]) / (shares * flow.mass(*i)));
         }
     }

@@ -18,6 +18,7 @@ use crate::neighbors::CellList;
 use crate::parallel::{Interrupt, Interrupted};
 use crate::particles::{Particles, ScalarKey};
 use crate::schemes::measured_redistancing::{query, rebuild};
+use crate::schemes::weakly_compressible_sph::droplets::Droplets;
 use crate::schemes::weakly_compressible_sph::level_update::LevelUpdate;
 use crate::simulation::Phases;
 
@@ -67,13 +68,13 @@ pub struct LevelSetConfig {
 
 /// What an answer depends on.
 #[derive(Debug, Clone, Copy)]
-pub struct Answering<'a> {
+pub struct Answering<'a, const D: usize> {
     /// Whether candidates were selected for this evaluation.
     pub is_selection: bool,
     /// Time since the last evaluation, 0 for the first.
     pub elapsed: f64,
-    /// The droplet of each particle, where there are several.
-    pub droplet: Option<&'a [u8]>,
+    /// The droplets, each of which keeps its area or volume.
+    pub droplets: &'a Droplets<D>,
 }
 
 /// The surface and the particles near it.
@@ -235,7 +236,7 @@ impl<const D: usize> LevelSet<D> {
         &mut self,
         particles: &mut Particles<D>,
         columns: &SurfaceColumns,
-        answering: Answering<'_>,
+        answering: Answering<'_, D>,
         interrupt: &Interrupt,
         phases: &mut Phases,
     ) -> Result<(), Interrupted> {
@@ -315,7 +316,7 @@ impl<const D: usize> LevelSet<D> {
     fn repair_level(
         &mut self,
         particles: &mut Particles<D>,
-        Answering { elapsed, droplet, .. }: Answering<'_>,
+        Answering { elapsed, droplets, .. }: Answering<'_, D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         let LevelUpdate::Transparent { relaxation, radius } = self.config.update else { return Ok(()) };
@@ -325,7 +326,7 @@ impl<const D: usize> LevelSet<D> {
         let share = 1.0 - (1.0 - relaxation).powf(elapsed / self.config.repair_time);
         self.find_changes(share, particles.scalar(self.carried));
         if self.is_begun {
-            self.keep_enclosed_measure(droplet, elapsed);
+            self.keep_enclosed_measure(droplets, elapsed);
         }
         let least = TUNING.least_level * self.config.spacing;
         let level = particles.scalar_mut(self.carried);
@@ -355,22 +356,21 @@ impl<const D: usize> LevelSet<D> {
     /// Takes the mean over each droplet's interface out of the changes: a repair does not move the interface as a whole.
     /// Without it a drop at rest loses 4e-4 of its area in 24,000 steps (measured at R = 8 h). Where drops merge the mean is
     /// large for other reasons, so it is bounded.
-    fn keep_enclosed_measure(&mut self, droplet: Option<&[u8]>, elapsed: f64) {
+    fn keep_enclosed_measure(&mut self, droplets: &Droplets<D>, elapsed: f64) {
         let most = TUNING.largest_shift * self.config.spacing * elapsed / self.config.repair_time;
         let spacing = self.config.spacing;
-        let group = |i: usize| droplet.map_or(0, |droplet| usize::from(droplet[i]));
         self.means.clear();
-        self.means.resize(droplet.map_or(1, |_| usize::from(u8::MAX) + 1), (0.0, 0.0));
+        self.means.resize(droplets.groups(), (0.0, 0.0));
         for ((i, place), change) in self.placed.iter().zip(&self.places).zip(&self.changes) {
             let weight = share_across(place.distance, spacing);
             if !place.values[LEVEL].is_nan() {
-                let (all, sum) = &mut self.means[group(*i)];
+                let (all, sum) = &mut self.means[droplets.group(*i)];
                 *all += weight;
                 *sum += weight * change;
             }
         }
         for ((i, place), change) in self.placed.iter().zip(&self.places).zip(&mut self.changes) {
-            let (all, sum) = self.means[group(*i)];
+            let (all, sum) = self.means[droplets.group(*i)];
             if all > 0.0 && place.distance.abs() <= TUNING.repaired_beyond * spacing {
                 *change -= (sum / all).clamp(-most, most);
             }
