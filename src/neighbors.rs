@@ -1,14 +1,16 @@
 //! Neighbor searches.
 //!
 //! A [`CellList`] answers searches around any point. [`Pencils`] serve sums over all pairs of neighbors. [`BruteForce`]
-//! looks at every point and is the reference of both in tests.
+//! looks at every point and is the reference of both in tests. A [`KdTree`] finds the nearest points of clouds whose density varies.
 
 pub mod brute_force;
 pub mod cell_list;
+pub mod kd_tree;
 pub mod pencils;
 
 pub use brute_force::BruteForce;
 pub use cell_list::CellList;
+pub use kd_tree::KdTree;
 pub use pencils::Pencils;
 
 use crate::geometry::Vector;

@@ -5,9 +5,19 @@
 //! outside are refused, or reported, where they cannot represent a surface.
 
 pub mod bump;
+pub mod cleaning;
 pub mod examination;
+pub mod given_normals;
+pub mod local_spacing;
 pub mod normals;
+pub mod orientation;
+pub mod planes;
+pub mod preparation;
 pub mod relaxation;
+pub mod star_graph;
+pub mod stars;
 
 pub use bump::Bump;
 pub use examination::Examined;
+pub use preparation::PreparedCloud;
+pub use star_graph::StarGraph;

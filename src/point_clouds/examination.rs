@@ -29,9 +29,9 @@ const ASIDE: f64 = 0.5;
 /// is 180° or 360°.
 const WIDEST_GAP: [f64; 2] = [1.5 * std::f64::consts::PI, 2.0 * std::f64::consts::FRAC_PI_3];
 /// Extents whose fourth powers, and those of their parts, neither overflow nor underflow.
-const EXTENTS: std::ops::Range<f64> = 1e-40..1e40;
+pub(super) const EXTENTS: std::ops::Range<f64> = 1e-40..1e40;
 /// Smallest ratio of the spacing to the largest coordinate that leaves enough digits for differences.
-const LEAST_SPACING: f64 = 1e-9;
+pub(super) const LEAST_SPACING: f64 = 1e-9;
 /// Number of points that a message names.
 const NAMED: usize = 5;
 
@@ -46,8 +46,14 @@ pub struct PointList {
 
 impl PointList {
     /// The points for which a condition holds; None if there are none.
-    fn from_condition(points: usize, holds: impl Fn(usize) -> bool) -> Option<Self> {
-        let found: Vec<usize> = (0..points).filter(|i| holds(*i)).collect();
+    #[must_use]
+    pub fn from_condition(points: usize, holds: impl Fn(usize) -> bool) -> Option<Self> {
+        Self::from_indices((0..points).filter(|i| holds(*i)).collect())
+    }
+
+    /// The points with the given indices, in any order; None if there are none.
+    pub(super) fn from_indices(mut found: Vec<usize>) -> Option<Self> {
+        found.sort_unstable();
         let first = found.iter().take(NAMED).copied().collect();
         (!found.is_empty()).then_some(Self { first, count: found.len() })
     }
@@ -84,6 +90,19 @@ pub enum Unusable {
         pair: [usize; 2],
         /// Distance of this pair.
         distance: f64,
+    },
+    /// Points far from all others.
+    #[error("{0}: far from all other points; leave them out")]
+    Strays(PointList),
+    /// Points of a surface that lie on a line.
+    #[error(
+        "{lines} of {count} points lie on a line with their neighbors: they are no surface; of a curve in the plane, give \"dimension\": 2"
+    )]
+    Line {
+        /// Number of points.
+        count: usize,
+        /// Number of those whose neighbors lie on a line.
+        lines: usize,
     },
     /// Normals of length zero or with undefined components.
     #[error("{0}: a normal without length")]

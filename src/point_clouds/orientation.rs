@@ -1,0 +1,219 @@
+//! Consistent sides of normals on the graph of stars (König and Gumhold 2009).
+//!
+//! The normal of a neighbor is mirrored in the plane across the middle of the edge. On a circle the mirror image of the one
+//! normal is the other. Sides are passed on along the tree of the edges where normal and mirror image differ least.
+//!
+//! Bodies that touch are one part of the graph, and the tree passes sides on through their contact, where normals mean nothing.
+//! So a piece of trusted points that closes on itself is turned outward by itself.
+
+use super::star_graph::StarGraph;
+use crate::geometry::Vector;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// An edge to a point that is not yet oriented. The heap returns the edge that turns least.
+struct Edge {
+    /// 1 − |n_i · mirrored n_j|.
+    turn: f64,
+    from: u32,
+    to: u32,
+}
+
+impl Ord for Edge {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.turn.total_cmp(&self.turn).then_with(|| (other.to, other.from).cmp(&(self.to, self.from)))
+    }
+}
+
+impl PartialOrd for Edge {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Edge {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Edge {}
+
+/// The product n_i · (n_j − 2 (n_j·e) e), where e is the direction of the edge: positive where both have the same side.
+#[must_use]
+pub fn agreement<const D: usize>(points: &[Vector<D>], normals: &[Vector<D>], i: usize, j: usize) -> f64 {
+    let d = points[j] - points[i];
+    let square = d.norm_squared();
+    let along = if square > 0.0 { 2.0 * normals[j].dot(&d) * normals[i].dot(&d) / square } else { 0.0 };
+    normals[i].dot(&normals[j]) - along
+}
+
+/// Gives the normals of each part one side, outward where the part encloses a volume.
+///
+/// A part without an inside, such as a flat patch, has its normals upward on the whole, along the last axis.
+pub fn orient<const D: usize>(points: &[Vector<D>], graph: &StarGraph, normals: &mut [Vector<D>]) {
+    let mut is_done = vec![false; points.len()];
+    let mut heap = BinaryHeap::new();
+    for start in 0..points.len() {
+        if is_done[start] {
+            continue;
+        }
+        is_done[start] = true;
+        let mut part = vec![start];
+        let mut at = Some(start);
+        while let Some(from) = at {
+            for to in graph.neighbors(from) {
+                if !is_done[*to as usize] {
+                    let turn = 1.0 - agreement(points, normals, from, *to as usize).abs();
+                    heap.push(Edge { turn, from: from as u32, to: *to });
+                }
+            }
+            at = None;
+            while let Some(Edge { from, to, .. }) = heap.pop() {
+                let to = to as usize;
+                if !is_done[to] {
+                    if agreement(points, normals, from as usize, to) < 0.0 {
+                        normals[to] = -normals[to];
+                    }
+                    is_done[to] = true;
+                    part.push(to);
+                    at = Some(to);
+                    break;
+                }
+            }
+        }
+        if points_inward(points, graph, normals, &part) {
+            part.iter().for_each(|i| normals[*i] = -normals[*i]);
+        }
+    }
+}
+
+/// Largest |Σ A n| by Σ A of a piece that closes on itself. On a closed surface the sum vanishes; a hole adds its area.
+const CLOSED: f64 = 0.1;
+/// Least points of such a piece.
+const LEAST_PIECE: usize = 12;
+/// Least agreement of the normals of neighbors in a piece.
+const SMOOTH: f64 = 0.5;
+
+/// Turns oriented normals outward on every piece of trusted points that closes on itself, and those of other points to the side
+/// of most of their neighbors there. Returns the number of such pieces.
+pub fn orient_pieces<const D: usize>(
+    points: &[Vector<D>],
+    graph: &StarGraph,
+    is_trusted: &[bool],
+    normals: &mut [Vector<D>],
+) -> usize {
+    let mut is_done = vec![false; points.len()];
+    let mut is_turned = vec![false; points.len()];
+    let mut closed = 0;
+    for start in (0..points.len()).filter(|i| is_trusted[*i]) {
+        if is_done[start] {
+            continue;
+        }
+        is_done[start] = true;
+        let mut piece = vec![start];
+        let mut place = 0;
+        while let Some(from) = piece.get(place).copied() {
+            place += 1;
+            for to in graph.neighbors(from).iter().map(|j| *j as usize) {
+                if is_trusted[to] && !is_done[to] && agreement(points, normals, from, to) > SMOOTH {
+                    is_done[to] = true;
+                    piece.push(to);
+                }
+            }
+        }
+        let sum = piece.iter().fold(Vector::<D>::zeros(), |sum, i| sum + normals[*i] * graph.areas[*i]);
+        let whole: f64 = piece.iter().map(|i| graph.areas[*i]).sum();
+        if piece.len() < LEAST_PIECE || sum.norm() > CLOSED * whole {
+            continue;
+        }
+        closed += 1;
+        if points_inward(points, graph, normals, &piece) {
+            piece.iter().for_each(|i| is_turned[*i] = true);
+        }
+    }
+    // A point outside of the pieces goes with most of its neighbors.
+    let goes_along = |i: &usize| {
+        let near = graph.neighbors(*i);
+        2 * near.iter().filter(|j| is_turned[**j as usize]).count() > near.len()
+    };
+    let along: Vec<usize> = (0..points.len()).filter(|i| !is_done[*i]).filter(goes_along).collect();
+    along.into_iter().for_each(|i| is_turned[i] = true);
+    normals.iter_mut().zip(&is_turned).filter(|(_, turned)| **turned).for_each(|(n, _)| *n = -*n);
+    closed
+}
+
+/// Least |Σ A n·x| by Σ A |x| of a part that encloses a volume, x measured from its middle.
+const LEAST_VOLUME: f64 = 1e-3;
+
+fn points_inward<const D: usize>(
+    points: &[Vector<D>],
+    graph: &StarGraph,
+    normals: &[Vector<D>],
+    part: &[usize],
+) -> bool {
+    let whole: f64 = part.iter().map(|i| graph.areas[*i]).sum();
+    let middle = part.iter().fold(Vector::<D>::zeros(), |sum, i| sum + points[*i] * (graph.areas[*i] / whole));
+    let (mut volume, mut size, mut up) = (0.0, 0.0, 0.0);
+    for i in part {
+        let x = points[*i] - middle;
+        volume += graph.areas[*i] * normals[*i].dot(&x);
+        size += graph.areas[*i] * x.norm();
+        up += graph.areas[*i] * normals[*i][D - 1];
+    }
+    if volume.abs() > LEAST_VOLUME * size { volume < 0.0 } else { up < 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{orient, points_inward};
+    use crate::geometry::{Vector, fibonacci};
+    use crate::point_clouds::local_spacing::{Nearest, at_each_point, smoothed};
+    use crate::point_clouds::star_graph::StarGraph;
+    use crate::point_clouds::stars::Stars;
+
+    fn graph(points: &[Vector<3>], normals: &[Vector<3>]) -> StarGraph {
+        let nearest = Nearest::new(points, 30);
+        let spacing = smoothed::<3>(&at_each_point(points, &nearest), &nearest);
+        StarGraph::new(&Stars::new(points, &nearest, normals, &spacing))
+    }
+
+    /// Normals with random signs on two spheres, one inside the other.
+    #[test]
+    fn every_part_gets_its_outer_side() {
+        let ball = fibonacci::sphere(500);
+        let points: Vec<Vector<3>> = ball.iter().map(|x| x * 0.4).chain(ball.iter().copied()).collect();
+        let exact: Vec<Vector<3>> = ball.iter().chain(&ball).copied().collect();
+        let mut normals: Vec<Vector<3>> =
+            exact.iter().enumerate().map(|(i, n)| if i * i % 7 < 3 { -n } else { *n }).collect();
+        let graph = graph(&points, &exact);
+        orient(&points, &graph, &mut normals);
+        assert!(normals.iter().zip(&exact).all(|(n, e)| n.dot(e) > 0.99));
+    }
+
+    /// Two spheres that touch: one part, with each half outward but for the points at the contact.
+    #[test]
+    fn bodies_that_touch_are_turned_outward_each() {
+        let ball = fibonacci::sphere(600);
+        let center = Vector::<3>::x() * 2.0;
+        let points: Vec<Vector<3>> = ball.iter().copied().chain(ball.iter().map(|x| x + center)).collect();
+        let found =
+            crate::point_clouds::PreparedCloud::new(&points, None, crate::point_clouds::cleaning::Cleaning::Drop);
+        let found = found.unwrap();
+        assert_eq!((found.graph.part_count, found.closed_pieces), (1, 2));
+        let outward = |i: usize| if i < 600 { points[i] } else { points[i] - center };
+        // Within half a radius of the contact the gap is below two spacings.
+        let is_apart = |i: &usize| (found.points[*i] - Vector::<3>::x()).norm() > 0.5;
+        assert!((0..1200).filter(is_apart).all(|i| found.normals[i].dot(&outward(i)) > 0.9));
+    }
+
+    #[test]
+    fn a_patch_points_up() {
+        let points: Vec<_> = (0..400).map(|k| Vector::<3>::new(f64::from(k % 20), f64::from(k / 20), 0.0)).collect();
+        let mut normals = vec![-Vector::<3>::z(); 400];
+        let graph = graph(&points, &normals);
+        orient(&points, &graph, &mut normals);
+        assert!(normals.iter().all(|n| n[2] > 0.0));
+        assert!(!points_inward(&points, &graph, &normals, &(0..400).collect::<Vec<_>>()));
+    }
+}

@@ -1,0 +1,81 @@
+use super::{Cleaning, NormalSource, PreparedCloud, Unusable};
+use crate::geometry::random::CounterRandom;
+use crate::geometry::{Vector, fibonacci};
+
+fn random_sphere(count: i64) -> Vec<Vector<3>> {
+    let random = CounterRandom::new(9);
+    let draw = |i: i64| Vector::<3>::from_fn(|d, _| random.symmetric(&[i, d as i64]));
+    (0..).map(draw).filter(|x| (0.1..1.0).contains(&x.norm())).map(|x| x.normalize()).take(count as usize).collect()
+}
+
+#[test]
+fn independent_random_points_get_normals_and_areas() {
+    let points = random_sphere(2000);
+    let found = PreparedCloud::new(&points, None, Cleaning::Drop).unwrap();
+    assert!(found.points.iter().zip(&found.normals).all(|(x, n)| x.dot(n) > 0.8));
+    let area: f64 = found.graph.areas.iter().sum();
+    assert!((area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 5e-3, "{area}");
+    assert_eq!((found.graph.part_count, found.joined_sheets), (1, None));
+}
+
+#[test]
+fn wrong_normals_are_replaced_and_good_ones_stay() {
+    let points: Vec<Vector<3>> = fibonacci::sphere(2000);
+    let swapped: Vec<_> = points.iter().map(|x| Vector::<3>::new(x[0], x[2], x[1])).collect();
+    let constant = vec![Vector::<3>::z(); 2000];
+    let colors: Vec<_> = (0..2000)
+        .map(|i| Vector::<3>::new(f64::from(i % 7) + 1.0, f64::from(i % 11), f64::from(i % 5)).normalize())
+        .collect();
+    for wrong in [swapped, constant, colors] {
+        let found = PreparedCloud::new(&points, Some(&wrong), Cleaning::Drop).unwrap();
+        let verdict = found.verdict.unwrap();
+        assert!(verdict.is_wrong_together && verdict.wrong_share > 0.3, "{}", verdict.wrong_share);
+        assert_eq!(found.source, NormalSource::Estimated);
+        assert!(points.iter().zip(&found.normals).all(|(x, n)| x.dot(n) > 0.999));
+    }
+    let random = CounterRandom::new(4);
+    let noise = |i: usize| Vector::<3>::from_fn(|d, _| 0.15 * random.symmetric(&[i as i64, d as i64]));
+    let noisy: Vec<_> = points.iter().enumerate().map(|(i, n)| (n + noise(i)).normalize()).collect();
+    let found = PreparedCloud::new(&points, Some(&noisy), Cleaning::Drop).unwrap();
+    assert_eq!((found.normals == noisy, found.verdict.unwrap().replaced), (true, None));
+    // Inward ones stay inward.
+    let inward: Vec<_> = points.iter().map(|n| -n).collect();
+    let found = PreparedCloud::new(&points, Some(&inward), Cleaning::Drop).unwrap();
+    assert_eq!(found.normals, inward);
+}
+
+#[test]
+fn single_wrong_normals_are_replaced_and_turned_ones_turned() {
+    let points: Vec<Vector<3>> = fibonacci::sphere(2000);
+    let mut given = points.clone();
+    (given[70], given[71]) = (-given[70], Vector::<3>::new(-points[71][1], points[71][0], 0.0).normalize());
+    let found = PreparedCloud::new(&points, Some(&given), Cleaning::Drop).unwrap();
+    assert!(points.iter().zip(&found.normals).all(|(x, n)| x.dot(n) > 0.999));
+    assert_eq!(found.verdict.unwrap().replaced.map(|list| list.first), Some(vec![70, 71]));
+    // Signs at random, as of a file whose normals are lines only.
+    let random = CounterRandom::new(4);
+    let signs: Vec<_> = points.iter().enumerate().map(|(i, n)| n * random.symmetric(&[i as i64]).signum()).collect();
+    let found = PreparedCloud::new(&points, Some(&signs), Cleaning::Drop).unwrap();
+    assert!(found.verdict.unwrap().is_turned_anew);
+    assert!(points.iter().zip(&found.normals).all(|(x, n)| x.dot(n) > 0.999));
+}
+
+#[test]
+fn halves_of_a_thin_body_face_away_from_each_other() {
+    let points: Vec<Vector<3>> =
+        fibonacci::sphere(4000).iter().map(|x| Vector::<3>::new(x[0], x[1], 0.07 * x[2])).collect();
+    let found = PreparedCloud::new(&points, None, Cleaning::Drop).unwrap();
+    let outward = |x: &Vector<3>| Vector::<3>::new(x[0], x[1], x[2] / 0.0049);
+    let wrong = found.points.iter().zip(&found.normals).filter(|(x, n)| outward(x).dot(n) < 0.0).count();
+    assert!(wrong < 40, "{wrong}");
+}
+
+#[test]
+fn what_is_no_surface_is_refused() {
+    let line: Vec<_> = (0..300).map(|i| Vector::<3>::new(f64::from(i), 0.5 * f64::from(i), 0.0)).collect();
+    assert!(matches!(PreparedCloud::new(&line, None, Cleaning::Drop), Err(Unusable::Line { .. })));
+    let far: Vec<_> = fibonacci::sphere(500).iter().map(|x: &Vector<3>| x + Vector::<3>::x() * 1e14).collect();
+    assert!(PreparedCloud::new(&far, None, Cleaning::Drop).is_err());
+    let one = vec![Vector::<3>::x(); 500];
+    assert!(matches!(PreparedCloud::new(&one, None, Cleaning::Drop), Err(Unusable::TooFew { count: 1, .. })));
+}
