@@ -4,6 +4,7 @@
 
 pub mod krylov;
 pub mod least_squares;
+pub mod mean_term;
 pub mod normal_equations;
 pub mod number;
 pub mod sparse_lu;

@@ -135,6 +135,14 @@ fn bodies() -> Vec<(Value, Cloud)> {
         (body(&json!({"problem": "laplace_beltrami", "repeat": 4})), bare(ball.clone())),
         (body(&json!({})), bare(ball.clone())),
         (body(&json!({"problem": "poisson"})), ball.clone()),
+        (body(&json!({"problem": "poisson", "method": "conservative"})), bare(ball.clone())),
+        (
+            body(
+                &json!({"problem": {"type": "diffusion", "end_time": 0.02, "time_step": 0.005}, "method": "conservative"}),
+            ),
+            ball.clone(),
+        ),
+        (body(&json!({"problem": "poisson", "method": {"type": "auto", "order": 4}})), random_sphere(600)),
         (body(&json!({"problem": "poisson", "solver": "sparse_lu"})), bare(ball.clone())),
         (body(&evolving(json!({"type": "diffusion", "initial": gaussian}))), bare(ball.clone())),
         (body(&gray_scott), ball),
@@ -194,7 +202,7 @@ fn what_is_wrong_with_points_is_said_before_the_first_step() {
     holed.normals.as_mut().unwrap()[70] = [0.0, 0.0, -1.0];
     let mut simulation = build(&body(&json!({})), &holed).unwrap();
     let described = simulation.report().method["points"].clone();
-    assert!(described.starts_with("1950 of them") && described.contains("normals; point"), "{described}");
+    assert!(described.starts_with("1950 of them") && described.contains("1 part"), "{described}");
     let findings = simulation.take_findings();
     let names: Vec<_> = findings.iter().map(|finding| finding.code.as_ref()).collect();
     assert_eq!(names, ["holes", "inconsistent_normals"]);
@@ -208,7 +216,8 @@ fn what_is_wrong_with_points_is_said_before_the_first_step() {
 
     let mut twins = cloud.clone();
     twins.positions[7] = twins.positions[1999];
-    assert!(refusal(&body(&json!({})), &twins).starts_with("points 7, 1999:"));
+    let refuse = json!({"surface": {"type": "points", "upload": "upl_x", "clean": "refuse"}});
+    assert!(refusal(&body(&refuse), &twins).starts_with("point 1999:"));
     let mut without_length = cloud.clone();
     without_length.normals.as_mut().unwrap()[11] = [0.0; 3];
     assert!(refusal(&body(&json!({})), &without_length).starts_with("point 11:"));
@@ -222,6 +231,171 @@ fn what_is_wrong_with_points_is_said_before_the_first_step() {
     let order = body(&json!({"method": {"type": "surface_dcpse", "order": 6}}));
     assert!(refusal(&order, &sphere(200, 1.0, [0.0; 3])).contains("280 points at least"));
     assert!(refusal(&body(&json!({"dimension": 2})), &cloud).contains("z ="));
+}
+
+/// A body with a problem on points.
+fn equation(problem: &Value, more: &Value) -> Value {
+    let mut body = body(&json!({"problem": problem}));
+    body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    body
+}
+
+fn joined(parts: &[Cloud]) -> Cloud {
+    Cloud { positions: parts.iter().flat_map(|part| part.positions.clone()).collect(), ..Cloud::default() }
+}
+
+fn diagnostic(simulation: &dyn Simulation, name: &str) -> f64 {
+    simulation.report().diagnostic(name).unwrap()
+}
+
+fn codes(simulation: &mut dyn Simulation) -> Vec<String> {
+    simulation.take_findings().iter().map(|finding| finding.code.to_string()).collect()
+}
+
+/// Independent random points on the unit sphere.
+fn random_sphere(count: usize) -> Cloud {
+    let random = meniscus::geometry::random::CounterRandom::new(21);
+    let draw = |i: i64| std::array::from_fn::<f64, 3, _>(|d| random.symmetric(&[i, d as i64]));
+    let length = |x: &[f64; 3]| x.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let points = (0..).map(draw).filter(|x| (0.1..1.0).contains(&length(x)));
+    Cloud { positions: points.map(|x| x.map(|c| c / length(&x))).take(count).collect(), ..Cloud::default() }
+}
+
+#[test]
+fn duplicates_and_strays_are_left_out_and_told() {
+    let mut cloud = bare(sphere(1000, 1.0, [0.0; 3]));
+    let copies: Vec<[f64; 3]> = cloud.positions[..20].to_vec();
+    cloud.positions.extend(copies);
+    cloud.positions.extend([[1.5, 0.0, 0.0], [-40.0, 3.0, 1.0]]);
+    let mut simulation = finished(&body(&json!({})), &cloud);
+    assert_eq!(diagnostic(simulation.as_ref(), "points.merged"), 20.0);
+    assert_eq!(diagnostic(simulation.as_ref(), "points.dropped"), 2.0);
+    assert_eq!(codes(simulation.as_mut()), ["points.merged", "points.dropped"]);
+    let mean = column(simulation.as_ref(), "mean_curvature");
+    assert!(mean.len() == 1000 && mean.iter().all(|h| (h - 1.0).abs() < 2e-2));
+}
+
+/// Two spheres with right-hand sides that have means: each part is solved with its own constant.
+#[test]
+fn poisson_is_solved_part_by_part() {
+    let center = [3.0, 0.0, 0.0];
+    let cloud = joined(&[sphere(600, 1.0, [0.0; 3]), sphere(600, 1.0, center)]);
+    let field = json!({"type": "plane_wave", "k": [1.0, 0.4, -0.3]});
+    let mut apart = Vec::new();
+    for at in [[0.0; 3], center] {
+        let alone = bare(sphere(600, 1.0, at));
+        let poisson = equation(&json!({"type": "poisson", "field": field}), &json!({}));
+        apart.push(column(finished(&poisson, &alone).as_ref(), "value"));
+    }
+    for solver in [json!("auto"), json!("sparse_lu"), json!("bicgstab")] {
+        let poisson = equation(&json!({"type": "poisson", "field": field}), &json!({"solver": solver}));
+        let mut simulation = finished(&poisson, &cloud);
+        assert_eq!(diagnostic(simulation.as_ref(), "parts"), 2.0);
+        assert_eq!(codes(simulation.as_mut()), ["parts"]);
+        let value = column(simulation.as_ref(), "value");
+        let off = value.iter().zip(apart.concat()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-6, "{solver}: {off}");
+        let health = simulation.health();
+        assert!(health.checks.iter().all(|check| check.holds != Some(false)), "{:?}", health.checks);
+    }
+    // The mean of the wave over a sphere about c is sin(k·c) sin(|k|)/|k|.
+    let size = (1.0_f64 + 0.16 + 0.09).sqrt();
+    let exact = 3.0_f64.sin() * size.sin() / size;
+    let described = finished(&equation(&json!({"type": "poisson", "field": field}), &json!({})), &cloud).report();
+    let constants = described.method["condition"].rsplit(": ").next().unwrap().to_owned();
+    let second: f64 = constants.split(", ").nth(1).unwrap().parse().unwrap();
+    assert!((second - exact).abs() < 1e-3, "{constants}: {exact}");
+}
+
+/// On independent random points the heat equation runs, with rows and in the conservative form.
+#[test]
+fn diffusion_keeps_its_bounds_on_random_points() {
+    let cloud = random_sphere(1500);
+    let initial = json!({"type": "plane_wave", "k": [2, -1, 3]});
+    let problem = json!({"type": "diffusion", "initial": initial, "end_time": 0.1, "time_step": 0.002});
+    for method in [json!("auto"), json!("conservative"), json!({"type": "surface_dcpse", "order": 4})] {
+        let mut simulation = finished(&equation(&problem, &json!({"method": method})), &cloud);
+        let health = simulation.health();
+        assert!(health.checks.iter().all(|check| check.holds != Some(false)), "{method}: {:?}", health.checks);
+        let drift = health.checks.iter().find(|check| check.name == "mass_drift").unwrap().value.unwrap();
+        let bound = if method == json!("conservative") { 1e-9 } else { 5e-3 };
+        assert!(drift < bound, "{method}: {drift}");
+        assert_eq!(codes(simulation.as_mut()), Vec::<String>::new(), "{method}");
+    }
+}
+
+/// A named method keeps its rows, and says where they cannot hold; `auto` takes the conservative form there.
+#[test]
+fn a_surface_that_is_not_resolved_gets_the_conservative_form() {
+    // A sphere pressed so flat that its halves are a third of a spacing apart at the rim.
+    let mut cloud = bare(sphere(700, 1.0, [0.0; 3]));
+    cloud.positions.iter_mut().for_each(|x| x[2] *= 0.05);
+    let wave = json!({"type": "plane_wave", "k": [2, -1, 3]});
+    let poisson = json!({"type": "poisson", "field": wave});
+    let automatic = finished(&equation(&poisson, &json!({})), &cloud);
+    let (operator, solver) = (&automatic.report().method["operator"], &automatic.report().method["solver"]);
+    assert!(operator.starts_with("conservative:") && solver.starts_with("CG"), "{operator}, {solver}");
+    let named = finished(&equation(&poisson, &json!({"method": "surface_dcpse"})), &cloud);
+    assert!(named.report().method["operator"].starts_with("rows"));
+    // Values at points keep the rows, with a finding that names those without order.
+    let mut applied = finished(&equation(&json!({"type": "laplace_beltrami", "field": wave}), &json!({})), &cloud);
+    assert!(codes(applied.as_mut()).contains(&"operator.voronoi_rows".to_owned()));
+}
+
+#[test]
+fn concentrations_stay_within_their_bounds_on_graded_points() {
+    // Points whose density varies tenfold.
+    let cloud = bare(sphere(600, 1.0, [0.0; 3]));
+    let positions: Vec<[f64; 3]> =
+        cloud.positions.iter().enumerate().filter(|(i, x)| x[2] > 0.0 || i % 10 == 0).map(|(_, x)| *x).collect();
+    let cloud = Cloud { positions, ..cloud };
+    let problem = json!({"type": "reaction_diffusion", "model": "gray_scott", "diffusivity": 0.002,
+        "second_diffusivity": 0.001, "end_time": 100});
+    let simulation = finished(&equation(&problem, &json!({})), &cloud);
+    for name in ["value", "second_value"] {
+        let values = column(simulation.as_ref(), name);
+        assert!(values.iter().all(|c| (-1e-2..1.01).contains(c)), "{name}");
+    }
+}
+
+#[test]
+fn wrong_normals_are_replaced_or_refused() {
+    let mut cloud = sphere(1500, 1.0, [0.0; 3]);
+    cloud.normals.as_mut().unwrap().iter_mut().for_each(|n| n.swap(1, 2));
+    let mut simulation = finished(&body(&json!({})), &cloud);
+    assert_eq!(codes(simulation.as_mut()), ["normals.wrong_together"]);
+    assert!(column(simulation.as_ref(), "mean_curvature").iter().all(|h| (h - 1.0).abs() < 2e-2));
+    let exact = body(&json!({"normals": {"type": "given", "metric": "normals"}}));
+    assert!(refusal(&exact, &cloud).contains("do not stand on the surface"));
+}
+
+#[test]
+fn bodies_that_touch_face_outward_each() {
+    let cloud = joined(&[sphere(400, 1.0, [-1.0, 0.0, 0.0]), sphere(400, 1.0, [1.0, 0.0, 0.0])]);
+    let mut simulation = finished(&body(&json!({})), &cloud);
+    assert!(codes(simulation.as_mut()).contains(&"close_sheets".to_owned()));
+    let mean = column(simulation.as_ref(), "mean_curvature");
+    for half in [&mean[..400], &mean[400..]] {
+        let mut half = half.to_vec();
+        half.sort_by(f64::total_cmp);
+        assert!((half[200] - 1.0).abs() < 2e-2, "{}", half[200]);
+    }
+}
+
+/// Resolved scenes of earlier versions keep supports of one radius and refuse points with faults.
+#[test]
+fn scenes_of_earlier_versions_go_on_as_they_were() {
+    let points = json!({"type": "points", "upload": "upl_x", "file": null});
+    let method = json!({"type": "surface_dcpse", "order": 2, "form": "intrinsic", "cutoff_dn": 2.4});
+    let earlier = json!({"kind": "surface_pde", "surface": points, "problem": {"type": "curvature"}, "method": method});
+    let now = meniscus::scene::of_earlier_version(earlier, SCENES);
+    assert_eq!((&now["method"]["supports"], &now["surface"]["clean"]), (&json!("ball"), &json!("refuse")));
+    let simulation = finished(&now, &sphere(800, 1.0, [0.0; 3]));
+    assert!(simulation.report().method["operator"].contains("tangent planes"));
+    let again = meniscus::scene::of_earlier_version(scene(&now).resolved(), SCENES);
+    assert_eq!(again, scene(&now).resolved());
+    let sphere = json!({"kind": "surface_pde", "method": {"type": "surface_dcpse", "order": 2}});
+    assert_eq!(meniscus::scene::of_earlier_version(sphere.clone(), SCENES), sphere);
 }
 
 #[test]
@@ -269,6 +443,10 @@ fn what_points_cannot_do_is_refused_at_its_place() {
         (json!({"surface": "points"}), "/surface"),
         (json!({"surface": {"type": "points", "upload": "a", "file": "b"}}), "/surface"),
         (json!({"surface": "sphere", "normals": "given"}), "/normals"),
+        (json!({"method": "conservative"}), "/method"),
+        (json!({"problem": "poisson", "solver": "cg"}), "/solver"),
+        (json!({"method": {"type": "surface_dcpse", "supports": "ball"}}), "/surface/clean"),
+        (json!({"surface": "bump", "method": "auto"}), "/method"),
     ] {
         let found = meniscus::scene::parse(&body(&more), SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == place), "{more}: {found:?}");

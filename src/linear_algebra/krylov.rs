@@ -19,13 +19,16 @@
 //! ```
 
 pub mod bicgstab;
+pub mod conjugate_gradients;
 pub mod gmres;
 pub mod incomplete_factors;
+pub mod ritz;
 
 pub use incomplete_factors::IncompleteFactors;
 
 use super::SparseRows;
 use super::least_squares::dot;
+use super::mean_term::MeanTerm;
 use crate::parallel::Interrupt;
 
 /// A square matrix A, known by its products with vectors.
@@ -82,30 +85,29 @@ impl LinearMap for SparseRows {
     }
 }
 
-/// The map A + α 1 1ᵀ/n, which makes an operator A that maps constants to zero regular.
+/// The map A + Σ_p α_p 1_p w_pᵀ, which makes an operator A regular that maps the constants of each part to zero.
 ///
 /// Its solutions have no mean if the right-hand side has none.
 #[derive(Debug)]
-pub struct WithMean<'a> {
+pub struct WithMeans<'a> {
     /// The matrix A.
     pub rows: &'a SparseRows,
-    /// Factor α of the mean.
-    pub alpha: f64,
+    /// The term of the means.
+    pub term: &'a MeanTerm,
 }
 
-impl LinearMap for WithMean<'_> {
+impl LinearMap for WithMeans<'_> {
     fn size(&self) -> usize {
         self.rows.rows()
     }
 
     fn apply(&self, x: &[f64], out: &mut [f64]) {
         self.rows.apply(x, out);
-        let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-        out.iter_mut().for_each(|value| *value += self.alpha * mean);
+        self.term.add_to(x, out);
     }
 
     fn infinity_norm(&self) -> f64 {
-        self.rows.infinity_norm() + self.alpha.abs()
+        self.rows.infinity_norm() + self.term.alpha().iter().fold(0.0_f64, |most, alpha| most.max(alpha.abs()))
     }
 }
 
@@ -134,8 +136,41 @@ pub struct Convergence {
 /// Measured: direct and iterative solutions on lines and circles of 20,000 and 30,000 points end at 0.2 to 0.6 of that.
 /// A solution that only the recurrence took for converged was at 1,000.
 const ROUNDING: f64 = 4.0;
+/// Largest floor that counts. Values of 1e136 beside a right-hand side of 1 once had a floor of 1e123.
+const LARGEST_FLOOR: f64 = 1e-6;
 /// A restart stagnates when it leaves more than this share of the true residual of the restart before.
 const STAGNATION: f64 = 0.5;
+
+/// Iterations without a new least residual after which a solution has stalled. Residuals of sound systems rise and fall over
+/// some tens of iterations.
+const PATIENCE: u64 = 300;
+/// A residual counts as a new least one below this share of the one before.
+const BETTER: f64 = 0.9;
+
+/// The least residual of a recurrence so far, to notice when it does not become smaller any more.
+#[derive(Debug)]
+struct Progress {
+    least: f64,
+    waited: u64,
+    /// Number of iterations at the last look.
+    iterations: u64,
+}
+
+impl Progress {
+    fn new(residual: f64) -> Self {
+        Self { least: residual, waited: 0, iterations: 0 }
+    }
+
+    /// Takes the residual after so many iterations in all; true after many of them without progress.
+    fn has_stalled(&mut self, residual: f64, iterations: u64) -> bool {
+        self.waited += iterations - self.iterations;
+        self.iterations = iterations;
+        if residual < BETTER * self.least {
+            (self.least, self.waited) = (residual, 0);
+        }
+        self.waited >= PATIENCE
+    }
+}
 
 impl Convergence {
     /// Whether the tolerance is met.
@@ -150,7 +185,9 @@ impl Convergence {
     /// The residual at most for which it counts.
     #[must_use]
     pub fn bound(&self, stopping: Stopping) -> f64 {
-        10.0 * stopping.tolerance + self.floor
+        // The floor of a solution that blew up is no excuse for its residual.
+        let floor = if self.floor <= LARGEST_FLOOR { self.floor } else { 0.0 };
+        10.0 * stopping.tolerance + floor
     }
 
     /// Whether the solution is good enough, or another restart from the true residual would not improve it.
@@ -189,7 +226,8 @@ fn add(y: &mut [f64], a: f64, x: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::{
-        IncompleteFactors, Interrupt, Interruptible, LinearMap, SparseRows, Stopping, WithMean, bicgstab, gmres,
+        IncompleteFactors, Interrupt, Interruptible, LinearMap, MeanTerm, SparseRows, Stopping, WithMeans, bicgstab,
+        gmres,
     };
 
     /// Advection and diffusion on a ring or a line, a matrix that is not symmetric.
@@ -235,7 +273,8 @@ mod tests {
         let exact: Vec<f64> = (0..200).map(|i| (std::f64::consts::TAU * f64::from(i) / 200.0).sin()).collect();
         let mut b = vec![0.0; 200];
         a.apply(&exact, &mut b);
-        let map = WithMean { rows: &a, alpha: 1.0 };
+        let term = MeanTerm::uniform(200, 1.0);
+        let map = WithMeans { rows: &a, term: &term };
         let factors = IncompleteFactors::from_rows(&a).unwrap();
         let mut x = vec![0.0; 200];
         let found = bicgstab::solve(&map, &factors, &b, &mut x, STOPPING, &mut bicgstab::Workspace::default());
@@ -271,6 +310,21 @@ mod tests {
         // A wrong solution is not taken for rounding.
         let wrong = super::Convergence::from_solution(&a, &b, &vec![0.0; n], 0, &mut Vec::new());
         assert!(!wrong.is_within(STOPPING), "{wrong:?}");
+    }
+
+    /// Without a solution, a solver ends long before its last iteration.
+    #[test]
+    fn a_solution_that_stalls_ends_early() {
+        let a = operator(200, true);
+        let b: Vec<f64> = (0..200).map(|i| 1.0 + f64::from(i).sin()).collect();
+        let factors = IncompleteFactors::from_rows(&a).unwrap();
+        let stopping = Stopping { tolerance: 1e-10, max_iterations: 1_000_000 };
+        let mut x = vec![0.0; 200];
+        let found = bicgstab::solve(&a, &factors, &b, &mut x, stopping, &mut bicgstab::Workspace::default());
+        assert!(!found.is_within(stopping) && found.iterations < 10_000, "{found:?}");
+        let mut x = vec![0.0; 200];
+        let found = gmres::solve(&a, &factors, &b, &mut x, 40, stopping, &mut gmres::Workspace::default());
+        assert!(!found.is_within(stopping) && found.iterations < 10_000, "{found:?}");
     }
 
     #[test]

@@ -64,12 +64,12 @@ pub trait Chart<const M: usize>: Sync {
 }
 
 /// Multi-index of ∂_a.
-fn first<const M: usize>(a: usize) -> [u8; M] {
+pub(super) fn first<const M: usize>(a: usize) -> [u8; M] {
     std::array::from_fn(|d| u8::from(d == a))
 }
 
 /// Multi-index of ∂_a ∂_b.
-fn second<const M: usize>(a: usize, b: usize) -> [u8; M] {
+pub(super) fn second<const M: usize>(a: usize, b: usize) -> [u8; M] {
     std::array::from_fn(|d| u8::from(d == a) + u8::from(d == b))
 }
 

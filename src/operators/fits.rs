@@ -5,7 +5,7 @@
 //! are used if the conditions hold. Every fallback is counted.
 
 use super::basis::Basis;
-use super::charts::{Chart, Functional, Heights, Node};
+use super::charts::{Chart, Functional, Heights, Node, first, second};
 use super::moment_fit::MomentFit;
 use crate::linear_algebra::number::{LANES, Lanes};
 use crate::parallel::Interrupt;
@@ -63,13 +63,13 @@ impl SupportDiagnostics {
 }
 
 /// Smallest number of neighbors per basis function. With fewer, a fit interpolates noise.
-const NEIGHBORS_PER_FUNCTION: f64 = 1.4;
+pub(super) const NEIGHBORS_PER_FUNCTION: f64 = 1.4;
 /// Factor of one enlargement of a support.
 const GROWTH: f64 = 1.2;
 /// Largest support radius, in multiples of the nominal radius.
 pub const MAX_GROWTH: f64 = 2.5;
 /// Smallest pivot ratio with which the moment conditions hold to enough digits.
-const MIN_PIVOT: f64 = 1e-9;
+pub(super) const MIN_PIVOT: f64 = 1e-9;
 /// Largest violation of the moment conditions by a rank-revealing solution, relative to the largest value of the
 /// functional.
 const MAX_MOMENT_VIOLATION: f64 = 1e-6;
@@ -208,27 +208,18 @@ impl<const M: usize> Fits<'_, M> {
         sink: &mut dyn RowSink<M>,
         outcome: &mut FitOutcome<M>,
     ) {
-        let heights = self.chart.needs_heights().then(|| self.heights(radius, sound, workspace));
+        let fitted = self.chart.needs_heights().then(|| heights(self.basis, &mut workspace.fit, radius, sound));
         // Where the moments are singular, the heights are undefined, and with them the metric.
-        let mut holds = sound.map(|is_sound| is_sound || heights.is_none());
+        let mut holds = sound.map(|is_sound| is_sound || fitted.is_none());
         for (k, functional) in self.functionals.iter().enumerate() {
             workspace.values.clear();
             workspace.values.resize(self.basis.size(), [0.0; LANES]);
             for lane in 0..LANES {
                 let i = points.start + lane.min(points.len().saturating_sub(1));
                 workspace.terms.clear();
-                let lane_heights = heights.as_ref().map(|heights| &heights[lane]);
+                let lane_heights = fitted.as_ref().map(|heights| &heights[lane]);
                 self.chart.terms(*functional, i, lane_heights, &mut workspace.terms);
-                for (alpha, coefficient) in &workspace.terms {
-                    // The basis functions depend on coordinates divided by the radius.
-                    let order: u8 = alpha.iter().sum();
-                    let scale = coefficient * radius[lane].powi(-i32::from(order));
-                    if let Some(values) = self.basis.derivative(alpha) {
-                        for (sum, value) in workspace.values.iter_mut().zip(values) {
-                            sum[lane] += scale * value;
-                        }
-                    }
-                }
+                add_terms(self.basis, &workspace.terms, radius[lane], lane, &mut workspace.values);
             }
             workspace.fit.solution.clear();
             workspace.fit.solution.extend(workspace.values.iter().map(|values| Lanes::new(*values)));
@@ -252,29 +243,49 @@ impl<const M: usize> Fits<'_, M> {
                 first_failed.get_or_insert(i);
             }
         }
-        if let Some(heights) = heights {
+        if let Some(heights) = fitted {
             outcome.heights.extend_from_slice(&heights[..points.len()]);
         }
     }
+}
 
-    /// Slopes and second derivatives of the surface over the plane of each lane; NaN in lanes that are not sound.
-    fn heights(&self, radius: [f64; LANES], sound: [bool; LANES], workspace: &mut Workspace<M>) -> [Heights<M>; LANES] {
-        workspace.fit.solve_heights(self.basis.size());
-        let derivative = |alpha: [u8; M], lane: usize| -> f64 {
-            if !sound[lane] {
-                return f64::NAN;
+/// Adds the values of a functional for the basis functions to one lane. The functional is a sum of partial derivatives, and
+/// the basis functions depend on coordinates divided by the radius.
+pub(super) fn add_terms<const M: usize>(
+    basis: &Basis<M>,
+    terms: &[([u8; M], f64)],
+    radius: f64,
+    lane: usize,
+    values: &mut [[f64; LANES]],
+) {
+    for (alpha, coefficient) in terms {
+        let order: u8 = alpha.iter().sum();
+        let scale = coefficient * radius.powi(-i32::from(order));
+        if let Some(derivative) = basis.derivative(alpha) {
+            for (sum, value) in values.iter_mut().zip(derivative) {
+                sum[lane] += scale * value;
             }
-            let values = self.basis.derivative(&alpha).unwrap_or(&[]);
-            values.iter().zip(&workspace.fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
-        };
-        std::array::from_fn(|lane| Heights {
-            first: std::array::from_fn(|a| derivative(std::array::from_fn(|d| u8::from(d == a)), lane)),
-            second: std::array::from_fn(|a| {
-                std::array::from_fn(|b| {
-                    let alpha = std::array::from_fn(|d| u8::from(d == a) + u8::from(d == b));
-                    derivative(alpha, lane) / radius[lane]
-                })
-            }),
-        })
+        }
     }
+}
+
+/// Slopes and second derivatives of the surface over the plane of each lane; NaN in lanes that are not sound.
+pub(super) fn heights<const M: usize>(
+    basis: &Basis<M>,
+    fit: &mut MomentFit<M>,
+    radius: [f64; LANES],
+    sound: [bool; LANES],
+) -> [Heights<M>; LANES] {
+    fit.solve_heights(basis.size());
+    let derivative = |alpha: [u8; M], lane: usize| -> f64 {
+        if !sound[lane] {
+            return f64::NAN;
+        }
+        let values = basis.derivative(&alpha).unwrap_or(&[]);
+        values.iter().zip(&fit.solution).map(|(value, c)| value * c.as_array()[lane]).sum()
+    };
+    std::array::from_fn(|lane| Heights {
+        first: std::array::from_fn(|a| derivative(first(a), lane)),
+        second: std::array::from_fn(|a| std::array::from_fn(|b| derivative(second(a, b), lane) / radius[lane])),
+    })
 }

@@ -1,6 +1,7 @@
 //! `surface_pde`: operators and equations on surfaces (Surface DC-PSE paper).
 
 mod points;
+mod preparation;
 mod problems;
 mod plan;
 pub mod spec;
@@ -21,7 +22,7 @@ pub static KIND: SceneKind = SceneKind {
     example: include_str!("surface_pde/example.json"),
     declarations: spec::SurfacePde::declarations,
     parse: scene::parse_as::<spec::SurfacePde>,
-    of_earlier_version: scene::unchanged,
+    of_earlier_version: plan::of_earlier_version,
     quantities: || Quantities {
         fields: surface_equation::all_fields(),
         observables: without_repetition(&[own::OBSERVABLES, embedding::OBSERVABLES]),

@@ -8,8 +8,10 @@ use crate::simulation::fields::COMMON_FIELDS;
 use crate::simulation::quantity::without_repetition;
 
 mod cloud;
+mod conservative;
 mod curvature;
 mod evolution;
+mod field_bounds;
 pub mod fields;
 mod format_1;
 mod method;
@@ -18,6 +20,7 @@ mod poisson;
 mod problem;
 pub mod quantities;
 mod reactions;
+mod row_quality;
 mod simulation;
 mod solver;
 
@@ -30,6 +33,7 @@ pub use pointwise::Pointwise;
 pub use poisson::{Condition, Poisson};
 pub use problem::Problem;
 pub use reactions::{Model, Reaction};
+pub use row_quality::RowQuality;
 pub use simulation::SurfaceEquation;
 pub use solver::Solver;
 

@@ -1,6 +1,6 @@
 //! BiCGSTAB with right preconditioning (van der Vorst 1992).
 
-use super::{Convergence, IncompleteFactors, LinearMap, Stopping, add, dot, norm};
+use super::{Convergence, IncompleteFactors, LinearMap, Progress, Stopping, add, dot, norm};
 
 /// Vectors of the recurrence, reused from one solution to the next.
 #[derive(Debug, Default)]
@@ -11,7 +11,7 @@ pub struct Workspace {
 /// Improves `x` until it solves A x = b, the matrix A being `map` and its preconditioner `factors`.
 ///
 /// The recurrence starts again from the true residual after a breakdown (a scalar that vanishes). It also does so when
-/// its own residual is small and the true one is not, as long as that helps.
+/// its own residual is small and the true one is not, as long as that helps. A solution that stalls ends early.
 pub fn solve(
     map: &dyn LinearMap,
     factors: &IncompleteFactors,
@@ -24,13 +24,13 @@ pub fn solve(
     workspace.vectors.iter_mut().for_each(|vector| vector.resize(n, 0.0));
     let [r, shadow, p, v, s, t, hat, scratch] = &mut workspace.vectors;
     let goal = stopping.tolerance * norm(b);
-    let mut iterations = 0;
-    let mut last = f64::INFINITY;
+    let (mut iterations, mut last) = (0, f64::INFINITY);
+    let mut progress = Progress::new(f64::INFINITY);
     while iterations < stopping.max_iterations && !map.is_interrupted() {
         map.apply(x, r);
         r.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
-        // This also holds for b = 0.
-        if norm(r) <= goal {
+        // This also holds for b = 0. Breakdowns one after another are no progress either.
+        if norm(r) <= goal || progress.has_stalled(norm(r), iterations) {
             break;
         }
         shadow.copy_from_slice(r);
@@ -63,7 +63,7 @@ pub fn solve(
             is_done = norm(r) <= goal;
             let next = dot(shadow, r);
             let beta = next / rho * (alpha / omega);
-            if !(beta.is_finite() && next.abs() > f64::MIN_POSITIVE) {
+            if progress.has_stalled(norm(r), iterations) || !(beta.is_finite() && next.abs() > f64::MIN_POSITIVE) {
                 break;
             }
             rho = next;

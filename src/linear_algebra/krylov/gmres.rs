@@ -1,6 +1,6 @@
 //! Restarted GMRES with right preconditioning (Saad 1986).
 
-use super::{Convergence, IncompleteFactors, LinearMap, Stopping, add, dot, norm};
+use super::{Convergence, IncompleteFactors, LinearMap, Progress, Stopping, add, dot, norm};
 
 /// Vectors and factors of a cycle, reused from one solution to the next.
 #[derive(Debug, Default)]
@@ -21,7 +21,7 @@ pub struct Workspace {
 /// Improves `x` until it solves A x = b, the matrix A being `map` and its preconditioner `factors`.
 ///
 /// A cycle builds up to `restart` vectors of the Krylov space of the true residual and minimizes the residual over
-/// them. The next cycle starts from the new residual.
+/// them. The next cycle starts from the new residual. A solution that stalls ends early.
 pub fn solve(
     map: &dyn LinearMap,
     factors: &IncompleteFactors,
@@ -40,6 +40,7 @@ pub fn solve(
     let goal = stopping.tolerance * norm(b);
     let mut iterations = 0;
     let (mut is_done, mut last) = (false, f64::INFINITY);
+    let mut progress = Progress::new(f64::INFINITY);
     loop {
         if is_done {
             let found = Convergence::from_solution(map, b, x, iterations, &mut workspace.scratch);
@@ -51,7 +52,8 @@ pub fn solve(
         map.apply(x, first);
         first.iter_mut().zip(b).for_each(|(r, b)| *r = b - *r);
         let beta = norm(first);
-        if beta <= goal || !beta.is_finite() || iterations >= stopping.max_iterations || map.is_interrupted() {
+        let is_over = iterations >= stopping.max_iterations || progress.has_stalled(beta, iterations);
+        if beta <= goal || !beta.is_finite() || is_over || map.is_interrupted() {
             break;
         }
         first.iter_mut().for_each(|r| *r /= beta);

@@ -69,6 +69,12 @@ impl IncompleteFactors {
         }
     }
 
+    /// Whether all pivots are positive. Those of a symmetric matrix then are incomplete Cholesky factors.
+    #[must_use]
+    pub fn has_positive_pivots(&self) -> bool {
+        self.inverse.iter().all(|inverse| *inverse > 0.0)
+    }
+
     /// Writes (L U)⁻¹ b to `x`.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) {
         for i in 0..b.len() {

@@ -116,36 +116,45 @@ impl<const D: usize, const M: usize> Chart<M> for TangentChart<'_, D> {
         heights: Option<&Heights<M>>,
         terms: &mut Vec<([u8; M], f64)>,
     ) {
-        // Without heights the metric is the identity.
-        let flat = Heights { first: [0.0; M], second: [[0.0; M]; M] };
-        let h = heights.unwrap_or(&flat);
-        let det = 1.0 + h.first.iter().map(|slope| slope * slope).sum::<f64>();
-        let inverse = |a: usize, b: usize| f64::from(u8::from(a == b)) - h.first[a] * h.first[b] / det;
-        match functional {
-            Functional::Partial(alpha) => terms.push((alpha, 1.0)),
-            Functional::LaplaceBeltrami => {
-                // g^ab (f_ab − Γ^c_ab f_c)
-                let mut trace = 0.0;
-                for a in 0..M {
-                    for b in 0..M {
-                        if heights.is_some() || a == b {
-                            terms.push((second(a, b), inverse(a, b)));
-                        }
-                        trace += inverse(a, b) * h.second[a][b];
+        tangent_terms(&self.normals[i], functional, heights, terms);
+    }
+}
+
+/// Appends a functional at a point with the given unit normal as a sum of partial derivatives in its tangent plane. Without
+/// `heights` the metric is the identity.
+pub(in crate::operators) fn tangent_terms<const D: usize, const M: usize>(
+    n: &Vector<D>,
+    functional: Functional<M>,
+    heights: Option<&Heights<M>>,
+    terms: &mut Vec<([u8; M], f64)>,
+) {
+    let flat = Heights { first: [0.0; M], second: [[0.0; M]; M] };
+    let h = heights.unwrap_or(&flat);
+    let det = 1.0 + h.first.iter().map(|slope| slope * slope).sum::<f64>();
+    let inverse = |a: usize, b: usize| f64::from(u8::from(a == b)) - h.first[a] * h.first[b] / det;
+    match functional {
+        Functional::Partial(alpha) => terms.push((alpha, 1.0)),
+        Functional::LaplaceBeltrami => {
+            // g^ab (f_ab − Γ^c_ab f_c)
+            let mut trace = 0.0;
+            for a in 0..M {
+                for b in 0..M {
+                    if heights.is_some() || a == b {
+                        terms.push((second(a, b), inverse(a, b)));
                     }
-                }
-                if heights.is_some() {
-                    terms.extend((0..M).map(|c| (first(c), -trace * h.first[c] / det)));
+                    trace += inverse(a, b) * h.second[a][b];
                 }
             }
-            Functional::Gradient(axis) => {
-                // g^ab f_b e_a with e_a = t_a + Z_a n
-                let n = self.normals[i];
-                let t = tangents::<D, M>(&n);
-                for b in 0..M {
-                    let part = (0..M).map(|a| inverse(a, b) * (t[a][axis] + h.first[a] * n[axis])).sum();
-                    terms.push((first(b), part));
-                }
+            if heights.is_some() {
+                terms.extend((0..M).map(|c| (first(c), -trace * h.first[c] / det)));
+            }
+        }
+        Functional::Gradient(axis) => {
+            // g^ab f_b e_a with e_a = t_a + Z_a n
+            let t = tangents::<D, M>(n);
+            for b in 0..M {
+                let part = (0..M).map(|a| inverse(a, b) * (t[a][axis] + h.first[a] * n[axis])).sum();
+                terms.push((first(b), part));
             }
         }
     }

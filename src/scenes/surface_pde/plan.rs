@@ -3,8 +3,8 @@
 
 use super::problems::{self, ProblemChoice};
 use super::spec::{
-    EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, SurfaceChoice,
-    SurfacePde,
+    CleanWord, EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice,
+    StoppingSpec, SupportsWord, SurfaceChoice, SurfacePde,
 };
 use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
 use crate::geometry::Vector;
@@ -15,7 +15,8 @@ use crate::point_clouds::Bump;
 use crate::scene::cloud::CloudReference;
 use crate::scene::{Planned, SceneSpec};
 use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method};
-use crate::spec::{Choice, Parameter, Violation};
+use crate::spec::choice::with_defaults;
+use crate::spec::{Choice, Given, Parameter, Preset, Violation};
 use crate::time::FixedStep;
 use serde_json::{Value, json};
 
@@ -91,7 +92,7 @@ impl SceneSpec for SurfacePde {
 fn plan(mut spec: SurfacePde) -> Planned {
     let mut errors = Vec::new();
     let points = match &spec.surface {
-        SurfaceChoice::Points { source } => source.reference("/surface", &mut errors),
+        SurfaceChoice::Points { source, .. } => source.reference("/surface", &mut errors),
         _ => None,
     };
     let shape = shape(&spec, &mut errors);
@@ -113,6 +114,7 @@ fn plan(mut spec: SurfacePde) -> Planned {
     }
     let (scheme, problem) = choices(&mut spec, (&shape, sampling, count), &mut errors);
     check_together(&given, &shape, scheme.as_ref(), problem.as_ref(), &mut errors);
+    check_form(&given, scheme.as_ref(), problem.as_ref(), &mut errors);
     let (Some(scheme), Some(problem)) = (scheme, problem.filter(|_| errors.is_empty())) else {
         return Err(errors);
     };
@@ -144,16 +146,84 @@ fn check_together(
             errors.push(Violation::new("/problem", "conflict", detail, given.problem.name(), allowed));
         }
     }
-    let default = SolverChoice::default();
-    if problem.is_some_and(|problem| problem.solver().is_none()) && given.solver != default {
+    let default = default_solver(shape);
+    let is_wish = |solver: &&SolverChoice| **solver != default;
+    if let (Some(problem), Some(solver)) = (problem, given.solver.as_ref().filter(is_wish))
+        && problem.solver().is_none()
+    {
         let detail = "this problem has no system of equations to solve: `poisson` and `bdf2` have";
-        errors.push(Violation::new("/solver", "conflict", detail, given.solver.to_json(), default.to_json()));
+        errors.push(Violation::new("/solver", "conflict", detail, solver.to_json(), default.to_json()));
     }
     let is_applied = matches!(problem, Some(ProblemChoice::LaplaceBeltrami { .. }) | None);
     if given.repeat > 1 && !is_applied {
         let detail = "only `laplace_beltrami` is applied more than once";
         errors.push(Violation::new("/repeat", "conflict", detail, given.repeat, 1));
     }
+}
+
+/// What the forms by stars do not go together with.
+fn check_form(
+    given: &SurfacePde,
+    scheme: Option<&Scheme>,
+    problem: Option<&ProblemChoice>,
+    errors: &mut Vec<Violation>,
+) {
+    let Some(Scheme::Dcpse(Method { form, .. })) = scheme else { return };
+    let is_conservative = *form == Form::Conservative;
+    let is_pointwise = matches!(problem, Some(ProblemChoice::LaplaceBeltrami { .. } | ProblemChoice::Curvature { .. }));
+    if is_conservative && is_pointwise {
+        let detail = "the rows of the conservative form are right in equations only, not point by point";
+        errors.push(Violation::new("/method", "conflict", detail, "conservative", json!(["auto", "surface_dcpse"])));
+    }
+    if matches!(given.solver, Some(SolverChoice::Cg { .. })) && !is_conservative {
+        let detail = "conjugate gradients need a symmetric system, which only the method `conservative` always has";
+        errors.push(Violation::new(
+            "/solver",
+            "conflict",
+            detail,
+            "cg",
+            json!(["auto", "bicgstab", "gmres", "sparse_lu"]),
+        ));
+    }
+    if matches!(given.surface, SurfaceChoice::Bump { .. })
+        && !matches!(form, Form::Intrinsic { .. } | Form::Copies { .. })
+    {
+        let detail = "a bump has mirrored points at its edges, which supports along stars do not know";
+        errors.push(Violation::new("/method", "conflict", detail, given.method.to_json(), json!(["surface_dcpse"])));
+    }
+    if let (SurfaceChoice::Points { clean, .. }, Form::Intrinsic { .. }) = (&given.surface, form)
+        && *clean != CleanWord::Refuse
+    {
+        let detail = "supports of one radius want points without duplicates and strays";
+        errors.push(Violation::new("/surface/clean", "conflict", detail, clean.to_json(), json!(["refuse"])));
+    }
+}
+
+/// The solver of a shape where none is named.
+fn default_solver(shape: &Shape) -> SolverChoice {
+    let stopping = StoppingSpec::default();
+    match shape {
+        Shape::Points(_) => SolverChoice::Auto { stopping },
+        _ => SolverChoice::Bicgstab { stopping },
+    }
+}
+
+/// A resolved scene of points whose method does not say how neighbors are found is of version 0.2.0 or before: they were found
+/// within one radius, and points with faults were refused.
+pub(super) fn of_earlier_version(given: Given) -> Preset {
+    let surface = given.read(SurfacePde::surface());
+    let method = given.read(SurfacePde::method()).flatten();
+    let (Some(SurfaceChoice::Points { source, .. }), Some(method)) = (surface, method) else {
+        return Preset::default();
+    };
+    let MethodSpec::SurfaceDcpse { order, form, cutoff_dn, layers, normal_spacing, supports: None } = method else {
+        return Preset::default();
+    };
+    let supports = Some(SupportsWord::Ball);
+    let method = MethodSpec::SurfaceDcpse { order, form, cutoff_dn, layers, normal_spacing, supports };
+    Preset::default()
+        .set(SurfacePde::surface(), SurfaceChoice::Points { source, clean: CleanWord::Refuse })
+        .set(SurfacePde::method(), Some(method))
 }
 
 /// Writes the planned steps into the spec of an evolution. A time step alone asks for steps of that length, so a tolerance that
@@ -167,7 +237,7 @@ fn fill_in_steps(spec: &mut ProblemSpec, planned: &ProblemChoice, fixed: FixedSt
     match spec {
         ProblemSpec::Diffusion { time_step, integrator, .. } => {
             *time_step = Some(fixed.time_step);
-            if let EvolutionChoice::Dopri5 { tolerance } = integrator {
+            if let Some(EvolutionChoice::Dopri5 { tolerance }) = integrator {
                 *tolerance = controlled;
             }
         }
@@ -195,8 +265,9 @@ pub(super) fn choices(
         }
         _ => Metric::FromHeights,
     };
+    let solver = problems::solver(spec.solver.get_or_insert_with(|| default_solver(shape)));
     let scheme = scheme(spec, Points { shape, sampling, count, metric }, errors);
-    (scheme, problems::plan(spec, shape, metric, errors))
+    (scheme, problems::plan(spec, shape, (metric, solver), errors))
 }
 
 /// Where normals come from; the spec gets the choice. The exact normals of points from outside are not known, and those of
@@ -264,7 +335,8 @@ fn wrong_order(order: u64, allowed: Value) -> Violation {
 }
 
 fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) -> Option<Scheme> {
-    match &mut spec.method {
+    let default = || with_defaults(if points.is_given() { "auto" } else { "surface_dcpse" });
+    match spec.method.get_or_insert_with(default) {
         MethodSpec::ClosestPoint { order, spacing } => {
             if *order != 2 && *order != 4 {
                 errors.push(wrong_order(*order, json!([2, 4])));
@@ -279,7 +351,14 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
             let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
             Some(Scheme::Embedding { order: *order as usize, spacing: grid })
         }
-        MethodSpec::SurfaceDcpse { order, form: FormWord::Copies, cutoff_dn, layers, normal_spacing } => {
+        MethodSpec::Auto { order, cutoff_dn } => points.by_stars(*order, cutoff_dn, true, errors),
+        MethodSpec::Conservative => {
+            // The support of the lowest order stands for lengths and counts.
+            let support = points.by_stars(2, &mut None, false, errors)?;
+            let Scheme::Dcpse(Method { support, .. }) = support else { return None };
+            Some(Scheme::Dcpse(Method { support, form: Form::Conservative }))
+        }
+        MethodSpec::SurfaceDcpse { order, form: FormWord::Copies, cutoff_dn, layers, normal_spacing, supports } => {
             let (degree, default_cutoff) = points.support(*order, true, errors)?;
             let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
             let (default_layers, default_spacing) = points.copies();
@@ -289,18 +368,26 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
                 let detail = "copies along normals want exact normals and a closed surface";
                 errors.push(Violation::new("/method/form", "conflict", detail, "copies", json!(["intrinsic"])));
             }
+            if let Some(given) = supports {
+                let detail = "the neighbors of copies lie within one radius";
+                errors.push(Violation::new("/method/supports", "conflict", detail, given.to_json(), Value::Null));
+            }
             let support = Support { degree, radius: cutoff_dn * apart };
             Some(Scheme::Dcpse(Method { support, form: Form::Copies { layers, spacing: apart } }))
         }
-        MethodSpec::SurfaceDcpse { order, form: FormWord::Intrinsic, cutoff_dn, layers, normal_spacing } => {
-            let (degree, default_cutoff) = points.support(*order, false, errors)?;
-            let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
+        MethodSpec::SurfaceDcpse { order, form: FormWord::Intrinsic, cutoff_dn, layers, normal_spacing, supports } => {
             for (name, given) in [("layers", layers.to_json()), ("normal_spacing", normal_spacing.to_json())] {
                 if !given.is_null() {
                     let (at, detail) = (format!("/method/{name}"), "there are no copies in the intrinsic form");
                     errors.push(Violation::new(at, "conflict", detail, given, Value::Null));
                 }
             }
+            let default = if points.is_given() { SupportsWord::Stars } else { SupportsWord::Ball };
+            if *supports.get_or_insert(default) == SupportsWord::Stars {
+                return points.by_stars(*order, cutoff_dn, false, errors);
+            }
+            let (degree, default_cutoff) = points.support(*order, false, errors)?;
+            let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
             points.check_fit(degree, cutoff_dn, errors);
             let support = Support { degree, radius: cutoff_dn * points.shape.spacing(points.count) };
             Some(Scheme::Dcpse(Method { support, form: Form::Intrinsic { metric: points.metric } }))
@@ -309,12 +396,33 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
 }
 
 impl Points<'_> {
+    /// Whether they come from outside.
+    fn is_given(self) -> bool {
+        matches!(self.shape, Shape::Points(_))
+    }
+
     fn support(self, order: u64, is_copies: bool, errors: &mut Vec<Violation>) -> Option<(usize, f64)> {
         let found = support(order, self.shape.is_curve(), is_copies, self.sampling);
         if found.is_none() {
             errors.push(wrong_order(order, json!([2, 4, 6])));
         }
         found
+    }
+
+    /// Fits by stars; the spec gets the cutoff. Supports grow by themselves, so random points take the cutoff of others.
+    fn by_stars(
+        self,
+        order: u64,
+        cutoff_dn: &mut Option<f64>,
+        may_switch: bool,
+        errors: &mut Vec<Violation>,
+    ) -> Option<Scheme> {
+        let (degree, default_cutoff) = Self { sampling: Sampling::Given, ..self }.support(order, false, errors)?;
+        let cutoff = *cutoff_dn.get_or_insert(default_cutoff);
+        self.check_fit(degree, cutoff, errors);
+        let support = Support { degree, radius: cutoff * self.shape.spacing(self.count) };
+        let form = Form::Stars { metric: self.metric, cutoff, may_switch };
+        Some(Scheme::Dcpse(Method { support, form }))
     }
 
     /// Layers of copies and their distance, where they are not given.

@@ -3,24 +3,27 @@
 //! exact answer.
 
 use super::plan::{Normals, Scheme, SurfaceScene, choices};
+use super::preparation::Preparation;
+use super::problems::ProblemChoice;
+use super::spec::{CleanWord, SurfaceChoice};
 use super::surfaces::{Extent, Sampling, Shape};
 use crate::geometry::Vector;
-use crate::point_clouds::Examined;
+use crate::point_clouds::cleaning::Cleaning;
 use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
 use crate::point_clouds::normals;
+use crate::point_clouds::{Examined, PreparedCloud};
 use crate::scene::BuildContext;
 use crate::scene::cloud::{self, Clouds};
-use crate::schemes::surface_equation::{SurfaceCloud, SurfaceEquation};
-use crate::simulation::{Finding, Mark, Simulation};
+use crate::schemes::surface_equation::{Form, Method, SurfaceCloud, SurfaceEquation};
+use crate::simulation::{Diagnostic, Finding, Mark, Simulation};
 use crate::spec::Violation;
 use serde_json::Value;
 
 /// Place of the points in a scene.
 const PLACE: &str = "/surface";
 
-/// 1. Reads the points and the normals that came with them. 2. Examines the points, which gives their spacing. 3. Plans
-///    method and problem anew with that spacing. 4. Estimates normals where none came. 5. Reports flaws of points and normals
-///    as findings.
+/// 1. Reads the points and the normals that came with them. 2. Prepares them, with stars or within one radius. 3. Plans method
+///    and problem anew with their spacing. 4. Reports what was found about points and normals.
 pub(super) fn build<const D: usize, const M: usize>(
     scene: &SurfaceScene,
     context: BuildContext,
@@ -29,39 +32,122 @@ pub(super) fn build<const D: usize, const M: usize>(
     let points = cloud::points::<D>(&clouds, PLACE).map_err(|refused| vec![refused])?;
     let given = given_normals::<D>(&clouds, scene.normals)?;
     drop(clouds);
-    let examined = Examined::new(&points).map_err(|reason| refuse(reason.to_string()))?;
-    let shape = Shape::Points(Extent::of(&points, examined.spacing));
-    let mut violations = Vec::new();
-    let (scheme, problem) =
-        choices(&mut scene.given.clone(), (&shape, Sampling::Fibonacci, points.len() as u64), &mut violations);
-    let (Some(Scheme::Dcpse(method)), Some(problem), true) = (scheme, problem, violations.is_empty()) else {
-        return Err(violations);
+    let is_ball = matches!(scene.scheme, Scheme::Dcpse(Method { form: Form::Intrinsic { .. }, .. }));
+    let found = if is_ball {
+        Found::within_radius(scene, points, given)?
+    } else {
+        Found::with_stars(scene, &points, given.as_deref())?
     };
-    let (mut normals, source) = match given {
-        Some(given) => (given, NormalSource::Given),
-        None => {
-            let found = normals::estimate(&points, examined.radius_of_normals());
-            (found.map_err(|reason| refuse(reason.to_string()))?, NormalSource::Estimated)
-        }
-    };
-    let flaws = examined.flaws(&mut normals, source, method.support.radius);
-    let finding = |flaw: &Flaw| {
-        let found = Finding::warning(flaw.name(), flaw.to_string(), (0, 0.0)).about(&flaw.points().first);
-        found.with_count(flaw.points().count as u64)
-    };
-    let origin = format!(
-        "{} of them, {:.4e} apart, {} normals{}",
-        points.len(),
-        examined.spacing,
-        if source == NormalSource::Given { "their own" } else { "estimated" },
-        flaws.iter().map(|flaw| format!("; {flaw}")).collect::<String>()
-    );
-    let findings = flaws.iter().map(finding).collect();
-    let marks = flaws.iter().map(|flaw| Mark { code: flaw.name(), points: flaw.points().first.clone() }).collect();
-    let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
+    let Found { cloud, measure, origin, findings, marks, counted } = found;
+    let shape = Shape::Points(Extent::of(&cloud.points, measure));
+    let (method, problem) = planned(scene, &shape, cloud.rows)?;
     let problem = problem.build(&shape, &cloud, scene.given.seed, scene.fixed.time_step)?;
     let equation = SurfaceEquation::<D, M>::new(cloud, method, problem, scene.fixed, interrupt, cpu_clock);
-    Ok(Box::new(equation.on_points(origin, findings, marks)))
+    Ok(Box::new(equation.on_points(origin, findings, marks).with_preparation(counted)))
+}
+
+/// Method and problem for points whose extent is known.
+fn planned(scene: &SurfaceScene, shape: &Shape, count: usize) -> Result<(Method, ProblemChoice), Vec<Violation>> {
+    let mut violations = Vec::new();
+    let points = (shape, Sampling::Fibonacci, count as u64);
+    let (scheme, problem) = choices(&mut scene.given.clone(), points, &mut violations);
+    match (scheme, problem) {
+        (Some(Scheme::Dcpse(method)), Some(problem)) if violations.is_empty() => Ok((method, problem)),
+        _ => Err(violations),
+    }
+}
+
+/// A cloud, and what was found about it.
+struct Found<const D: usize> {
+    cloud: SurfaceCloud<D>,
+    /// Its length or area.
+    measure: f64,
+    /// A sentence about the points for the report.
+    origin: String,
+    findings: Vec<Finding>,
+    marks: Vec<Mark>,
+    counted: Vec<Diagnostic>,
+}
+
+impl<const D: usize> Found<D> {
+    /// Examines points for supports of one radius. Flaws of points and normals are reported.
+    fn within_radius(
+        scene: &SurfaceScene,
+        points: Vec<Vector<D>>,
+        given: Option<Vec<Vector<D>>>,
+    ) -> Result<Self, Vec<Violation>> {
+        let examined = Examined::new(&points).map_err(|reason| refuse(reason.to_string()))?;
+        let measure = points.len() as f64 * examined.spacing.powi(D as i32 - 1);
+        let shape = Shape::Points(Extent::of(&points, measure));
+        let (method, _) = planned(scene, &shape, points.len())?;
+        let (mut normals, source) = match given {
+            Some(given) => (given, NormalSource::Given),
+            None => {
+                let found = normals::estimate(&points, examined.radius_of_normals());
+                (found.map_err(|reason| refuse(reason.to_string()))?, NormalSource::Estimated)
+            }
+        };
+        let flaws = examined.flaws(&mut normals, source, method.support.radius);
+        let finding = |flaw: &Flaw| {
+            let found = Finding::warning(flaw.name(), flaw.to_string(), (0, 0.0)).about(&flaw.points().first);
+            found.with_count(flaw.points().count as u64)
+        };
+        let origin = format!(
+            "{} of them, {:.4e} apart, {} normals{}",
+            points.len(),
+            examined.spacing,
+            named(source),
+            flaws.iter().map(|flaw| format!("; {flaw}")).collect::<String>()
+        );
+        let findings = flaws.iter().map(finding).collect();
+        let marks = flaws.iter().map(|flaw| Mark { code: flaw.name(), points: flaw.points().first.clone() }).collect();
+        let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
+        Ok(Self { cloud, measure, origin, findings, marks, counted: Vec::new() })
+    }
+
+    /// Prepares points for supports along stars, and for the conservative form.
+    fn with_stars(
+        scene: &SurfaceScene,
+        points: &[Vector<D>],
+        given: Option<&[Vector<D>]>,
+    ) -> Result<Self, Vec<Violation>> {
+        let cleaning = match scene.spec.surface {
+            SurfaceChoice::Points { clean: CleanWord::Refuse, .. } => Cleaning::Refuse,
+            SurfaceChoice::Points { clean: CleanWord::Off, .. } => Cleaning::Off,
+            _ => Cleaning::Drop,
+        };
+        let prepared = PreparedCloud::new(points, given, cleaning);
+        let prepared = prepared.map_err(|reason| refuse(reason.to_string()))?;
+        let must_be_right = matches!(scene.normals, Normals::Given { must_be_there: true });
+        if must_be_right && prepared.verdict.as_ref().is_some_and(|verdict| verdict.is_wrong_together) {
+            let detail = "the normals of the points do not stand on the surface, so they cannot be taken as exact \
+                          (/normals/metric); `heights` estimates others";
+            return Err(refuse(detail.to_owned()));
+        }
+        let is_equation =
+            !matches!(scene.problem, ProblemChoice::LaplaceBeltrami { .. } | ProblemChoice::Curvature { .. });
+        let Preparation { findings, marks, counted } = Preparation::new(&prepared, is_equation);
+        let measure = prepared.graph.areas.iter().sum();
+        let origin = format!(
+            "{} of them, {:.4e} apart, {} normals, {} {}, {} of {measure:.6e}",
+            prepared.points.len(),
+            prepared.spacing,
+            named(prepared.source),
+            prepared.graph.part_count,
+            if prepared.graph.part_count == 1 { "part" } else { "parts" },
+            if D == 2 { "a length" } else { "an area" },
+        );
+        let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
+        let areas = Some(graph.areas.clone());
+        let rows = points.len();
+        let cloud = SurfaceCloud { rows, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
+        Ok(Self { cloud, measure, origin, findings, marks, counted })
+    }
+}
+
+/// Where normals come from, in words.
+fn named(source: NormalSource) -> &'static str {
+    if source == NormalSource::Given { "their own" } else { "estimated" }
 }
 
 /// Unit normals that came with the points, where they are wanted.

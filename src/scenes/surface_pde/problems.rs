@@ -152,12 +152,11 @@ impl Site<'_> {
 pub(super) fn plan(
     spec: &mut SurfacePde,
     shape: &Shape,
-    metric: Metric,
+    (metric, solver): (Metric, Solver),
     errors: &mut Vec<Violation>,
 ) -> Option<ProblemChoice> {
     let count = spec.count.unwrap_or(DEFAULT_COUNT);
     let site = |pointer| Site { pointer, shape, count };
-    let solver = solver(&spec.solver);
     let name = spec.problem.name();
     match &mut spec.problem {
         ProblemSpec::LaplaceBeltrami { field } => {
@@ -176,7 +175,7 @@ pub(super) fn plan(
                 shape => InitialChoice::Field(default_field(shape)),
             });
             let start = Start::Field(site("/problem/initial").initial(initial, errors));
-            let integrator = match integrator {
+            let integrator = match integrator.get_or_insert_with(|| default_integrator(shape)) {
                 EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
                 EvolutionChoice::Bdf2 => EvolutionIntegrator::Bdf2(solver),
             };
@@ -207,6 +206,14 @@ pub(super) fn plan(
             let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
             Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
         }
+    }
+}
+
+/// The integrator of diffusion that is taken where none is given. Points that are close together make explicit steps short.
+fn default_integrator(shape: &Shape) -> EvolutionChoice {
+    match shape {
+        Shape::Points(_) => EvolutionChoice::Bdf2,
+        _ => EvolutionChoice::Dopri5 { tolerance: None },
     }
 }
 
@@ -246,8 +253,11 @@ impl From<&StoppingSpec> for Stopping {
     }
 }
 
-fn solver(choice: &SolverChoice) -> Solver {
+/// The solver of a choice.
+pub(super) fn solver(choice: &SolverChoice) -> Solver {
     match choice {
+        SolverChoice::Auto { stopping } => Solver::Automatic(stopping.into()),
+        SolverChoice::Cg { stopping } => Solver::Cg(stopping.into()),
         SolverChoice::Bicgstab { stopping } => Solver::BiCgStab(stopping.into()),
         SolverChoice::Gmres { restart, stopping } => Solver::Gmres { restart: *restart, stopping: stopping.into() },
         SolverChoice::SparseLu => Solver::SparseLu,
@@ -406,7 +416,7 @@ impl ProblemChoice {
                     Some(operated) => (operated, Some(values)),
                     None => (values, None),
                 };
-                Box::new(Poisson::new(right, exact, condition, *solver))
+                Box::new(Poisson::new(right, exact, condition, *solver, cloud))
             }
             Self::Evolution { start, integrator, .. } => {
                 let (initial, reaction, exact) = begin(start, shape, cloud, seed);

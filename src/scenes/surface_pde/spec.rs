@@ -4,6 +4,18 @@ use crate::scene::cloud::PointsSource;
 use crate::spec::choice::with_defaults;
 use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Sign, whole};
 
+crate::words! {
+    /// What happens to points that coincide with others, and to points far from all others.
+    pub enum CleanWord {
+        /// they are left out and counted
+        Drop = "drop",
+        /// points with such a fault are refused
+        Refuse = "refuse",
+        /// they are kept
+        Off = "off",
+    }
+}
+
 crate::choice! {
     /// A surface about the origin.
     pub enum SurfaceChoice {
@@ -38,6 +50,8 @@ crate::choice! {
         Points = "points" {
             /// where the points come from
             source: PointsSource => flatten;
+            /// points that coincide with others, and strays: `drop` leaves them out and counts them
+            clean: CleanWord = CleanWord::Drop;
         }
     }
 }
@@ -185,8 +199,8 @@ crate::choice! {
             end_time: f64 = 1.0, in POSITIVE;
             /// time step Δt; when not given, a hundredth of T, which `dopri5` divides as its tolerance asks
             time_step: Option<f64>, in POSITIVE;
-            /// integrator of time
-            integrator: EvolutionChoice = EvolutionChoice::Dopri5 { tolerance: None };
+            /// integrator of time; `bdf2` on points from outside, else `dopri5`, when not given
+            integrator: Option<EvolutionChoice>;
             /// condition at the edges of a bump
             edges: EdgesWord = EdgesWord::Neumann;
         }
@@ -225,9 +239,28 @@ crate::words! {
     }
 }
 
+crate::words! {
+    /// How the neighbors of a fit are found.
+    pub enum SupportsWord {
+        /// all points within a radius that is the same everywhere
+        Ball = "ball",
+        /// along the edges of stars, within a radius that follows the local spacing and grows until the row is bounded
+        Stars = "stars",
+    }
+}
+
 crate::choice! {
     /// The method.
     pub enum MethodSpec {
+        /// fits with supports along stars; where an equation is solved and too many points have no bounded fit, the conservative form
+        Auto = "auto" {
+            /// 2, 4 or 6: polynomials of degree 3, 5 or 7; the conservative form has order 2
+            order: u64 = 2, in whole(2, 6);
+            /// cutoff radius r_c in local spacings; 2.4, 3.3, 4.2 (on curves 3.4, 5.4, 7.4) when not given
+            cutoff_dn: Option<f64>, in Interval::above(1.0).and_at_most(20.0);
+        }
+        /// exchange between Voronoi cells in tangent planes, of order 2: keeps the integral and the bounds of a field; for equations
+        Conservative = "conservative",
         /// Surface DC-PSE: fits of polynomials about every point
         SurfaceDcpse = "surface_dcpse" {
             /// 2, 4 or 6: polynomials of degree 3, 5 or 7
@@ -240,6 +273,8 @@ crate::choice! {
             layers: Option<u32>, in whole(1, 16);
             /// distance δn of the copies; √(area/N), on circles 3 R/(N − 1), when not given
             normal_spacing: Option<f64>, in POSITIVE;
+            /// how neighbors of intrinsic fits are found; `stars` on points from outside, else `ball`, when not given
+            supports: Option<SupportsWord>;
         }
         /// the embedding closest-point method on a grid about the surface, for `laplace_beltrami`
         ClosestPoint = "closest_point" {
@@ -299,7 +334,17 @@ crate::group! {
 crate::choice! {
     /// How systems of equations are solved.
     pub enum SolverChoice {
-        /// BiCGSTAB with ILU(0)
+        /// `cg` where the operator is conservative, else `bicgstab`
+        Auto = "auto" {
+            /// when it stops
+            stopping: StoppingSpec => flatten;
+        }
+        /// conjugate gradients with incomplete Cholesky factors; for the method `conservative`
+        Cg = "cg" {
+            /// when it stops
+            stopping: StoppingSpec => flatten;
+        }
+        /// BiCGSTAB with ILU(0); where it stalls GMRES goes on, and then sparse LU
         Bicgstab = "bicgstab" {
             /// when it stops
             stopping: StoppingSpec => flatten;
@@ -316,12 +361,6 @@ crate::choice! {
     }
 }
 
-impl Default for SolverChoice {
-    fn default() -> Self {
-        Self::Bicgstab { stopping: StoppingSpec::default() }
-    }
-}
-
 crate::group! {
     /// Operators and equations on a surface that is known by points.
     pub struct SurfacePde {
@@ -335,12 +374,12 @@ crate::group! {
         sampling: Option<SamplingWord>;
         /// what is computed
         problem: ProblemSpec = ProblemSpec::LaplaceBeltrami { field: None };
-        /// the method
-        method: MethodSpec = with_defaults("surface_dcpse");
+        /// the method; `auto` for points, else `surface_dcpse`, when not given
+        method: Option<MethodSpec>;
         /// the normals that operators are made with; `given` for points, else `exact`, when not given
         normals: Option<NormalsChoice>;
-        /// how systems of equations are solved: those of `poisson` and of `bdf2`
-        solver: SolverChoice = SolverChoice::default();
+        /// how systems of equations are solved: those of `poisson` and of `bdf2`; `auto` for points, else `bicgstab`, when not given
+        solver: Option<SolverChoice>;
         /// seed of random points and normals
         seed: u64 = 1;
         /// applications of the operator in a row, one a step; of `laplace_beltrami`

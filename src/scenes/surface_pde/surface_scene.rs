@@ -6,6 +6,7 @@ use super::surfaces::{self, Shape};
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Surface, Vector};
 use crate::point_clouds::normals;
+use crate::point_clouds::preparation::spacings_and_graph;
 use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::PhaseWork;
 use crate::scene::{self, BuildContext, Estimate, Scene, View};
@@ -31,6 +32,9 @@ impl SurfaceScene {
         let surface = self.entries(method);
         match method.form {
             Form::Intrinsic { .. } => surface,
+            // Walks, stars and normals take about as long as a fit of twice as many nodes.
+            Form::Stars { .. } => 3.0 * surface,
+            Form::Conservative => 0.5 * surface,
             Form::Copies { layers, .. } => surface * (1.0 + 1.6 * f64::from(layers)),
         }
     }
@@ -76,6 +80,10 @@ impl SurfaceScene {
                 })?;
                 cloud.normals = found;
             }
+        }
+        if let Scheme::Dcpse(Method { form: Form::Stars { .. } | Form::Conservative, .. }) = self.scheme {
+            (cloud.spacings, cloud.graph) = spacings_and_graph(&cloud.points, &cloud.normals);
+            cloud.areas.get_or_insert_with(|| cloud.graph.areas.clone());
         }
         Ok(cloud)
     }
@@ -125,7 +133,13 @@ impl Scene for SurfaceScene {
             // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
             Scheme::Dcpse(method) => {
                 let entries = self.entries(method);
-                points * (250.0 + 2.4 * 12.0 * entries * self.problem.copies() + self.problem.fill(entries, points))
+                // Neighbors, stars and their graph.
+                let stars = if let Form::Stars { .. } | Form::Conservative = method.form { 700.0 } else { 0.0 };
+                points
+                    * (250.0
+                        + stars
+                        + 2.4 * 12.0 * entries * self.problem.copies()
+                        + self.problem.fill(entries, points))
             }
             Scheme::Embedding { order, spacing } => {
                 let area = points * self.shape.spacing(self.count).powi(2);
@@ -148,6 +162,12 @@ impl Scene for SurfaceScene {
         match &self.scheme {
             Scheme::Dcpse(Method { support, form: Form::Intrinsic { .. } }) => {
                 format!("surface_pde/{dimension}/intrinsic/{}/{problem}", support.degree)
+            }
+            Scheme::Dcpse(Method { support, form: Form::Stars { .. } }) => {
+                format!("surface_pde/{dimension}/stars/{}/{problem}", support.degree)
+            }
+            Scheme::Dcpse(Method { form: Form::Conservative, .. }) => {
+                format!("surface_pde/{dimension}/conservative/{problem}")
             }
             Scheme::Dcpse(Method { support, .. }) => {
                 format!("surface_pde/{dimension}/copies/{}/{problem}", support.degree)

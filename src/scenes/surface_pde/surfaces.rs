@@ -42,15 +42,15 @@ pub(super) struct Extent {
 const BELOW_CAP: f64 = 0.9;
 
 impl Extent {
-    /// Of points that are so far apart.
-    pub fn of<const D: usize>(points: &[Vector<D>], spacing: f64) -> Self {
+    /// Of points with a length or area.
+    pub fn of<const D: usize>(points: &[Vector<D>], measure: f64) -> Self {
         let low = points.iter().fold(Vector::<D>::repeat(f64::INFINITY), |low, x| low.inf(x));
         let high = points.iter().fold(Vector::<D>::repeat(f64::NEG_INFINITY), |high, x| high.sup(x));
         let middle = 0.5 * (low + high);
         let axis = if D == 3 { 2 } else { 0 };
         Self {
             dimension: D,
-            measure: points.len() as f64 * spacing.powi(D as i32 - 1),
+            measure,
             reach: points.iter().map(|x| (x - middle).norm()).fold(0.0, f64::max),
             cap: low[axis] + BELOW_CAP * (high[axis] - low[axis]),
             is_known: true,
@@ -338,6 +338,7 @@ fn with_edges(bump: Bump, count: u64, reach: f64) -> SurfaceCloud<3> {
         source: (0..found.points.len() as u32).collect(),
         scales: found.ratios,
         areas: Some(found.areas),
+        ..SurfaceCloud::default()
     };
     // Supports may grow two and a half times.
     for (image, source) in bump::images(&cloud.points, 2.5 * reach) {

@@ -1,6 +1,10 @@
 //! The points of a surface and what is known there.
 
 use crate::geometry::Vector;
+use crate::linear_algebra::mean_term::MeanTerm;
+use crate::point_clouds::StarGraph;
+
+use super::conservative;
 
 /// Points with unit normals. The first [`Self::rows`] are unknowns; those behind are images of them across an edge.
 #[derive(Debug, Clone, Default)]
@@ -23,6 +27,10 @@ pub struct SurfaceCloud<const D: usize> {
     pub areas: Option<Vec<f64>>,
     /// Points whose values go into the series.
     pub probes: Vec<usize>,
+    /// Local spacing at each point, a length; empty without stars.
+    pub spacings: Vec<f64>,
+    /// The graph of stars; empty where operators do not need it.
+    pub graph: StarGraph,
 }
 
 impl<const D: usize> SurfaceCloud<D> {
@@ -32,6 +40,39 @@ impl<const D: usize> SurfaceCloud<D> {
         match &self.areas {
             Some(areas) => areas.iter().zip(field).map(|(area, f)| area * f).sum(),
             None => field.iter().sum::<f64>() / field.len().max(1) as f64,
+        }
+    }
+
+    /// Mean of a field: weighted by the areas of stars where there are stars, else the plain mean over the points.
+    #[must_use]
+    pub fn mean(&self, field: &[f64]) -> f64 {
+        self.mean_by(field, |value| value)
+    }
+
+    /// Root mean square of one field, or of several one after another; weighted likewise.
+    #[must_use]
+    pub fn root_mean_square(&self, fields: &[f64]) -> f64 {
+        self.mean_by(fields, |value| value * value).sqrt()
+    }
+
+    fn mean_by(&self, fields: &[f64], function: impl Fn(f64) -> f64) -> f64 {
+        let values = fields.iter().map(|value| function(*value));
+        if self.graph.is_empty() {
+            return values.sum::<f64>() / fields.len().max(1) as f64;
+        }
+        let (sum, whole) = values
+            .zip(self.graph.areas.iter().cycle())
+            .fold((0.0, 0.0), |(sum, whole), (value, area)| (sum + area * value, whole + area));
+        sum / whole
+    }
+
+    /// The term of means that makes Δ_S regular: part by part with stars, else with the given factor for all points.
+    #[must_use]
+    pub fn mean_term(&self, alpha: f64) -> MeanTerm {
+        if self.graph.is_empty() {
+            MeanTerm::uniform(self.rows, alpha)
+        } else {
+            conservative::mean_term(&self.graph, D)
         }
     }
 }

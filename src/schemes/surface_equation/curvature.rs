@@ -106,8 +106,7 @@ impl<const D: usize> Problem<D> for Curvature {
     fn observables(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Observables {
         // Gauss and Bonnet: ∫ K is 2π times the Euler characteristic.
         let whole = if clock.step == 0 || cloud.areas.is_none() { f64::NAN } else { cloud.integral(&self.gauss) };
-        let mean = self.mean.iter().sum::<f64>() / self.mean.len().max(1) as f64;
-        vec![(&CURVATURE_MEAN, mean), (&GAUSS_INTEGRAL, whole)]
+        vec![(&CURVATURE_MEAN, cloud.mean(&self.mean)), (&GAUSS_INTEGRAL, whole)]
     }
 
     fn save(&self, section: &mut Section) {

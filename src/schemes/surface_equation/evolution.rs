@@ -1,19 +1,20 @@
 //! du/dt = d Δ_S u, with reactions of two substances or without: explicit by Dormand and Prince's pair in fixed or
-//! controlled steps, or implicit by the second backward differentiation formula. Diffusion alone makes nothing larger: what grows
-//! all the same is a mode of the operator, and ends the run.
+//! controlled steps, or implicit by the second backward differentiation formula. What leaves the bounds of a solution is a mode of
+//! the operator, and ends the run.
 
 use super::cloud::SurfaceCloud;
+use super::field_bounds::FieldBounds;
 use super::format_1;
-use super::method::Wanted;
+use super::method::{Operators, Use, Wanted};
 use super::problem::{Problem, Tools, Watched};
 use super::quantities::{INTEGRAL, LARGEST, LEAST, PROBES, RATE, REFERENCE, VALUE};
 use super::reactions::Reaction;
-use super::solver::{Factors, Solver, Workspace};
+use super::solver::{LinearSystem, Solver, Workspace};
 use crate::linear_algebra::SparseRows;
-use crate::linear_algebra::krylov::Interruptible;
 use crate::parallel::Interrupt;
+use crate::point_clouds::StarGraph;
 use crate::schemes::measured_errors::{against_exact, entry};
-use crate::simulation::{Check, Diagnostic, ErrorEntry, LoadError, Observables, Quantity, Section, StepError};
+use crate::simulation::{Check, Diagnostic, ErrorEntry, Finding, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use crate::time::embedded_pair::EmbeddedPair;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
@@ -73,7 +74,8 @@ pub struct Evolution {
     /// Step of the controlled integrator.
     inner_step: f64,
     pair: EmbeddedPair,
-    implicit: Option<(f64, SparseRows, Factors)>,
+    /// The system of the implicit formula, for its factor of Δt.
+    implicit: Option<(f64, LinearSystem)>,
     storage: Workspace,
     right: Vec<f64>,
     /// Steps of the pair that were tried.
@@ -82,8 +84,17 @@ pub struct Evolution {
     /// Largest value at each probe so far.
     peaks: Vec<f64>,
     initial_integral: f64,
+    /// Integral of |u| at the start.
+    initial_size: f64,
     /// Root mean square of du/dt at the end of the last step, of reactions.
     rate: f64,
+    bounds: FieldBounds,
+    /// Doubts of the last step.
+    findings: Vec<Finding>,
+    /// Values before the last step, a buffer.
+    earlier: Vec<f64>,
+    /// What a solver left of the integral of each part, and its area, a buffer.
+    defects: Vec<[f64; 2]>,
 }
 
 impl Evolution {
@@ -91,7 +102,9 @@ impl Evolution {
     #[must_use]
     pub fn new<const D: usize>(parts: EvolutionParts, cloud: &SurfaceCloud<D>) -> Self {
         let values = parts.initial.clone();
+        let sizes: Vec<f64> = values[..cloud.rows].iter().map(|value| value.abs()).collect();
         Self {
+            initial_size: cloud.integral(&sizes).max(f64::MIN_POSITIVE),
             previous: values.clone(),
             inner_step: 0.0,
             pair: EmbeddedPair::default(),
@@ -103,6 +116,10 @@ impl Evolution {
             peaks: cloud.probes.iter().map(|probe| values[*probe]).collect(),
             initial_integral: cloud.integral(&values[..cloud.rows]),
             rate: 0.0,
+            bounds: FieldBounds::new(&values, parts.reaction.as_ref()),
+            findings: Vec::new(),
+            earlier: Vec::new(),
+            defects: Vec::new(),
             values,
             parts,
         }
@@ -166,10 +183,10 @@ impl Evolution {
         }
     }
 
-    /// A step of the implicit formula.
-    fn implicit(
+    /// A step of the implicit formula. Conservative rows are solved in their symmetric form A (1 − c Δt Δ_S) u = A b.
+    fn implicit<const D: usize>(
         &mut self,
-        operator: &SparseRows,
+        (cloud, operators): (&SurfaceCloud<D>, &Operators),
         solver: Solver,
         interrupt: &Interrupt,
         from: Clock,
@@ -179,44 +196,63 @@ impl Evolution {
         // The first step has nothing before it.
         let is_first = from.step == 0;
         let share = if is_first { 1.0 } else { 2.0 / 3.0 };
+        let is_symmetric = operators.is_conservative && solver.is_symmetric();
+        let area = |i: usize| if is_symmetric { cloud.graph.areas[i] } else { 1.0 };
         let unsolved = |reason: String| StepError::Unsolved { reason, step: to.step, time: to.time };
-        if self.implicit.as_ref().is_none_or(|(known, ..)| *known != share) {
-            let mut system = operator.sorted();
-            system.change_rows(|i, columns, weights| {
+        if self.implicit.as_ref().is_none_or(|(known, _)| *known != share) {
+            let mut rows = operators.rows[0].sorted();
+            rows.change_rows(|i, columns, weights| {
                 for (j, w) in columns.iter().zip(weights.iter_mut()) {
-                    *w = f64::from(u8::from(*j as usize == i)) - share * whole * *w;
+                    *w = area(i) * (f64::from(u8::from(*j as usize == i)) - share * whole * *w);
                 }
             });
-            let factors = solver.factors(&system, None).map_err(unsolved)?;
-            self.implicit = Some((share, system, factors));
+            let system = LinearSystem::new(rows, None, solver, is_symmetric).map_err(unsolved)?;
+            self.implicit = Some((share, system));
         }
-        let Self { implicit: Some((_, system, factors)), values, previous, right, storage, .. } = self else {
+        let Self { implicit: Some((_, system)), values, previous, right, storage, .. } = self else {
             return Err(unsolved("there is no system".to_owned()));
         };
         right.resize(values.len(), 0.0);
-        for ((right, now), before) in right.iter_mut().zip(values.iter()).zip(previous.iter()) {
-            *right = if is_first { *now } else { (4.0 * now - before) / 3.0 };
+        for (i, ((right, now), before)) in right.iter_mut().zip(values.iter()).zip(previous.iter()).enumerate() {
+            *right = area(i) * if is_first { *now } else { (4.0 * now - before) / 3.0 };
         }
         previous.copy_from_slice(values);
-        let map = Interruptible { map: system, interrupt };
-        let found = solver.solve(&map, factors, right, values, storage);
+        let found = system.solve(right, values, interrupt, storage);
         interrupt.check()?;
-        self.iterations += found.iterations;
-        solver.failure(found).map_or(Ok(()), |reason| Err(unsolved(reason)))
+        self.iterations += found.map_err(unsolved)?.iterations;
+        if is_symmetric {
+            // What the solver left of the integral: Σ A u = Σ A b on each part, since the exchange cancels.
+            let StarGraph { areas, parts, part_count, .. } = &cloud.graph;
+            self.defects.clear();
+            self.defects.resize(*part_count, [0.0; 2]);
+            for (((part, area), value), right) in parts.iter().zip(areas).zip(values.iter()).zip(right.iter()) {
+                let [defect, whole] = &mut self.defects[*part as usize];
+                (*defect, *whole) = (*defect + right - area * value, *whole + area);
+            }
+            for (value, part) in values.iter_mut().zip(parts) {
+                let [defect, whole] = self.defects[*part as usize];
+                *value += defect / whole;
+            }
+        }
+        Ok(())
     }
 
-    /// Refuses what diffusion cannot do.
-    fn check_growth(&self, to: Clock) -> Result<(), StepError> {
-        let largest = largest_of(&self.values);
-        let bound = MOST_GROWTH * largest_of(&self.parts.initial);
-        if self.parts.reaction.is_some() || !largest.is_finite() || largest <= bound {
-            return Ok(());
+    /// Holds the fields against their bounds. `earlier` are the values before the step.
+    fn check_bounds<const D: usize>(
+        &mut self,
+        cloud: &SurfaceCloud<D>,
+        earlier: &[f64],
+        to: Clock,
+    ) -> Result<(), StepError> {
+        let before = self.bounds.drift;
+        if cloud.areas.is_some() && self.parts.reaction.is_none() {
+            self.bounds.drift = (cloud.integral(&self.values) - self.initial_integral) / self.initial_size;
         }
-        let reason = format!(
-            "max|u| = {largest:.3e} is above {bound:.3e}, {MOST_GROWTH} times that at the start: the operator has growing \
-             modes, or Δt is too long for steps without a tolerance; a larger cutoff_dn or relaxed sampling helps"
-        );
-        Err(StepError::Unsolved { reason, step: to.step, time: to.time })
+        if let Some(reason) = self.bounds.violation(&self.values) {
+            return Err(StepError::Unsolved { reason, step: to.step, time: to.time });
+        }
+        self.findings = self.bounds.findings(before, (&self.values, earlier), to);
+        Ok(())
     }
 
     fn reference(&self, time: f64) -> Option<Vec<f64>> {
@@ -264,14 +300,8 @@ const FIRST_STEP: f64 = 1e-3;
 /// Inner steps below this share of a step end the run.
 const LEAST_STEP: f64 = 1e-9;
 const SAFETY: f64 = 0.9;
-/// Of max|u| by that at the start, without reactions: a sound operator of high order overshoots by far less.
-const MOST_GROWTH: f64 = 10.0;
 /// Points that a task works on at least.
 const POINTS: usize = 1024;
-
-fn largest_of(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |most, value| most.max(value.abs()))
-}
 
 /// d Δ_S u and the terms of a reaction.
 fn slopes(operator: &SparseRows, reaction: Option<&Reaction>, u: &[f64], time: f64, out: &mut [f64]) {
@@ -300,19 +330,27 @@ impl<const D: usize> Problem<D> for Evolution {
         vec![Wanted::LaplaceBeltrami]
     }
 
+    fn purpose(&self) -> Use {
+        Use::Equation
+    }
+
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
         let Tools { cloud, operators, interrupt, phases, from, to } = tools;
         let operator = &operators.rows[0];
+        self.earlier.clone_from(&self.values);
         match self.parts.integrator {
             EvolutionIntegrator::Bdf2(solver) => {
-                phases.measure("solver/solution", || self.implicit(operator, solver, interrupt, from, to))?;
+                phases.measure("solver/solution", || self.implicit((cloud, operators), solver, interrupt, from, to))?;
             }
             _ => phases.measure("evolution", || self.explicit(operator, interrupt, from, to))?,
         }
-        self.check_growth(to)?;
+        let earlier = std::mem::take(&mut self.earlier);
+        let checked = self.check_bounds(cloud, &earlier, to);
+        self.earlier = earlier;
+        checked?;
         if self.parts.reaction.is_some() {
             let slope = self.pair.slope();
-            self.rate = (slope.iter().map(|s| s * s).sum::<f64>() / slope.len().max(1) as f64).sqrt();
+            self.rate = cloud.root_mean_square(slope);
         }
         for (peak, probe) in self.peaks.iter_mut().zip(&cloud.probes) {
             *peak = peak.max(self.values[*probe]);
@@ -350,18 +388,17 @@ impl<const D: usize> Problem<D> for Evolution {
         for (probe, peak) in PROBES.into_iter().zip(&self.peaks) {
             errors.push(entry(probe.name, "peak", *peak, clock.time, "none: the largest value so far"));
         }
-        let sizes: Vec<f64> = self.parts.initial.iter().map(|value| value.abs()).collect();
         // A field whose parts cancel has no mass to be lost.
-        let has_mass = self.initial_integral.abs() > 1e-3 * cloud.integral(&sizes[..cloud.rows]);
+        let has_mass = self.initial_integral.abs() > 1e-3 * self.initial_size;
         if cloud.areas.is_some() && self.parts.reaction.is_none() && has_mass {
             let drift = cloud.integral(&self.values) / self.initial_integral - 1.0;
             errors.push(entry("mass", "relative", drift.abs(), clock.time, "the integral at the start"));
         }
         if self.parts.reaction.is_some() {
             let rows = self.values.len() / 2;
-            let mean = self.values[..rows].iter().sum::<f64>() / rows as f64;
-            let spread = self.values[..rows].iter().map(|u| (u - mean).powi(2)).sum::<f64>() / rows as f64;
-            errors.push(entry("pattern", "std", spread.sqrt(), clock.time, "a state without a pattern"));
+            let mean = cloud.mean(&self.values[..rows]);
+            let off: Vec<f64> = self.values[..rows].iter().map(|u| u - mean).collect();
+            errors.push(entry("pattern", "std", cloud.root_mean_square(&off), clock.time, "a state without a pattern"));
             if clock.step > 0 {
                 errors.push(entry("pattern", "rate", self.rate, clock.time, "a steady state"));
             }
@@ -394,6 +431,9 @@ impl<const D: usize> Problem<D> for Evolution {
         section.put_real("rate", self.rate);
         section.put_count("attempts", self.attempts);
         section.put_count("iterations", self.iterations);
+        if self.bounds.drift.is_finite() {
+            section.put_real("mass_drift", self.bounds.drift);
+        }
     }
 
     fn load(&mut self, section: &Section) -> Result<(), LoadError> {
@@ -402,6 +442,9 @@ impl<const D: usize> Problem<D> for Evolution {
         let peaks = section.reals_of("peaks", self.peaks.len())?;
         let (inner_step, rate) = (section.real("inner_step")?, section.real("rate")?);
         let (attempts, iterations) = (section.count("attempts")?, section.count("iterations")?);
+        // It is not known before the first step, and in checkpoints of earlier versions.
+        let drift = if section.has("mass_drift") { section.real("mass_drift")? } else { f64::NAN };
+        self.bounds.drift = drift;
         self.values.copy_from_slice(value);
         self.previous.copy_from_slice(previous);
         self.peaks.copy_from_slice(peaks);
@@ -417,11 +460,11 @@ impl<const D: usize> Problem<D> for Evolution {
     }
 
     fn checks(&self, _steps: u64) -> Vec<Check> {
-        if self.parts.reaction.is_some() {
-            return Vec::new();
-        }
-        let growth = largest_of(&self.values) / largest_of(&self.parts.initial);
-        vec![Check::at_most("field_growth", Some(growth), MOST_GROWTH, "")]
+        self.bounds.checks(&self.values)
+    }
+
+    fn findings(&self, _clock: Clock) -> Vec<Finding> {
+        self.findings.clone()
     }
 
     fn diagnostics(&self) -> Vec<Diagnostic> {
@@ -443,7 +486,10 @@ impl<const D: usize> Problem<D> for Evolution {
             EvolutionIntegrator::Controlled { tolerance } => {
                 format!("Dormand–Prince, tolerance {tolerance:.1e}, {} steps tried", self.attempts)
             }
-            EvolutionIntegrator::Bdf2(solver) => format!("BDF2, {}, {} iterations", solver.name(), self.iterations),
+            EvolutionIntegrator::Bdf2(solver) => {
+                let name = self.implicit.as_ref().map_or_else(|| solver.name(), |(_, system)| system.name());
+                format!("BDF2, {name}, {} iterations", self.iterations)
+            }
         };
         method.insert("integrator", integrator);
     }

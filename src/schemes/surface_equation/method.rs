@@ -1,17 +1,21 @@
 //! From points to operators, in the form that was chosen.
 
 use super::cloud::SurfaceCloud;
+use super::conservative;
+use super::row_quality::RowQuality;
 use crate::linear_algebra::SparseRows;
 use crate::operators::charts::tangent::Metric;
 use crate::operators::{
-    Construction, Functional, NormalCopies, Support, SupportDiagnostics, TangentChart, charts::Heights, construct,
+    Construction, Functional, NormalCopies, StarCloud, StarSupport, Support, SupportDiagnostics, TangentChart,
+    charts::Heights, construct, construct_star_rows,
 };
 use crate::parallel::{Interrupt, Interrupted};
+use crate::point_clouds::StarGraph;
 
 /// The form of Surface DC-PSE.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
-    /// Fits on the tangent plane.
+    /// Fits on the tangent plane, with supports of one radius.
     Intrinsic {
         /// Where the metric comes from.
         metric: Metric,
@@ -23,6 +27,17 @@ pub enum Form {
         /// Distance δn of the copies.
         spacing: f64,
     },
+    /// Fits on the tangent plane, with supports that follow the stars of points and the local spacing.
+    Stars {
+        /// Where the metric comes from.
+        metric: Metric,
+        /// Radius of supports in local spacings.
+        cutoff: f64,
+        /// Whether the conservative form takes the place of rows that would not hold.
+        may_switch: bool,
+    },
+    /// The conservative form, exchange between Voronoi cells.
+    Conservative,
 }
 
 /// How operators are made.
@@ -43,16 +58,35 @@ pub enum Wanted {
     Gradient(usize),
 }
 
+/// What a problem does with Δ_S.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Use {
+    /// Values at points are the result.
+    Pointwise,
+    /// An equation is solved, so that growing modes matter.
+    Equation,
+}
+
 /// The operators that a problem asks for.
 #[derive(Debug)]
 pub struct Operators {
-    /// In the order of the wishes.
+    /// In the order in which they were wanted.
     pub rows: Vec<SparseRows>,
     /// κ = ∇·n and the Gauss curvature of the fitted surface, where heights were fitted.
     pub curvatures: Option<Vec<[f64; 2]>>,
     /// What became of the points.
     pub fit_diagnostics: SupportDiagnostics,
+    /// Kinds of rows, of fits by stars.
+    pub quality: Option<RowQuality>,
+    /// Whether Δ_S is the conservative form, symmetric in areas.
+    pub is_conservative: bool,
 }
+
+/// Degree and radius in local spacings of the fits that take the place of others, in order.
+const LOWER: [StarSupport; 2] = [StarSupport { degree: 5, cutoff: 3.3 }, StarSupport { degree: 3, cutoff: 2.4 }];
+/// The same on curves.
+const LOWER_ON_CURVES: [StarSupport; 2] =
+    [StarSupport { degree: 5, cutoff: 5.4 }, StarSupport { degree: 3, cutoff: 3.4 }];
 
 impl Method {
     /// Operators on a cloud in D dimensions, M = D − 1.
@@ -63,6 +97,7 @@ impl Method {
         &self,
         cloud: &SurfaceCloud<D>,
         wanted: &[Wanted],
+        purpose: Use,
         interrupt: &Interrupt,
     ) -> Result<Operators, Interrupted> {
         let radius = self.support.radius;
@@ -83,20 +118,71 @@ impl Method {
                 let chart = NormalCopies::new(&cloud.points, &cloud.normals, layers, spacing, radius);
                 Ok(operators(construct::<D>(&chart, self.support, &functionals(wanted), interrupt)?, None))
             }
+            Form::Stars { metric, cutoff, may_switch } => {
+                let SurfaceCloud { points, normals, spacings, graph, .. } = cloud;
+                let cloud = StarCloud { points, normals, spacings, graph, metric };
+                self.by_stars::<D, M>(cloud, (cutoff, may_switch), wanted, purpose, interrupt)
+            }
+            Form::Conservative => Ok(conservative_operators(&cloud.graph, None)),
         }
+    }
+
+    /// Rows by stars; the conservative form where they would not hold.
+    fn by_stars<const D: usize, const M: usize>(
+        &self,
+        cloud: StarCloud<'_, D>,
+        (cutoff, may_switch): (f64, bool),
+        wanted: &[Wanted],
+        purpose: Use,
+        interrupt: &Interrupt,
+    ) -> Result<Operators, Interrupted> {
+        let degree = self.support.degree;
+        let lower = if M == 1 { LOWER_ON_CURVES } else { LOWER };
+        let first = StarSupport { degree, cutoff };
+        let supports: Vec<StarSupport> =
+            std::iter::once(first).chain(lower.into_iter().filter(|support| support.degree < degree)).collect();
+        let built = construct_star_rows::<D, M>(cloud, &supports, &functionals(wanted), interrupt)?;
+        let laplacian = wanted.iter().position(|wanted| *wanted == Wanted::LaplaceBeltrami);
+        let judged = laplacian.filter(|_| purpose == Use::Equation).map(|place| &built.operators[place]);
+        let quality = RowQuality::new(&built, judged, interrupt);
+        interrupt.check()?;
+        if may_switch && purpose == Use::Equation && quality.reason_to_switch().is_some() {
+            return Ok(conservative_operators(cloud.graph, Some(quality)));
+        }
+        let curvatures = (!built.heights.is_empty()).then(|| built.heights.iter().map(bends).collect());
+        let fit_diagnostics = SupportDiagnostics { enlarged: built.grown, ..SupportDiagnostics::default() };
+        Ok(Operators {
+            rows: built.operators,
+            curvatures,
+            fit_diagnostics,
+            quality: Some(quality),
+            is_conservative: false,
+        })
     }
 }
 
 fn functionals<const M: usize>(wanted: &[Wanted]) -> Vec<Functional<M>> {
-    let of = |wanted: &Wanted| match wanted {
+    let functional = |wanted: &Wanted| match wanted {
         Wanted::LaplaceBeltrami => Functional::LaplaceBeltrami,
         Wanted::Gradient(axis) => Functional::Gradient(*axis),
     };
-    wanted.iter().map(of).collect()
+    wanted.iter().map(functional).collect()
 }
 
 fn operators<const M: usize>(built: Construction<M>, curvatures: Option<Vec<[f64; 2]>>) -> Operators {
-    Operators { rows: built.operators, curvatures, fit_diagnostics: built.fit_diagnostics }
+    let fit_diagnostics = built.fit_diagnostics;
+    Operators { rows: built.operators, curvatures, fit_diagnostics, quality: None, is_conservative: false }
+}
+
+/// The conservative form of Δ_S; `quality` is that of the rows whose place it takes.
+fn conservative_operators(graph: &StarGraph, quality: Option<RowQuality>) -> Operators {
+    Operators {
+        rows: vec![conservative::rows(graph)],
+        curvatures: None,
+        fit_diagnostics: SupportDiagnostics::default(),
+        quality,
+        is_conservative: true,
+    }
 }
 
 /// ∇·n = −g^ab h_ab/√det g and K = det h_ab/(det g)² of a graph over its plane.

@@ -1,9 +1,11 @@
 //! What a problem on a surface is to the simulation that runs it.
 
 use super::cloud::SurfaceCloud;
-use super::method::{Operators, Wanted};
+use super::method::{Operators, Use, Wanted};
 use crate::parallel::Interrupt;
-use crate::simulation::{Check, Diagnostic, ErrorEntry, LoadError, Observables, Phases, Quantity, Section, StepError};
+use crate::simulation::{
+    Check, Diagnostic, ErrorEntry, Finding, LoadError, Observables, Phases, Quantity, Section, StepError,
+};
 use crate::time::Clock;
 use std::collections::BTreeMap;
 
@@ -30,6 +32,11 @@ pub type Watched<'a> = [(&'static str, &'a [f64]); 2];
 pub trait Problem<const D: usize>: Send {
     /// Operators that it needs.
     fn wanted(&self) -> Vec<Wanted>;
+
+    /// What it does with Δ_S.
+    fn purpose(&self) -> Use {
+        Use::Pointwise
+    }
 
     /// Makes one step.
     ///
@@ -69,6 +76,11 @@ pub trait Problem<const D: usize>: Send {
 
     /// What it watches: bounds that end the run where they do not hold. `steps` are done.
     fn checks(&self, _steps: u64) -> Vec<Check> {
+        Vec::new()
+    }
+
+    /// Doubts that the step just done left.
+    fn findings(&self, _clock: Clock) -> Vec<Finding> {
         Vec::new()
     }
 

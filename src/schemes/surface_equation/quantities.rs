@@ -12,9 +12,9 @@ quantities! {
         ERROR_MAX = "error_max", "of the field", "Largest error over the points.";
         ITERATIONS = "iterations", "", "Iterations of the solver.";
         RESIDUAL = "residual", "", "Norm of b - A x by that of b.";
-        CURVATURE_MEAN = "curvature_mean", "1/length", "Mean over the points of the mean curvature.";
+        CURVATURE_MEAN = "curvature_mean", "1/length", "Mean of the mean curvature, weighted by areas on points from outside.";
         GAUSS_INTEGRAL = "gauss_integral", "", "Integral of the Gauss curvature: 2 pi times the Euler characteristic.";
-        INTEGRAL = "integral", "of the field times area", "Integral of the first field over the surface.";
+        INTEGRAL = "integral", "of the field times area", "Integral of the first field over the surface; its mean over the points where areas are not known.";
         LEAST = "least", "of the field", "Least value of the first field.";
         LARGEST = "largest", "of the field", "Largest value of the first field.";
         RATE = "rate", "of the field by time", "Root mean square of the rate of change at the end of the last step.";

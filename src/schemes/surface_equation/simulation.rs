@@ -2,9 +2,10 @@
 
 use super::cloud::SurfaceCloud;
 use super::format_1;
-use super::method::{Form, Method, Operators};
+use super::method::{Form, Method, Operators, Use};
 use super::problem::{Problem, Tools};
 use super::quantities::{CURVATURE, NORMAL, TIME};
+use super::row_quality::RowQuality;
 use crate::linear_algebra::SparseRows;
 use crate::operators::{Support, SupportDiagnostics};
 use crate::parallel::Interrupt;
@@ -24,6 +25,8 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     problem: Box<dyn Problem<D>>,
     operators: Option<Operators>,
     fit_diagnostics: SupportDiagnostics,
+    /// Of fits by stars: kinds of rows.
+    quality: Option<RowQuality>,
     /// Points whose curvature is too large for their support.
     coarse: u64,
     interrupt: Interrupt,
@@ -31,6 +34,8 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     origin: Option<String>,
     /// Points from outside that findings are about.
     marks: Vec<Mark>,
+    /// What was counted when the points were prepared.
+    preparation: Vec<Diagnostic>,
     course: Course,
 }
 
@@ -45,7 +50,11 @@ fn coarse_points<const D: usize>(cloud: &SurfaceCloud<D>, method: &Method, built
         let known = cloud.curvatures.get(*i).copied().unwrap_or(f64::NAN);
         let kappa = if known.is_nan() { fitted(*i) } else { known };
         let scale = cloud.scales.get(*i).copied().unwrap_or(1.0);
-        kappa.abs() * scale * method.support.radius > COARSE
+        let radius = match method.form {
+            Form::Stars { cutoff, .. } => cutoff * cloud.spacings[*i],
+            _ => scale * method.support.radius,
+        };
+        kappa.abs() * radius > COARSE
     };
     (0..cloud.rows).filter(is_coarse).count() as u64
 }
@@ -67,10 +76,12 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
             problem,
             operators: None,
             fit_diagnostics: SupportDiagnostics::default(),
+            quality: None,
             coarse: 0,
             interrupt,
             origin: None,
             marks: Vec::new(),
+            preparation: Vec::new(),
             course: Course::new(fixed.into(), Phases::new(cpu_clock), BTreeMap::new()),
         }
     }
@@ -81,6 +92,89 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
         (self.origin, self.course.findings, self.marks) = (Some(origin), findings, marks);
         self
     }
+
+    /// The same with what was counted when the points were prepared.
+    #[must_use]
+    pub fn with_preparation(mut self, counted: Vec<Diagnostic>) -> Self {
+        self.preparation = counted;
+        self
+    }
+}
+
+impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
+    /// Makes the operators. Their doubts are told in the first step; a run that goes on makes them again in silence.
+    fn construct_operators(&mut self) -> Result<(), StepError> {
+        let Self { cloud, method, problem, course, interrupt, .. } = self;
+        let (from, to) = (course.clock(), course.next());
+        let wanted = problem.wanted();
+        let build = || method.build::<D, M>(cloud, &wanted, problem.purpose(), interrupt);
+        let built = course.phases.measure("operators/construction", build)?;
+        self.fit_diagnostics = built.fit_diagnostics;
+        self.coarse = coarse_points(cloud, method, &built);
+        if let Some(first) = built.fit_diagnostics.first_failed {
+            let (failed, Clock { step, time }) = (built.fit_diagnostics.failed, to);
+            let reason = format!(
+                "the moment conditions of {failed} of {} points cannot be met, the first is point {first}; a larger \
+                 cutoff_dn or relaxed sampling helps",
+                cloud.rows
+            );
+            return Err(StepError::Unsolved { reason, step, time });
+        }
+        if from.step == 0 {
+            course.findings.extend(findings_of(&built, problem.purpose(), method, to));
+        }
+        self.quality.clone_from(&built.quality);
+        self.operators = Some(built);
+        Ok(())
+    }
+
+    /// What the operators are, and why.
+    fn operator_name(&self) -> String {
+        let Support { degree, radius } = self.method.support;
+        let rows = format!("degree {degree}, support {radius:.6}");
+        let is_switched = self.quality.as_ref().and_then(RowQuality::reason_to_switch);
+        match self.method.form {
+            Form::Intrinsic { .. } => format!("{rows}, tangent planes"),
+            Form::Copies { layers, spacing } => {
+                format!("{rows}, {layers} copies to either side, {spacing:.6} apart")
+            }
+            Form::Stars { cutoff, may_switch, .. } => match is_switched {
+                Some(reason) if may_switch && self.problem.purpose() == Use::Equation => {
+                    format!("conservative: {reason}")
+                }
+                _ => format!("rows: degree {degree}, supports of {cutoff} local spacings along stars"),
+            },
+            Form::Conservative => "conservative: asked for".to_owned(),
+        }
+    }
+}
+
+/// Findings about operators that were just made.
+fn findings_of(built: &Operators, purpose: Use, method: &Method, to: Clock) -> Vec<Finding> {
+    let Some(quality) = &built.quality else { return Vec::new() };
+    let at = (to.step, to.time);
+    let mut findings = Vec::new();
+    if built.is_conservative {
+        let reason = quality.reason_to_switch().unwrap_or_default();
+        let message = format!("the conservative form takes the place of fits, since {reason}");
+        // Second order is all that it has.
+        let finding = if method.support.degree > 3 { Finding::warning } else { Finding::info };
+        findings.push(finding("operator.conservative", message, at));
+    } else if purpose == Use::Equation && quality.has_growing_modes() {
+        let message = format!(
+            "the operator has growing modes: the largest Ritz value is {:.1e} of its largest weight",
+            quality.growth()
+        );
+        let advice = "the methods `auto` and `conservative` have none";
+        findings.push(Finding::warning("operator.growing_modes", message, at).with_advice(advice));
+    }
+    let (count, first) = quality.voronoi();
+    if purpose == Use::Pointwise && count > 0 {
+        let message =
+            format!("{count} points have no consistent row: there are too few points for the bends of the surface");
+        findings.push(Finding::warning("operator.voronoi_rows", message, at).about(first).with_count(count));
+    }
+    findings
 }
 
 impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
@@ -94,33 +188,20 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
 
     /// 1. Operators, where there are none yet: a row for every point. 2. The problem's step. 3. A look at the numbers.
     fn step(&mut self) -> Result<(), StepError> {
-        let Self { cloud, method, problem, operators, course, interrupt, fit_diagnostics, coarse, .. } = self;
-        let (from, to) = (course.clock(), course.next());
-        let phases = &mut course.phases;
-        let operators = match operators {
-            Some(operators) => operators,
-            None => {
-                let wanted = problem.wanted();
-                let build = || method.build::<D, M>(cloud, &wanted, interrupt);
-                let built = phases.measure("operators/construction", build)?;
-                (*fit_diagnostics, *coarse) = (built.fit_diagnostics, coarse_points(cloud, method, &built));
-                if let Some(first) = fit_diagnostics.first_failed {
-                    let (failed, Clock { step, time }) = (fit_diagnostics.failed, to);
-                    let reason = format!(
-                        "the moment conditions of {failed} of {} points cannot be met, the first is point {first}; a larger \
-                         cutoff_dn or relaxed sampling helps",
-                        cloud.rows
-                    );
-                    return Err(StepError::Unsolved { reason, step, time });
-                }
-                operators.insert(built)
-            }
+        if self.operators.is_none() {
+            self.construct_operators()?;
+        }
+        let Self { cloud, problem, operators: Some(operators), course, interrupt, .. } = self else {
+            let Clock { step, time } = self.clock();
+            return Err(StepError::Unsolved { reason: "there are no operators".to_owned(), step, time });
         };
-        problem.step(Tools { cloud, operators, interrupt, phases, from, to })?;
+        let (from, to) = (course.clock(), course.next());
+        problem.step(Tools { cloud, operators, interrupt, phases: &mut course.phases, from, to })?;
         interrupt.check()?;
         for (field, values) in problem.watched() {
             check_finite(field, values, to)?;
         }
+        course.findings.extend(problem.findings(to));
         course.step += 1;
         Ok(())
     }
@@ -152,14 +233,18 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         state.put_section("problem", |section| self.problem.save(section));
         state.put_component("fits", &self.fit_diagnostics);
         state.put_count("coarse_points", self.coarse);
+        if let Some(quality) = &self.quality {
+            state.put_component("quality", quality);
+        }
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
         let clock = self.course.check(state)?;
         let (soundness, coarse) = (state.component("fits")?, state.count("coarse_points")?);
+        let quality = if state.has("quality") { Some(state.component("quality")?) } else { None };
         state.section("problem", |section| self.problem.load(section))?;
         // From here on nothing fails.
-        (self.fit_diagnostics, self.coarse) = (soundness, coarse);
+        (self.fit_diagnostics, self.coarse, self.quality) = (soundness, coarse, quality);
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
         if clock.step > 0 {
@@ -175,19 +260,18 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
     }
 
     fn report(&self) -> Report {
-        let Support { degree, radius } = self.method.support;
-        let form = match self.method.form {
-            Form::Intrinsic { .. } => "tangent planes".to_owned(),
-            Form::Copies { layers, spacing } => format!("{layers} copies to either side, {spacing:.6} apart"),
-        };
         let entries = self.operators.iter().flat_map(|o| &o.rows).map(SparseRows::entries).sum::<usize>();
-        let mut method = BTreeMap::from([("operator", format!("degree {degree}, support {radius:.6}, {form}"))]);
+        let mut method = BTreeMap::from([("operator", self.operator_name())]);
         if entries > 0 {
             method.insert("entries", format!("{:.1} a point", entries as f64 / self.cloud.rows as f64));
         }
         method.extend(self.origin.iter().map(|origin| ("points", origin.clone())));
         self.problem.describe(&mut method);
-        let mut diagnostics = support_diagnostics(SUPPORTS, &self.fit_diagnostics);
+        let mut diagnostics = self.preparation.clone();
+        match &self.quality {
+            Some(quality) => diagnostics.extend(quality.diagnostics()),
+            None => diagnostics.extend(support_diagnostics(SUPPORTS, &self.fit_diagnostics)),
+        }
         let doc = "Points whose curvature is too large for their support.";
         diagnostics.push(Diagnostic::count("supports.coarse", self.coarse, doc));
         diagnostics.extend(self.problem.diagnostics());
@@ -198,6 +282,10 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         let finite = self.problem.watched().iter().all(|(_, values)| values.iter().all(|value| value.is_finite()));
         let unmet = (self.course.step > 0).then_some(self.fit_diagnostics.failed as f64);
         let mut checks = vec![Check::at_most("unmet_moment_conditions", unmet, 0.0, "points")];
+        if let Some(quality) = &self.quality {
+            checks.push(Check::watched("fallback_rows", Some(quality.fallback_share()), ""));
+            checks.push(Check::watched("growing_modes", Some(quality.growth()), ""));
+        }
         checks.extend(self.problem.checks(self.course.step));
         Health { finite, max_cfl: 0.0, volume_drift: None, checks }
     }
