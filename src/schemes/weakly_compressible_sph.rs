@@ -39,9 +39,11 @@ mod pacing;
 mod pair_sums;
 mod pair_workspace;
 pub mod quantities;
+mod pressures;
 mod saved_state;
 mod simulation;
 pub mod species;
+mod standing_wave;
 mod stepping;
 mod strays;
 mod summary;
@@ -60,6 +62,7 @@ pub use level_update::LevelUpdate;
 pub use pacing::measurement_interval;
 pub use simulation::WeaklyCompressibleSph;
 pub use species::{Fluids, Species};
+pub use standing_wave::StandingWave;
 pub use system::{Drop, SphSystem};
 
 #[cfg(test)]

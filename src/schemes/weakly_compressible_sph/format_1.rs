@@ -85,6 +85,8 @@ fn summary(values: &[f64]) -> Result<Summary, LoadError> {
             count: head[1],
             pressure_jump: head[2],
             pressure_eos_jump: head[3],
+            pressure_jump_measured: f64::NAN,
+            pressure_balanced: f64::NAN,
             curvature: head[4],
         },
         kinetic: ThirdMeans::default(),

@@ -7,7 +7,8 @@ use super::frame_fields;
 use super::guard::Guard;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
-use super::quantities::{TIME, TIME_STEP};
+use super::quantities::{TIME, TIME_STEP, WAVE_AMPLITUDE};
+use super::standing_wave::WaveRecord;
 use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, Instant, SphSystem};
@@ -38,6 +39,7 @@ pub struct WeaklyCompressibleSph<const D: usize> {
     row: Row,
     guard: Guard<D>,
     summary: Summary,
+    wave: Option<WaveRecord>,
     course: Course,
 }
 
@@ -59,6 +61,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         method: BTreeMap<&'static str, String>,
     ) -> Self {
         let pace = Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 });
+        let wave = system.config.wave.clone().map(WaveRecord::new);
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
@@ -71,6 +74,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             resting: 0,
             row: Row::new(),
             summary: Summary::new(end_time),
+            wave,
             course: Course::new(pace, Phases::new(cpu_clock), method),
         };
         this.failure = this.begin().err();
@@ -122,12 +126,13 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         });
         self.row = row;
         let Clock { step, time } = self.clock();
-        self.summary.take_energy(time, contents.kinetic);
+        self.summary.take_energy(time, contents.inner_kinetic());
         let of = |name: &str| self.row_value(name);
         let jump = of("pressure_inside") - of("pressure_outside");
         let momentum = self.row[1..=D].iter().map(|m| m * m).sum::<f64>().sqrt();
-        let numbers = [jump, of("pressure_eos_jump"), of("curvature_mean"), of("curvature_std"), momentum];
-        self.summary.take(time >= 0.8 * self.end().time, numbers);
+        let jumps = [jump, of("pressure_eos_jump"), of("pressure_jump_measured"), of("pressure_balanced")];
+        let curvatures = [of("curvature_mean"), of("curvature_std")];
+        self.summary.take(time >= 0.8 * self.end().time, jumps, curvatures, momentum);
         let is_closed = !system.droplets.has_layer();
         if let Some(moments) = moments.filter(|_| is_closed) {
             let turned = self.summary.take_shape(time, moments.area_or_volume, deformation(&moments));
@@ -138,7 +143,11 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         // At fixed steps, so that the end of a run does not depend on what the series shows.
         let clock = self.clock();
         let last = self.course.pace.last;
-        if clock.step.is_multiple_of(measurement_interval(last)) || clock.step >= last {
+        let is_measured = clock.step.is_multiple_of(measurement_interval(last)) || clock.step >= last;
+        if let Some(wave) = &mut self.wave {
+            wave.take(&self.system, time, is_measured);
+        }
+        if is_measured {
             let measured = (crowded, self.row_value(if D == 2 { "area" } else { "volume" }));
             self.guard.measure(&self.system, &contents, measured, clock)?;
             let Fastest { speed, sound_speed, .. } = fastest(&self.system);
@@ -147,16 +156,16 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         Ok(())
     }
 
-    /// The largest speed u as u √(ρD/τ), with the diameter D of the ball of the measure at the start.
+    /// The largest speed u about the mean velocity as u √(ρD/τ), with the diameter D of the ball of the measure at the start.
     fn scaled_speed(&self) -> Option<ErrorEntry> {
         if self.system.droplets.has_layer() {
             return None;
         }
         let diameter = 2.0 * (D - 1) as f64 / self.whole_curvature();
         let config = &self.system.config;
-        let scaled =
-            self.system.flow.largest_speed() * (config.fluids.inside.density * diameter / config.tension).sqrt();
-        let reference = "0 for a drop at rest; u sqrt(rho D/tau)";
+        let scaled = self.system.flow.largest_relative_speed()
+            * (config.fluids.inside.density * diameter / config.tension).sqrt();
+        let reference = "0 for a drop at rest; u sqrt(rho D/tau), u about the mean velocity";
         scaled.is_finite().then(|| entry("speed", "scaled", scaled, self.clock().time, reference))
     }
 
@@ -308,6 +317,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     fn observables(&self) -> Observables {
         let mut row: Observables = vec![(&TIME, self.clock().time), (&TIME_STEP, self.time_of_part())];
         row.extend(names(D).into_iter().zip(self.row.iter().copied()));
+        row.extend(self.wave.as_ref().map(|wave| (&WAVE_AMPLITUDE, wave.amplitude)));
         row
     }
 
@@ -328,6 +338,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         state.put_count("resting_steps", self.resting);
         state.put_section("row", |section| save_row::<D>(&self.row, section));
         state.put_component("summary", &self.summary);
+        if let Some(wave) = &self.wave {
+            state.put_section("wave", |section| wave.save(section));
+        }
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
@@ -349,12 +362,16 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             true => Some(state.section("guard", |section| self.guard.load(section))?),
             false => None,
         };
+        let wave = match &self.wave {
+            Some(wave) => Some(state.section("wave", |section| wave.load(section))?),
+            None => None,
+        };
         self.system.load(state)?;
         // 2. From here on nothing fails.
         // An interrupt ends the run before its next step.
         let _ = self.system.derive();
         self.guard = guard.unwrap_or_else(|| Guard::new(&self.system));
-        self.failure = None;
+        (self.failure, self.wave) = (None, wave);
         (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
         (self.row, self.summary) = (row, summary.with_end(self.end_time));
         self.course.pace = pace;
@@ -378,6 +395,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         };
         let mut errors = self.summary.entries(D, self.clock().time, expected);
         errors.extend(self.scaled_speed());
+        errors.extend(self.wave.iter().flat_map(|wave| wave.errors(self.clock().time)));
         Report { errors, health: self.health(), diagnostics: self.diagnostics(), method: self.course.method.clone() }
     }
 

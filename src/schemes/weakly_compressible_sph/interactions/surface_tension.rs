@@ -54,7 +54,7 @@ impl SurfaceTension {
     }
 
     /// The δ of the force at a signed distance.
-    fn profile(&self, distance: f64) -> f64 {
+    pub fn profile(&self, distance: f64) -> f64 {
         let wide = smoothed_delta(distance, self.smoothing_length);
         if self.force != TensionForce::Balanced {
             return wide;

@@ -1,0 +1,175 @@
+//! Dimensionless numbers of a droplet scene: as they follow from it, and scenes that are given by them.
+
+use super::cases::Case;
+use super::numbers::{SceneNumbers, smallest_radius};
+use super::spec::{Balance, CaseName, Corners, Droplet, FluidSpec, Fluids, ForceChoice, NumbersSpec};
+use crate::scenes::shapes::{PlainShape, Shape};
+use crate::spec::{Coordinates, Given, Group, Preset, Violation};
+use serde_json::{Value, json};
+
+/// Speeds of sound of a scene that is given by numbers, by the least that keeps its fluids nearly incompressible.
+const STIFFNESS_MARGIN: f64 = 1.25;
+
+/// Relative difference of a given number from that of the scene beyond which they contradict each other.
+const SLACK: f64 = 1e-6;
+
+impl NumbersSpec {
+    /// The numbers of a scene, with the diameter D of its smallest drop, the fluid inside and a speed U.
+    pub(super) fn of(scene: &SceneNumbers, spec: &Droplet, speed: f64) -> Self {
+        let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
+        let diameter = 2.0 * scene.radius.unwrap_or(f64::NAN);
+        let (density, viscosity, tension) = (inside.density, inside.viscosity, scene.tension);
+        let weight = (density - outside.density).abs() * scene.gravity;
+        let known = |value: f64| value.is_finite().then_some(value);
+        Self {
+            laplace: known(tension * density * diameter / (viscosity * viscosity)),
+            ohnesorge: known(viscosity / (density * tension * diameter).sqrt()),
+            reynolds: known(density * speed * diameter / viscosity),
+            weber: known(density * speed * speed * diameter / tension),
+            capillary: known(viscosity * speed / tension),
+            bond: known(weight * diameter * diameter / tension),
+            density_ratio: known(outside.density / density),
+            viscosity_ratio: known(outside.viscosity / viscosity),
+            diameter_over_h: known(diameter / spec.spacing),
+            radius_over_h: known(0.5 * diameter / spec.spacing),
+        }
+    }
+
+    /// The numbers by their names; those that are not defined are left out.
+    pub fn named(&self) -> Vec<(&'static str, f64)> {
+        let values = [
+            self.laplace,
+            self.ohnesorge,
+            self.reynolds,
+            self.weber,
+            self.capillary,
+            self.bond,
+            self.density_ratio,
+            self.viscosity_ratio,
+            self.diameter_over_h,
+            self.radius_over_h,
+        ];
+        Self::names().into_iter().zip(values).filter_map(|(name, value)| Some((name, value?))).collect()
+    }
+
+    /// An error for each given number that contradicts the scene.
+    pub fn check(&self, scene: &Self, errors: &mut Vec<Violation>) {
+        let of_scene = scene.named();
+        for (name, given) in self.named() {
+            let own = of_scene.iter().find(|(of, _)| *of == name).map(|(_, value)| *value);
+            if own.is_some_and(|own| (given - own).abs() <= SLACK * own.abs().max(given.abs())) {
+                continue;
+            }
+            let detail = "the fluids, the tension, the shape and the spacing of the scene give another number; leave out \
+                          the number or what contradicts it";
+            let allowed = own.map_or(Value::Null, Value::from);
+            errors.push(Violation::new(format!("/numbers/{name}"), "conflict", detail, given, allowed));
+        }
+    }
+}
+
+/// The values that given numbers stand for: ρ = τ = 1 and, where no shape is given, R = 1. What is given beside them wins.
+pub(super) fn implied(given: Given) -> Preset {
+    let shape = given.read(Droplet::shape()).flatten();
+    let implied = shape.as_ref().and_then(Shape::dimension);
+    let dimension = given.read(Droplet::dimension()).flatten().or(implied).unwrap_or(2);
+    match dimension {
+        3 => implied_in::<3>(given, shape),
+        _ => implied_in::<2>(given, shape),
+    }
+}
+
+fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
+    let Some(numbers) = given.read(Droplet::numbers()).flatten() else { return Preset::default() };
+    let case = Case::new(given.read(Droplet::case()).unwrap_or(CaseName::Oscillating), D, 1.0);
+    let (shape, domain, radius) = match (shape, case.shape) {
+        (Some(shape), _) => {
+            let radius = smallest_radius::<D>(&shape);
+            (shape, None, radius)
+        }
+        // The case at the size R = 1.
+        (None, Some(own)) => {
+            let factor = smallest_radius::<D>(&own).map_or(1.0, |radius| 1.0 / radius);
+            (scaled(own, factor), Some(scaled_corners(case.domain, factor)), Some(1.0))
+        }
+        // A custom drop needs a shape.
+        (None, None) => return Preset::default(),
+    };
+    let Some(radius) = radius else { return Preset::default() };
+    let (diameter, tension) = (2.0 * radius, 1.0);
+    let laplace = numbers.laplace.map(|laplace| (diameter / laplace).sqrt());
+    let ohnesorge = numbers.ohnesorge.map(|ohnesorge| ohnesorge * diameter.sqrt());
+    let Some(viscosity) = laplace.or(ohnesorge) else { return Preset::default() };
+    let inside = FluidSpec { density: 1.0, viscosity, ..FluidSpec::default() };
+    let outside = FluidSpec {
+        density: numbers.density_ratio.unwrap_or(1.0),
+        viscosity: viscosity * numbers.viscosity_ratio.unwrap_or(1.0),
+        ..FluidSpec::default()
+    };
+    let gravity = numbers
+        .bond
+        .filter(|bond| *bond > 0.0)
+        .map_or(0.0, |bond| bond * tension / ((inside.density - outside.density).abs() * diameter * diameter));
+    let height = domain.as_ref().or(Some(&Case::new(CaseName::Oscillating, D, 1.0).domain)).map_or(0.0, longest_side);
+    let stiff = |fluid: FluidSpec| {
+        let square = 100.0 * (tension / (fluid.density * radius)).max(gravity * height);
+        FluidSpec { sound_speed: STIFFNESS_MARGIN * square.sqrt(), ..fluid }
+    };
+    let fall = Coordinates((0..D).map(|d| if d == 1 { -gravity } else { 0.0 }).collect());
+    let force = ForceChoice::Constant { acceleration: fall, balance: Balance::Mean };
+    let spacing = numbers.diameter_over_h.or(numbers.radius_over_h.map(|ratio| 2.0 * ratio));
+    Preset::default()
+        .set(Droplet::shape(), Some(shape))
+        .set_if(domain.is_some(), Droplet::domain(), domain)
+        .set(Droplet::surface_tension(), Some(tension))
+        .set(Droplet::fluids(), Fluids { inside: stiff(inside), outside: stiff(outside) })
+        .set_if(gravity > 0.0 && gravity.is_finite(), Droplet::body_force(), Some(force))
+        .set(Droplet::spacing(), diameter / spacing.unwrap_or(DIAMETER_OVER_H))
+}
+
+/// D/h where none is given.
+const DIAMETER_OVER_H: f64 = 25.6;
+
+fn longest_side(corners: &Corners) -> f64 {
+    corners.high.iter().zip(corners.low.iter()).map(|(high, low)| high - low).fold(0.0, f64::max)
+}
+
+fn times(numbers: &Coordinates, factor: f64) -> Coordinates {
+    Coordinates(numbers.iter().map(|x| factor * x).collect())
+}
+
+fn scaled_corners(Corners { low, high }: Corners, factor: f64) -> Corners {
+    Corners { low: times(&low, factor), high: times(&high, factor) }
+}
+
+/// The shape of a case about the origin, at another size.
+fn scaled(shape: Shape, factor: f64) -> Shape {
+    match shape {
+        Shape::Plain(PlainShape::Circle { center, radius }) => {
+            Shape::Plain(PlainShape::Circle { center, radius: factor * radius })
+        }
+        Shape::Plain(PlainShape::Sphere { center, radius }) => {
+            Shape::Plain(PlainShape::Sphere { center, radius: factor * radius })
+        }
+        Shape::Plain(PlainShape::Ellipse { center, semi_axes }) => {
+            Shape::Plain(PlainShape::Ellipse { center, semi_axes: times(&semi_axes, factor) })
+        }
+        Shape::Plain(PlainShape::Ellipsoid { center, semi_axes }) => {
+            Shape::Plain(PlainShape::Ellipsoid { center, semi_axes: times(&semi_axes, factor) })
+        }
+        other => other,
+    }
+}
+
+/// An error where numbers are given that do not make a scene.
+pub(super) fn check_given(spec: &Droplet, radius: Option<f64>, errors: &mut Vec<Violation>) {
+    let Some(numbers) = &spec.numbers else { return };
+    if numbers.laplace.is_none() && numbers.ohnesorge.is_none() {
+        let detail = "numbers make a scene with a Laplace number La or an Ohnesorge number Oh";
+        errors.push(Violation::new("/numbers/La", "required", detail, Value::Null, json!("a number > 0")));
+    }
+    if radius.is_none() {
+        let detail = "the size of a drop that is known by points or of a layer is not known before the run: numbers need a shape";
+        errors.push(Violation::new("/numbers", "conflict", detail, Value::Null, Value::Null));
+    }
+}

@@ -1,0 +1,76 @@
+//! Layers across the box, at rest or with a standing wave on both sides.
+
+use super::plan::DropletScene;
+use super::spec::Droplet;
+use crate::geometry::Vector;
+use crate::geometry::surfaces::WavyLayer;
+use crate::scenes::shapes::Shape;
+use crate::schemes::capillary_wave::CapillaryWave;
+use crate::schemes::weakly_compressible_sph::StandingWave;
+use crate::spec::Violation;
+use serde_json::json;
+use std::f64::consts::TAU;
+
+/// The layer that a shape stands for, in a box of a length along x.
+pub(super) fn layer_of(shape: &Shape, length: f64) -> Option<WavyLayer> {
+    let Shape::Layer { height, thickness, amplitude, wavelength, crest } = shape else { return None };
+    let wavelength = wavelength.unwrap_or(length);
+    Some(WavyLayer { height: *height, thickness: *thickness, amplitude: *amplitude, wavelength, crest: *crest })
+}
+
+/// Relative difference of the box from a whole number of waves.
+const WAVE_SLACK: f64 = 1e-9;
+
+/// Checks that a layer fits into a box; its shape gets the wavelength.
+pub(super) fn check_layer<const D: usize>(shape: &mut Shape, lengths: &Vector<D>, errors: &mut Vec<Violation>) {
+    let got = shape.clone();
+    let Shape::Layer { thickness, amplitude, wavelength, .. } = shape else { return };
+    let wavelength = *wavelength.get_or_insert(lengths[0]);
+    let waves = lengths[0] / wavelength;
+    if (waves - waves.round()).abs() > WAVE_SLACK * waves || waves < 0.5 {
+        let detail = "the box is not a whole number of waves long";
+        let allowed = json!(lengths[0] / waves.round().max(1.0));
+        errors.push(Violation::new("/shape/wavelength", "conflict", detail, wavelength, allowed));
+    }
+    if 2.0 * *amplitude >= *thickness {
+        let detail = "the sides of the layer would meet in the troughs";
+        let allowed = format!("a number < {}", 0.5 * *thickness);
+        errors.push(Violation::new("/shape/amplitude", "range", detail, *amplitude, allowed));
+    }
+    if *thickness + 2.0 * *amplitude >= lengths[1] {
+        let detail = "the layer is as thick as the box is high";
+        errors.push(Violation::new(
+            "/shape",
+            "conflict",
+            detail,
+            crate::spec::Parameter::to_json(&got),
+            json!(lengths[1]),
+        ));
+    }
+}
+
+/// The wave of a layer, with linear theory where it is exact: equal kinematic viscosities, no force from outside.
+pub(super) fn standing_wave(shape: &Shape, spec: &Droplet, tension: f64, length: f64) -> Option<StandingWave> {
+    let layer = layer_of(shape, length).filter(|layer| layer.amplitude > 0.0)?;
+    let wavenumber = TAU / layer.wavelength;
+    let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
+    let kinematic = [inside, outside].map(|fluid| fluid.viscosity / fluid.density);
+    let is_alike = (kinematic[0] - kinematic[1]).abs() <= 1e-9 * kinematic[0];
+    let is_free = spec.body_force.as_ref().is_none_or(|force| *force == super::spec::ForceChoice::None);
+    let theory = (is_alike && is_free && tension > 0.0)
+        .then(|| CapillaryWave::new(wavenumber, [inside.density, outside.density], kinematic[0], tension));
+    Some(StandingWave { wavenumber, crest: layer.crest, amplitude: layer.amplitude, theory })
+}
+
+impl<const D: usize> DropletScene<D> {
+    /// Signed distance from the nearest image of a layer.
+    pub(super) fn distance_from_layer(&self, layer: &WavyLayer, x: &Vector<D>) -> f64 {
+        let height = self.lengths()[1];
+        let distance = |turns: f64| {
+            let mut image = *x;
+            image[1] += turns * height;
+            layer.signed_distance(&image)
+        };
+        [-1.0, 0.0, 1.0].into_iter().map(distance).fold(f64::INFINITY, f64::min)
+    }
+}
