@@ -21,6 +21,7 @@ mod checks;
 mod column;
 pub mod config;
 mod dcpse;
+pub mod dimensionless;
 mod droplets;
 mod equations;
 mod flow_state;
@@ -50,6 +51,7 @@ mod summary;
 mod system;
 pub mod time_step;
 mod volume_form;
+mod wave_record;
 
 pub use config::{
     DensityMethod, Discretization, Geometry, Integrator, PressureConfig, PressureForm, SphConfig, Volumes,

@@ -4,8 +4,9 @@ use super::cases::Case;
 use super::numbers::{SceneNumbers, smallest_radius};
 use super::spec::{Balance, CaseName, Corners, Droplet, FluidSpec, Fluids, ForceChoice, NumbersSpec};
 use crate::scenes::shapes::{PlainShape, Shape};
-use crate::spec::{Coordinates, Given, Group, Preset, Violation};
-use serde_json::{Value, json};
+use crate::schemes::weakly_compressible_sph::dimensionless::{DimensionlessNumbers, Scales};
+use crate::spec::{Coordinates, Given, Group, Parameter, Preset, Violation};
+use serde_json::Value;
 
 /// Speeds of sound of a scene that is given by numbers, by the least that keeps its fluids nearly incompressible.
 const STIFFNESS_MARGIN: f64 = 1.25;
@@ -14,24 +15,28 @@ const STIFFNESS_MARGIN: f64 = 1.25;
 const SLACK: f64 = 1e-6;
 
 impl NumbersSpec {
-    /// The numbers of a scene, with the diameter D of its smallest drop, the fluid inside and a speed U.
+    /// The numbers of a scene, with the diameter of its smallest drop and a speed.
     pub(super) fn of(scene: &SceneNumbers, spec: &Droplet, speed: f64) -> Self {
-        let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
-        let diameter = 2.0 * scene.radius.unwrap_or(f64::NAN);
-        let (density, viscosity, tension) = (inside.density, inside.viscosity, scene.tension);
-        let weight = (density - outside.density).abs() * scene.gravity;
+        let numbers = DimensionlessNumbers::from(Scales {
+            fluids: spec.fluids.planned(),
+            tension: scene.tension,
+            diameter: 2.0 * scene.radius.unwrap_or(f64::NAN),
+            speed,
+            gravity: scene.gravity,
+            spacing: spec.spacing,
+        });
         let known = |value: f64| value.is_finite().then_some(value);
         Self {
-            laplace: known(tension * density * diameter / (viscosity * viscosity)),
-            ohnesorge: known(viscosity / (density * tension * diameter).sqrt()),
-            reynolds: known(density * speed * diameter / viscosity),
-            weber: known(density * speed * speed * diameter / tension),
-            capillary: known(viscosity * speed / tension),
-            bond: known(weight * diameter * diameter / tension),
-            density_ratio: known(outside.density / density),
-            viscosity_ratio: known(outside.viscosity / viscosity),
-            diameter_over_h: known(diameter / spec.spacing),
-            radius_over_h: known(0.5 * diameter / spec.spacing),
+            laplace: known(numbers.laplace),
+            ohnesorge: known(numbers.ohnesorge),
+            reynolds: known(numbers.reynolds),
+            weber: known(numbers.weber),
+            capillary: known(numbers.capillary),
+            bond: known(numbers.bond),
+            density_ratio: known(numbers.density_ratio),
+            viscosity_ratio: known(numbers.viscosity_ratio),
+            diameter_over_h: known(numbers.diameter_over_h),
+            radius_over_h: known(numbers.radius_over_h),
         }
     }
 
@@ -97,7 +102,7 @@ fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
     };
     let Some(radius) = radius else { return Preset::default() };
     let (diameter, tension) = (2.0 * radius, 1.0);
-    let laplace = numbers.laplace.map(|laplace| (diameter / laplace).sqrt());
+    let laplace = numbers.laplace.filter(|laplace| *laplace > 0.0).map(|laplace| (diameter / laplace).sqrt());
     let ohnesorge = numbers.ohnesorge.map(|ohnesorge| ohnesorge * diameter.sqrt());
     let Some(viscosity) = laplace.or(ohnesorge) else { return Preset::default() };
     let inside = FluidSpec { density: 1.0, viscosity, ..FluidSpec::default() };
@@ -161,15 +166,23 @@ fn scaled(shape: Shape, factor: f64) -> Shape {
     }
 }
 
-/// An error where numbers are given that do not make a scene.
-pub(super) fn check_given(spec: &Droplet, radius: Option<f64>, errors: &mut Vec<Violation>) {
-    let Some(numbers) = &spec.numbers else { return };
-    if numbers.laplace.is_none() && numbers.ohnesorge.is_none() {
-        let detail = "numbers make a scene with a Laplace number La or an Ohnesorge number Oh";
-        errors.push(Violation::new("/numbers/La", "required", detail, Value::Null, json!("a number > 0")));
+/// Checks the numbers that are given against the scene; the spec gets all of them.
+pub(super) fn complete(spec: &mut Droplet, scene: &SceneNumbers, errors: &mut Vec<Violation>) {
+    let found = NumbersSpec::of(scene, spec, scene.expected_inner_speed(spec));
+    if let Some(given) = &spec.numbers {
+        // Without tension and viscosity neither is defined.
+        let is_open = given.laplace.is_none() && given.ohnesorge.is_none();
+        if is_open && found.laplace.or(found.ohnesorge).is_some() {
+            let detail = "numbers make a scene with a Laplace number La or an Ohnesorge number Oh";
+            errors.push(Violation::new("/numbers/La", "required", detail, Value::Null, "a number > 0"));
+        }
+        if scene.radius.is_none() {
+            let detail =
+                "the size of a drop that is known by points is not known before the run: numbers need another shape";
+            errors.push(Violation::new("/numbers", "conflict", detail, given.to_json(), Value::Null));
+        } else {
+            given.check(&found, errors);
+        }
     }
-    if radius.is_none() {
-        let detail = "the size of a drop that is known by points or of a layer is not known before the run: numbers need a shape";
-        errors.push(Violation::new("/numbers", "conflict", detail, Value::Null, Value::Null));
-    }
+    spec.numbers = scene.radius.map(|_| found);
 }

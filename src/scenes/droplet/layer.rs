@@ -1,13 +1,12 @@
 //! Layers across the box, at rest or with a standing wave on both sides.
 
-use super::plan::DropletScene;
-use super::spec::Droplet;
+use super::spec::{Droplet, ForceChoice};
 use crate::geometry::Vector;
 use crate::geometry::surfaces::WavyLayer;
 use crate::scenes::shapes::Shape;
 use crate::schemes::capillary_wave::CapillaryWave;
 use crate::schemes::weakly_compressible_sph::StandingWave;
-use crate::spec::Violation;
+use crate::spec::{Parameter, Violation};
 use serde_json::json;
 use std::f64::consts::TAU;
 
@@ -39,13 +38,7 @@ pub(super) fn check_layer<const D: usize>(shape: &mut Shape, lengths: &Vector<D>
     }
     if *thickness + 2.0 * *amplitude >= lengths[1] {
         let detail = "the layer is as thick as the box is high";
-        errors.push(Violation::new(
-            "/shape",
-            "conflict",
-            detail,
-            crate::spec::Parameter::to_json(&got),
-            json!(lengths[1]),
-        ));
+        errors.push(Violation::new("/shape", "conflict", detail, got.to_json(), json!(lengths[1])));
     }
 }
 
@@ -56,21 +49,18 @@ pub(super) fn standing_wave(shape: &Shape, spec: &Droplet, tension: f64, length:
     let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
     let kinematic = [inside, outside].map(|fluid| fluid.viscosity / fluid.density);
     let is_alike = (kinematic[0] - kinematic[1]).abs() <= 1e-9 * kinematic[0];
-    let is_free = spec.body_force.as_ref().is_none_or(|force| *force == super::spec::ForceChoice::None);
+    let is_free = spec.body_force.as_ref().is_none_or(|force| *force == ForceChoice::None);
     let theory = (is_alike && is_free && tension > 0.0)
         .then(|| CapillaryWave::new(wavenumber, [inside.density, outside.density], kinematic[0], tension));
     Some(StandingWave { wavenumber, crest: layer.crest, amplitude: layer.amplitude, theory })
 }
 
-impl<const D: usize> DropletScene<D> {
-    /// Signed distance from the nearest image of a layer.
-    pub(super) fn distance_from_layer(&self, layer: &WavyLayer, x: &Vector<D>) -> f64 {
-        let height = self.lengths()[1];
-        let distance = |turns: f64| {
-            let mut image = *x;
-            image[1] += turns * height;
-            layer.signed_distance(&image)
-        };
-        [-1.0, 0.0, 1.0].into_iter().map(distance).fold(f64::INFINITY, f64::min)
-    }
+/// Signed distance from the nearest image of a layer, in a box of a height.
+pub(super) fn distance_from_layer<const D: usize>(layer: &WavyLayer, height: f64, x: &Vector<D>) -> f64 {
+    let distance = |turns: f64| {
+        let mut image = *x;
+        image[1] += turns * height;
+        layer.signed_distance(&image)
+    };
+    [-1.0, 0.0, 1.0].into_iter().map(distance).fold(f64::INFINITY, f64::min)
 }

@@ -4,7 +4,7 @@ use super::cases::Case;
 use super::dimensionless;
 use super::flow::{FlowPlan, body_force};
 use super::formulation::{Scope, level_and_curvature, pressures};
-use super::layer::{check_layer, layer_of, standing_wave};
+use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave};
 use super::numbers::SceneNumbers;
 use super::spec::{
     Corners, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen,
@@ -24,8 +24,8 @@ use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem,
-    TensionForce, WeaklyCompressibleSph, measurement_interval,
+    DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
+    WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{Finding, OutputPlan, Quantity, Simulation};
 use crate::spec::{Coordinates, Parameter, Violation};
@@ -184,7 +184,6 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, &mut errors));
     let speeds = [gravity, velocity.norm()];
     let numbers = SceneNumbers::new(shape.as_ref().map(|(shape, _)| shape), tension, speeds, &lengths);
-    let expected_inner_speed = numbers.expected_inner_speed(&spec);
     let expected_speed = numbers.expected_speed(&spec);
     let wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, lengths[0]));
     let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
@@ -199,12 +198,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         errors.push(Violation::new("/domain", "range", error.to_string(), got, error.least));
     }
     numbers.check_sound_speeds(&spec, &mut errors);
-    let found = NumbersSpec::of(&numbers, &spec, expected_inner_speed);
-    dimensionless::check_given(&spec, numbers.radius, &mut errors);
-    if let Some(given) = &spec.numbers {
-        given.check(&found, &mut errors);
-    }
-    spec.numbers = numbers.radius.map(|_| found);
+    dimensionless::complete(&mut spec, &numbers, &mut errors);
     let Some((shape, points)) = shape.filter(|_| errors.is_empty()) else {
         return Err(errors);
     };
@@ -238,7 +232,7 @@ fn sph_config<const D: usize>(
         smoothing_length,
         pressure,
         kernel: flow.kernel,
-        fluids: Fluids { inside: Fluid::from(&spec.fluids.inside), outside: Fluid::from(&spec.fluids.outside) },
+        fluids: spec.fluids.planned(),
         tension: *spec.surface_tension.get_or_insert(case.tension),
         tension_force: match spec.tension_force {
             TensionWord::Balanced => TensionForce::Balanced,
@@ -447,7 +441,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let positions = self.lattice.positions(&self.low, &lengths);
         let (level, measure) = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
             let area = lengths.product() / lengths[1];
-            (positions.iter().map(|x| self.distance_from_layer(&layer, x)).collect(), layer.thickness * area)
+            (positions.iter().map(|x| distance_from_layer(&layer, lengths[1], x)).collect(), layer.thickness * area)
         } else if self.clouds.is_empty() {
             let surface = self.shape.surface::<D>("/shape")?;
             (self.levels(surface.as_ref(), &positions), surface.area_or_volume())

@@ -138,7 +138,7 @@ crate::group! {
     /// speed that is expected.
     pub struct NumbersSpec: Default {
         /// Laplace number τρD/η²
-        laplace as "La": Option<f64>, in POSITIVE;
+        laplace as "La": Option<f64>, in NOT_NEGATIVE;
         /// Ohnesorge number η/√(ρτD), which is 1/√La
         ohnesorge as "Oh": Option<f64>, in NOT_NEGATIVE;
         /// Reynolds number ρUD/η

@@ -94,6 +94,7 @@ fn summary(values: &[f64]) -> Result<Summary, LoadError> {
         curvature_std: head[6],
         least_curvature_std: head[7],
         momentum: head[8],
+        largest_speed: 0.0,
         droplets: head[9],
         measure: head[10],
         before_last: shape([head[11], head[12]]),

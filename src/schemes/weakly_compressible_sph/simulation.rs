@@ -1,18 +1,21 @@
 //! Two fluids step by step.
 
 use super::checks::LIMITS;
+use super::config::SphConfig;
+use super::dimensionless::{DimensionlessNumbers, Scales};
 use super::droplets::ball_curvature;
 use super::format_1;
 use super::frame_fields;
 use super::guard::Guard;
+use super::interactions::BodyForce;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
 use super::quantities::{TIME, TIME_STEP, WAVE_AMPLITUDE};
-use super::standing_wave::WaveRecord;
 use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, Instant, SphSystem};
 use super::time_step::{StepLimit, longest_step};
+use super::wave_record::WaveRecord;
 use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, entry, support_diagnostics};
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
 use crate::simulation::{
@@ -148,6 +151,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             wave.take(&self.system, time, is_measured);
         }
         if is_measured {
+            self.summary.largest_speed = self.summary.largest_speed.max(self.system.flow.largest_relative_speed());
             let measured = (crowded, self.row_value(if D == 2 { "area" } else { "volume" }));
             self.guard.measure(&self.system, &contents, measured, clock)?;
             let Fastest { speed, sound_speed, .. } = fastest(&self.system);
@@ -419,6 +423,24 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 }
 
 impl<const D: usize> WeaklyCompressibleSph<D> {
+    /// Numbers of the run, with the largest speed that was measured.
+    fn numbers(&self) -> DimensionlessNumbers {
+        let SphConfig { fluids, tension, spacing, wave, body_force, .. } = &self.system.config;
+        let largest = self.system.droplets.ball_curvatures.iter().copied().fold(0.0, f64::max);
+        let diameter = match wave {
+            Some(wave) => 2.0 * std::f64::consts::PI / wave.wavenumber,
+            None => 2.0 * (D - 1) as f64 / largest,
+        };
+        DimensionlessNumbers::from(Scales {
+            fluids: *fluids,
+            tension: *tension,
+            diameter,
+            speed: self.summary.largest_speed,
+            gravity: body_force.as_ref().map_or(0.0, BodyForce::constant_strength),
+            spacing: *spacing,
+        })
+    }
+
     fn diagnostics(&self) -> Vec<Diagnostic> {
         let mut diagnostics = Vec::new();
         if let Some(interface) = self.system.interface.level_set() {
@@ -429,6 +451,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         if let Some(flow) = self.system.equations.fits() {
             diagnostics.extend(support_diagnostics(FLOW_FITS, &flow.fit_diagnostics));
         }
+        diagnostics.extend(self.numbers().diagnostics());
         let doc = "Particles without a neighbor of their own fluid that took the side of their neighbors.";
         diagnostics.push(Diagnostic::count("strays.absorbed", self.system.strays.absorbed, doc));
         diagnostics

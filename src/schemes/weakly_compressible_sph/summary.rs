@@ -17,6 +17,8 @@ pub(super) struct Summary {
     pub least_curvature_std: f64,
     /// Largest Σ m u.
     pub momentum: f64,
+    /// Largest speed about the mean velocity.
+    pub largest_speed: f64,
     /// Connected components of the inner fluid.
     pub droplets: f64,
     /// Enclosed area or volume in the last measured state; NaN before.
@@ -168,6 +170,7 @@ impl Component for Summary {
         section.put_optional("curvature_std", known(self.curvature_std));
         section.put_optional("least_curvature_std", known(self.least_curvature_std));
         section.put_real("momentum", self.momentum);
+        section.put_real("largest_speed", self.largest_speed);
         section.put_real("droplets", self.droplets);
         section.put_optional("measure", known(self.measure));
         section.put_component("before_last", &self.before_last);
@@ -196,6 +199,8 @@ impl Component for Summary {
             curvature_std: or_nan("curvature_std")?,
             least_curvature_std: section.optional("least_curvature_std")?.unwrap_or(f64::INFINITY),
             momentum: section.real("momentum")?,
+            // Version 0.2.0 did not measure it.
+            largest_speed: if section.has("largest_speed") { section.real("largest_speed")? } else { 0.0 },
             droplets: section.real("droplets")?,
             measure: or_nan("measure")?,
             before_last: section.component("before_last")?,
@@ -218,6 +223,7 @@ impl Summary {
             curvature_std: f64::NAN,
             least_curvature_std: f64::INFINITY,
             momentum: 0.0,
+            largest_speed: 0.0,
             droplets: 1.0,
             measure: f64::NAN,
             before_last: Shape::UNKNOWN,

@@ -32,9 +32,9 @@ impl TensionForce {
 }
 
 /// Share of δ_{ε/2} in the δ of the balanced force, the rest is δ_ε. A force that is spread over the width ε acts on the
-/// interface like ∫ e^{−k|φ|} δ dφ at the wave number k, and generates vorticity as wide: both lower frequency and decay.
-/// With all of δ_ε decay is 10.6 % low at 13 particles a radius, with this share 6 % (measured, La = 8000).
-const NARROW_SHARE: f64 = 0.15;
+/// interface like ∫ e^{−k|φ|} δ dφ at the wave number k, and generates vorticity as wide: both lower frequency and decay. With
+/// more of the narrow δ the decay of resolved drops comes out too high (measured; docs/results/droplet-notes.md).
+const NARROW_SHARE: f64 = 0.1;
 
 /// Surface tension: −(τ/ρ) (κ − κ₀) n δ.
 #[derive(Debug, Clone, Copy, PartialEq)]
