@@ -115,6 +115,8 @@ fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
         .bond
         .filter(|bond| *bond > 0.0)
         .map_or(0.0, |bond| bond * tension / ((inside.density - outside.density).abs() * diameter * diameter));
+    // Without a difference of densities no gravity has that number, and the check of the numbers says so.
+    let gravity = if gravity.is_finite() { gravity } else { 0.0 };
     let height = domain.as_ref().or(Some(&Case::new(CaseName::Oscillating, D, 1.0).domain)).map_or(0.0, longest_side);
     let stiff = |fluid: FluidSpec| {
         let square = 100.0 * (tension / (fluid.density * radius)).max(gravity * height);
@@ -128,7 +130,7 @@ fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
         .set_if(domain.is_some(), Droplet::domain(), domain)
         .set(Droplet::surface_tension(), Some(tension))
         .set(Droplet::fluids(), Fluids { inside: stiff(inside), outside: stiff(outside) })
-        .set_if(gravity > 0.0 && gravity.is_finite(), Droplet::body_force(), Some(force))
+        .set_if(gravity > 0.0, Droplet::body_force(), Some(force))
         .set(Droplet::spacing(), diameter / spacing.unwrap_or(DIAMETER_OVER_H))
 }
 
