@@ -1,9 +1,9 @@
 //! Dimensionless numbers of a droplet scene: as they follow from it, and scenes that are given by them.
 
 use super::cases::Case;
-use super::numbers::{SceneNumbers, smallest_radius};
+use super::numbers::{SceneNumbers, least_sound_speed, smallest_radius};
 use super::spec::{Balance, CaseName, Corners, Droplet, FluidSpec, Fluids, ForceChoice, NumbersSpec};
-use crate::scenes::shapes::{PlainShape, Shape};
+use crate::scenes::shapes::Shape;
 use crate::schemes::weakly_compressible_sph::dimensionless::{DimensionlessNumbers, Scales};
 use crate::spec::{Coordinates, Given, Group, Parameter, Preset, Violation};
 use serde_json::Value;
@@ -86,19 +86,23 @@ pub(super) fn implied(given: Given) -> Preset {
 
 fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
     let Some(numbers) = given.read(Droplet::numbers()).flatten() else { return Preset::default() };
-    let case = Case::new(given.read(Droplet::case()).unwrap_or(CaseName::Oscillating), D, 1.0);
+    let name = given.read(Droplet::case()).unwrap_or(CaseName::Oscillating);
+    let case = Case::new(name, D, 1.0);
+    let given_box = given.read(Droplet::domain()).flatten();
     let (shape, domain, radius) = match (shape, case.shape) {
-        (Some(shape), _) => {
+        (Some(mut shape), _) => {
+            let corners = given_box.unwrap_or(case.domain);
+            name_wavelength(&mut shape, &corners);
             let radius = smallest_radius::<D>(&shape);
-            (shape, None, radius)
+            (shape, corners, radius)
         }
-        // The case at the size R = 1.
-        (None, Some(own)) => {
+        // The case at the size R = 1. The pulse and the steps of a dividing drop are made for its own size.
+        (None, Some(own)) if name != CaseName::Dividing => {
             let factor = smallest_radius::<D>(&own).map_or(1.0, |radius| 1.0 / radius);
-            (scaled(own, factor), Some(scaled_corners(case.domain, factor)), Some(1.0))
+            (scaled::<D>(own, factor), given_box.unwrap_or_else(|| scaled_corners(case.domain, factor)), Some(1.0))
         }
         // A custom drop needs a shape.
-        (None, None) => return Preset::default(),
+        (None, _) => return Preset::default(),
     };
     let Some(radius) = radius else { return Preset::default() };
     let (diameter, tension) = (2.0 * radius, 1.0);
@@ -117,17 +121,17 @@ fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
         .map_or(0.0, |bond| bond * tension / ((inside.density - outside.density).abs() * diameter * diameter));
     // Without a difference of densities no gravity has that number, and the check of the numbers says so.
     let gravity = if gravity.is_finite() { gravity } else { 0.0 };
-    let height = domain.as_ref().or(Some(&Case::new(CaseName::Oscillating, D, 1.0).domain)).map_or(0.0, longest_side);
+    let fall = gravity * longest_side(&domain);
     let stiff = |fluid: FluidSpec| {
-        let square = 100.0 * (tension / (fluid.density * radius)).max(gravity * height);
-        FluidSpec { sound_speed: STIFFNESS_MARGIN * square.sqrt(), ..fluid }
+        let least = least_sound_speed(&fluid, Some(radius), tension, fall);
+        FluidSpec { sound_speed: STIFFNESS_MARGIN * least, ..fluid }
     };
-    let fall = Coordinates((0..D).map(|d| if d == 1 { -gravity } else { 0.0 }).collect());
-    let force = ForceChoice::Constant { acceleration: fall, balance: Balance::Mean };
+    let acceleration = Coordinates((0..D).map(|d| if d == 1 { -gravity } else { 0.0 }).collect());
+    let force = ForceChoice::Constant { acceleration, balance: Balance::Mean };
     let spacing = numbers.diameter_over_h.or(numbers.radius_over_h.map(|ratio| 2.0 * ratio));
     Preset::default()
         .set(Droplet::shape(), Some(shape))
-        .set_if(domain.is_some(), Droplet::domain(), domain)
+        .set(Droplet::domain(), Some(domain))
         .set(Droplet::surface_tension(), Some(tension))
         .set(Droplet::fluids(), Fluids { inside: stiff(inside), outside: stiff(outside) })
         .set_if(gravity > 0.0, Droplet::body_force(), Some(force))
@@ -149,22 +153,21 @@ fn scaled_corners(Corners { low, high }: Corners, factor: f64) -> Corners {
     Corners { low: times(&low, factor), high: times(&high, factor) }
 }
 
-/// The shape of a case about the origin, at another size.
-fn scaled(shape: Shape, factor: f64) -> Shape {
-    match shape {
-        Shape::Plain(PlainShape::Circle { center, radius }) => {
-            Shape::Plain(PlainShape::Circle { center, radius: factor * radius })
+/// The ball or ellipsoid of a case about the origin, at another size.
+fn scaled<const D: usize>(shape: Shape, factor: f64) -> Shape {
+    match (shape.as_ball::<D>(), shape.quadric::<D>()) {
+        (Some(ball), _) => Shape::ball(D, factor * ball.radius),
+        (None, Some((_, axes))) => {
+            Shape::ellipsoid(D, std::array::from_fn(|d| factor * axes.get(d).copied().unwrap_or(1.0)))
         }
-        Shape::Plain(PlainShape::Sphere { center, radius }) => {
-            Shape::Plain(PlainShape::Sphere { center, radius: factor * radius })
-        }
-        Shape::Plain(PlainShape::Ellipse { center, semi_axes }) => {
-            Shape::Plain(PlainShape::Ellipse { center, semi_axes: times(&semi_axes, factor) })
-        }
-        Shape::Plain(PlainShape::Ellipsoid { center, semi_axes }) => {
-            Shape::Plain(PlainShape::Ellipsoid { center, semi_axes: times(&semi_axes, factor) })
-        }
-        other => other,
+        (None, None) => shape,
+    }
+}
+
+/// Waves whose length is not given are as long as the box.
+fn name_wavelength(shape: &mut Shape, corners: &Corners) {
+    if let (Shape::Layer { wavelength, .. }, [low, ..], [high, ..]) = (shape, &corners.low[..], &corners.high[..]) {
+        wavelength.get_or_insert(high - low);
     }
 }
 

@@ -42,15 +42,33 @@ pub(super) fn check_layer<const D: usize>(shape: &mut Shape, lengths: &Vector<D>
     }
 }
 
-/// The wave of a layer, with linear theory where it is exact: equal kinematic viscosities, no force from outside.
-pub(super) fn standing_wave(shape: &Shape, spec: &Droplet, tension: f64, length: f64) -> Option<StandingWave> {
-    let layer = layer_of(shape, length).filter(|layer| layer.amplitude > 0.0)?;
+/// Where linear theory of two unbounded layers holds for a wave of wave number k.
+struct Validity {
+    /// Least k times the thickness of either layer: ω of the waves on two sides differs by e^(−kd), .2 % at 2π.
+    depth: f64,
+    /// Largest k a₀: ω falls by (k a₀)²/16.
+    steepness: f64,
+}
+
+const VALIDITY: Validity = Validity { depth: TAU, steepness: 0.1 };
+
+/// The wave of a layer, with linear theory where it holds: equal kinematic viscosities, no force from outside, deep layers and
+/// flat waves.
+pub(super) fn standing_wave<const D: usize>(
+    shape: &Shape,
+    spec: &Droplet,
+    tension: f64,
+    lengths: &Vector<D>,
+) -> Option<StandingWave> {
+    let layer = layer_of(shape, lengths[0]).filter(|layer| layer.amplitude > 0.0)?;
     let wavenumber = TAU / layer.wavelength;
     let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
     let kinematic = [inside, outside].map(|fluid| fluid.viscosity / fluid.density);
     let is_alike = (kinematic[0] - kinematic[1]).abs() <= 1e-9 * kinematic[0];
     let is_free = spec.body_force.as_ref().is_none_or(|force| *force == ForceChoice::None);
-    let theory = (is_alike && is_free && tension > 0.0)
+    let thinner = layer.thickness.min(lengths[1] - layer.thickness);
+    let is_linear = wavenumber * thinner >= VALIDITY.depth && wavenumber * layer.amplitude <= VALIDITY.steepness;
+    let theory = (is_alike && is_free && is_linear && tension > 0.0)
         .then(|| CapillaryWave::new(wavenumber, [inside.density, outside.density], kinematic[0], tension));
     Some(StandingWave { wavenumber, crest: layer.crest, amplitude: layer.amplitude, theory })
 }

@@ -62,10 +62,9 @@ impl SceneNumbers {
         (2.0 * self.gravity * self.length).sqrt()
     }
 
-    /// The least speed of sound of a fluid: c² = 100 max(τ/(ρR), gL).
+    /// The least speed of sound of a fluid of the scene.
     pub fn least_sound_speed(&self, fluid: &FluidSpec) -> f64 {
-        let capillary = self.radius.map_or(0.0, |radius| self.tension / (fluid.density * radius));
-        (TUNING.stiffness * capillary.max(self.gravity * self.length)).sqrt()
+        least_sound_speed(fluid, self.radius, self.tension, self.gravity * self.length)
     }
 
     /// A warning for each fluid that is softer than c² = 100 max(τ/(ρR), gL).
@@ -97,6 +96,12 @@ impl SceneNumbers {
             }
         }
     }
+}
+
+/// The least speed of sound that keeps a fluid nearly incompressible: c² = 100 max(τ/(ρR), gL). `fall` is gL.
+pub(super) fn least_sound_speed(fluid: &FluidSpec, radius: Option<f64>, tension: f64, fall: f64) -> f64 {
+    let capillary = radius.map_or(0.0, |radius| tension / (fluid.density * radius));
+    (TUNING.stiffness * capillary.max(fall)).sqrt()
 }
 
 /// Radius of the smallest ball that has the area or volume of a part of a shape; half the length of the waves of a layer.

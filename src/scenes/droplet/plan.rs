@@ -185,10 +185,10 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let speeds = [gravity, velocity.norm()];
     let numbers = SceneNumbers::new(shape.as_ref().map(|(shape, _)| shape), tension, speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
-    let wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, lengths[0]));
     let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
     let mut config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
-    (config.start_velocity, config.wave) = (velocity, wave);
+    config.start_velocity = velocity;
+    config.wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     if is_box
         && lattice.count() >= 1.0
@@ -466,17 +466,13 @@ impl<const D: usize> DropletScene<D> {
     /// Particles within a band of this width about the drop, about: that of a ball of its measure, which is taken for a fifth of the
     /// box where it is not known.
     fn near(&self, width: f64) -> f64 {
-        if let Shape::Layer { .. } = self.shape {
-            let lengths = self.lengths();
-            let area = 2.0 * lengths.product() / lengths[1];
-            return (area * width / self.config.spacing.powi(D as i32)).min(self.count() as f64);
-        }
+        let lengths = self.lengths();
         let surface = self.shape.surface::<D>("/shape");
-        let measure = surface.map_or_else(|_| self.lengths().product() / 5.0, |surface| surface.area_or_volume());
-        let area = if D == 2 {
-            2.0 * (std::f64::consts::PI * measure).sqrt()
-        } else {
-            (36.0 * std::f64::consts::PI).cbrt() * measure.powf(2.0 / 3.0)
+        let measure = surface.map_or_else(|_| lengths.product() / 5.0, |surface| surface.area_or_volume());
+        let area = match self.shape {
+            Shape::Layer { .. } => 2.0 * lengths.product() / lengths[1],
+            _ if D == 2 => 2.0 * (std::f64::consts::PI * measure).sqrt(),
+            _ => (36.0 * std::f64::consts::PI).cbrt() * measure.powf(2.0 / 3.0),
         };
         (area * width / self.config.spacing.powi(D as i32)).min(self.count() as f64)
     }

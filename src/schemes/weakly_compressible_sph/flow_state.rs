@@ -122,8 +122,12 @@ impl<const D: usize> FlowState<D> {
     pub fn largest_relative_speed(&self) -> f64 {
         let mass: f64 = (0..self.count()).map(|i| self.mass(i)).sum();
         let momentum: Vector<D> = self.velocity.iter().enumerate().map(|(i, u)| u * self.mass(i)).sum();
-        let mean = momentum / mass;
-        self.velocity.iter().map(|u| (u - mean).norm_squared()).fold(0.0, f64::max).sqrt()
+        self.largest_speed_about(&(momentum / mass))
+    }
+
+    /// The largest speed about a velocity.
+    pub fn largest_speed_about(&self, velocity: &Vector<D>) -> f64 {
+        self.velocity.iter().map(|u| (u - velocity).norm_squared()).fold(0.0, f64::max).sqrt()
     }
 
     /// The largest speed.

@@ -232,13 +232,15 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             let Clock { step, time } = next;
             return Err(StepError::TooFast { particle, speed, sound_speed, time_step, stable, bound, step, time });
         }
+        // In the frame of the start.
+        let about_start = system.flow.largest_speed_about(&system.config.start_velocity);
         self.resting = match system.config.rest_below {
-            Some(limit) if largest_speed < limit => self.resting + 1,
+            Some(limit) if about_start < limit => self.resting + 1,
             _ => 0,
         };
         if self.resting == PACING.steps_of_rest {
             let message =
-                format!("no particle has been faster than {largest_speed:.3e} for {} steps", PACING.steps_of_rest);
+                format!("no particle has been faster than {about_start:.3e} for {} steps", PACING.steps_of_rest);
             self.course.findings.push(Finding::info("came_to_rest", message, (next.step, next.time)));
         }
         Ok(())

@@ -11,6 +11,6 @@ pub struct StandingWave {
     pub crest: f64,
     /// Amplitude a₀ at the start.
     pub amplitude: f64,
-    /// Exact for small amplitudes; None where the fluids differ in kinematic viscosity.
+    /// Exact for small amplitudes; None where it does not hold.
     pub theory: Option<CapillaryWave>,
 }

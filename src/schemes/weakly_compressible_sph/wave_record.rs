@@ -10,15 +10,17 @@ use crate::simulation::{ErrorEntry, LoadError, Section};
 impl<const D: usize> SphSystem<D> {
     /// The amplitude of a wave on the sides of a layer: the Fourier coefficient ∮ sin(k(x − crest))/k n_x dS by half the sides'
     /// projection ∮ |n_y| dS, with dS = V δ at the closest points. NaN without a level set.
-    pub(super) fn wave_amplitude(&self, wave: &StandingWave) -> f64 {
+    pub(super) fn wave_amplitude(&self, wave: &StandingWave, time: f64) -> f64 {
         let Some(level_set) = self.interface.level_set() else { return f64::NAN };
         let (particles, columns) = (&self.particles, &self.columns);
         let (phi, band) = (particles.scalar(columns.phi), particles.flag(columns.in_band));
         let (foot, normal) = (particles.vector(columns.closest_point), particles.vector(columns.normal));
+        // The wave moves with the fluids.
+        let crest = wave.crest + self.config.start_velocity[0] * time;
         let (mut wavy, mut plane) = (0.0, 0.0);
         for i in level_set.candidates().iter().copied().filter(|i| band[*i] == 1) {
             let area = self.flow.volume[i] * smoothed_delta(phi[i], self.config.smoothing_length);
-            let phase = wave.wavenumber * (foot[i][0] - wave.crest);
+            let phase = wave.wavenumber * (foot[i][0] - crest);
             wavy += area * phase.sin() / wave.wavenumber * normal[i][0];
             plane += area * normal[i][1].abs();
         }
@@ -46,8 +48,9 @@ impl WaveRecord {
 
     /// Takes the state at a time; its error counts where the state is one of those at equal intervals.
     pub fn take<const D: usize>(&mut self, system: &SphSystem<D>, time: f64, counts: bool) {
-        self.amplitude = system.wave_amplitude(&self.wave);
-        if let Some(theory) = self.wave.theory.as_ref().filter(|_| counts) {
+        self.amplitude = system.wave_amplitude(&self.wave, time);
+        // Without a level set there is no amplitude.
+        if let Some(theory) = self.wave.theory.as_ref().filter(|_| counts && self.amplitude.is_finite()) {
             let error = self.amplitude / self.wave.amplitude - theory.amplitude_ratio(time);
             self.count += 1.0;
             self.squares += error * error;

@@ -297,3 +297,66 @@ impl<const D: usize> Cluster<D> {
         self.ways += domain.displacement(&self.first, &place.foot) * share;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{CURVATURE, LEVEL, Place, SurfaceFilter};
+    use crate::geometry::domain::Axis;
+    use crate::geometry::{Domain, Vector};
+    use crate::parallel::Interrupt;
+    use std::f64::consts::TAU;
+
+    const SPACING: f64 = 0.05;
+    const RADIUS: f64 = 6.0 * SPACING;
+
+    /// Two particles on either side of each of 60 samples of a circle of radius 0.5.
+    fn places(center: [f64; 2], domain: &Domain<2>, value: impl Fn(f64) -> f64) -> Vec<Place<2>> {
+        let place = |k: usize| {
+            let angle = TAU * (k / 4) as f64 / 60.0;
+            let normal = Vector::<2>::new(angle.cos(), angle.sin());
+            let foot = domain.wrap(Vector::<2>::new(center[0], center[1]) + normal * 0.5);
+            let distance = [-1.4, -0.5, 0.4, 1.3][k % 4] * SPACING;
+            Place { foot, sample: k / 4, normal, distance, values: [value(angle); 2] }
+        };
+        (0..240).map(place).collect()
+    }
+
+    fn smoothed(places: &[Place<2>], domain: &Domain<2>) -> Vec<[f64; 2]> {
+        let (mut filter, mut smoothed) = (SurfaceFilter::new(domain.clone()), Vec::new());
+        filter.smooth(places, SPACING, RADIUS, &mut smoothed, &Interrupt::default()).unwrap();
+        smoothed
+    }
+
+    /// (2S − S²)[q] by its definition, sums over all places.
+    fn by_definition(places: &[Place<2>], domain: &Domain<2>) -> Vec<f64> {
+        let mean = |at: &Place<2>, values: &[f64]| {
+            let (mut all, mut sum) = (0.0, 0.0);
+            for (place, value) in places.iter().zip(values) {
+                let r = domain.displacement(&at.foot, &place.foot).norm() / RADIUS;
+                if r < 1.0 && place.normal.dot(&at.normal) > 0.0 {
+                    let w = (1.0 - r).powi(4) * (1.0 + 4.0 * r) * super::share_across(place.distance, SPACING);
+                    all += w;
+                    sum += w * value;
+                }
+            }
+            sum / all
+        };
+        let values: Vec<f64> = places.iter().map(|place| place.values[CURVATURE]).collect();
+        let first: Vec<f64> = places.iter().zip(&values).map(|(at, value)| 2.0 * value - mean(at, &values)).collect();
+        places.iter().map(|at| mean(at, &first)).collect()
+    }
+
+    #[test]
+    fn the_filter_is_its_definition_also_across_the_side_of_the_box() {
+        let domain = Domain::new([Axis::Periodic { start: 0.0, length: 2.0 }; 2]);
+        for center in [[1.0, 1.0], [0.1, 1.9]] {
+            let places = places(center, &domain, |angle| (5.0 * angle).cos());
+            let expected = by_definition(&places, &domain);
+            for (found, expected) in smoothed(&places, &domain).iter().zip(&expected) {
+                assert!((found[CURVATURE] - expected).abs() < 1e-12, "{found:?}, not {expected}");
+                // All places of a sample have one value, so that the weights across do not matter.
+                assert!((found[LEVEL] - expected).abs() < 1e-12, "{found:?}, not {expected}");
+            }
+        }
+    }
+}
