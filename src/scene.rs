@@ -12,7 +12,7 @@ pub use view::View;
 pub use work::PhaseWork;
 
 use crate::parallel::Interrupt;
-use crate::simulation::{CpuClock, OutputPlan, Quantity, Simulation};
+use crate::simulation::{CpuClock, Finding, OutputPlan, Quantity, Simulation};
 use crate::spec::{Declaration, Given, Group, Json, Object, Preset, Violation, group, suggest};
 use serde_json::json;
 
@@ -168,6 +168,16 @@ pub trait Scene: Send + Sync {
 
     /// Size of the run; `sizes` tells of points that come from outside.
     fn estimate(&self, sizes: &CloudSizes) -> Estimate;
+
+    /// What is doubtful about the scene before it runs.
+    fn warnings(&self) -> Vec<Finding> {
+        Vec::new()
+    }
+
+    /// Dimensionless numbers of the scene by their names; empty where it has none.
+    fn numbers(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
 
     /// Runs of one family cost about the same for a unit of work: kind, dimension, and what the method makes of them.
     fn family(&self) -> String;

@@ -2,6 +2,7 @@
 //! reports show, `simulation` is the one `impl Simulation`, and `format_1` reads old checkpoints. No scheme uses another's inside.
 
 pub mod advected_level_set;
+pub mod capillary_wave;
 pub mod embedding_closest_point;
 pub mod exact_motion;
 pub mod front_stretch;

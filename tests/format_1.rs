@@ -94,7 +94,10 @@ fn check_end(simulation: &dyn Simulation, before: &Value, what: &str) {
     for (quantity, value) in simulation.observables() {
         // Quantities that came later have no value before.
         let Some(text) = before["observables"][quantity.name].as_str() else { continue };
-        let is_same = value.is_nan() && text == "NaN" || text.parse::<f64>().unwrap().to_bits() == value.to_bits();
+        // Pressures inside thin drops were not known.
+        let is_new = quantity.name.starts_with("pressure_") && text == "NaN";
+        let is_same =
+            is_new || value.is_nan() && text == "NaN" || text.parse::<f64>().unwrap().to_bits() == value.to_bits();
         assert!(is_same, "{} of {what}: {value} for {text}", quantity.name);
     }
     let report = simulation.report();

@@ -26,6 +26,8 @@ const COARSE_CELLS: f64 = 16.0;
 pub struct EnclosedMoments<const D: usize> {
     /// Enclosed area (2D) or volume (3D).
     pub area_or_volume: f64,
+    /// Length (2D) or area (3D) of the surface.
+    pub surface: f64,
     /// First moments ∫ x dV.
     pub first: Vector<D>,
     /// Second moments ∫ x_d² dV, axis by axis.
@@ -42,12 +44,13 @@ impl<const D: usize> EnclosedMoments<D> {
     /// The moments of an empty set.
     fn zero() -> Self {
         let zero = Vector::<D>::zeros();
-        Self { area_or_volume: 0.0, first: zero, second: zero, mixed: zero, low: zero, high: zero }
+        Self { area_or_volume: 0.0, surface: 0.0, first: zero, second: zero, mixed: zero, low: zero, high: zero }
     }
 
     /// Adds the moments of another set.
     fn add(&mut self, other: &Self) {
         self.area_or_volume += other.area_or_volume;
+        self.surface += other.surface;
         self.first += other.first;
         self.second += other.second;
         self.mixed += other.mixed;
@@ -181,7 +184,9 @@ fn inside_of_cell<const D: usize>(
         // At the distance ρ the surface is κ ρ²/2 away from its tangent plane, on average κ edge²/24 over a section of
         // the cell.
         let mean_deviation = (foot.curvature * edge).clamp(-1.0, 1.0) / 24.0;
-        add(whole * share_below_plane(&foot.normal, signed / edge + mean_deviation));
+        let offset = signed / edge + mean_deviation;
+        add(whole * share_below_plane(&foot.normal, offset));
+        sum.surface += whole / edge * section_by_plane(&foot.normal, offset);
         return;
     }
     let half = 0.5 * edge;
@@ -215,9 +220,37 @@ fn share_below_plane<const D: usize>(normal: &Vector<D>, signed: f64) -> f64 {
     (sum / (factorial * n.product())).clamp(0.0, 1.0)
 }
 
+/// Length (2D) or area (3D) of the section of the unit cube, centered at the origin, by the plane n·x + s = 0: minus the
+/// derivative of [`share_below_plane`] by s.
+fn section_by_plane<const D: usize>(normal: &Vector<D>, signed: f64) -> f64 {
+    let n = normal.map(|c| c.abs().max(1e-4));
+    let depth = 0.5 * n.sum() - signed;
+    let mut sum = 0.0;
+    for corner in 0..1_usize << D {
+        let offset: f64 = (0..D).filter(|d| corner >> d & 1 == 1).map(|d| n[d]).sum();
+        let term = (depth - offset).max(0.0).powi(D as i32 - 1);
+        sum += if corner.count_ones().is_multiple_of(2) { term } else { -term };
+    }
+    let factorial = if D == 2 { 1.0 } else { 2.0 };
+    // Behind the far corner the terms cancel up to round-off.
+    (sum / (factorial * n.product())).clamp(0.0, 2.0)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Vector, share_below_plane};
+    use super::{Vector, section_by_plane, share_below_plane};
+
+    #[test]
+    fn sections_are_those_of_lines_and_planes() {
+        let near = |got: f64, expected: f64| assert!((got - expected).abs() < 1e-3, "{got}, not {expected}");
+        near(section_by_plane(&Vector::<2>::new(1.0, 0.0), 0.2), 1.0);
+        near(section_by_plane(&Vector::<2>::new(1.0, -1.0).normalize(), 0.0), 2.0_f64.sqrt());
+        near(section_by_plane(&Vector::<2>::new(1.0, 1.0).normalize(), 0.8), 0.0);
+        near(section_by_plane(&Vector::<2>::new(1.0, 1.0).normalize(), -0.8), 0.0);
+        // A regular hexagon through the center.
+        near(section_by_plane(&Vector::<3>::repeat(1.0).normalize(), 0.0), 0.75 * 3.0_f64.sqrt());
+        near(section_by_plane(&Vector::<3>::new(0.0, 0.0, -1.0), 0.3), 1.0);
+    }
 
     #[test]
     fn shares_of_the_unit_cube_agree_with_counted_points() {

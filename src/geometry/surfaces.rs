@@ -11,6 +11,7 @@ mod profile;
 pub mod rounded_cuboid;
 pub mod torus;
 pub mod union;
+pub mod wavy_layer;
 pub mod zalesak_disk;
 
 pub use ball::Ball;
@@ -20,6 +21,7 @@ pub use ellipsoid::Ellipsoid;
 pub use rounded_cuboid::RoundedCuboid;
 pub use torus::Torus;
 pub use union::Union;
+pub use wavy_layer::WavyLayer;
 pub use zalesak_disk::ZalesakDisk;
 
 use super::Vector;

@@ -1,8 +1,10 @@
 //! `droplet`: two fluids with surface tension (PCP, sections 4.3 and 4.4, appendix B).
 
 mod cases;
+mod dimensionless;
 mod flow;
 mod formulation;
+mod layer;
 mod numbers;
 mod plan;
 mod preset;
@@ -12,7 +14,7 @@ mod start_levels;
 
 use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::weakly_compressible_sph::{frame_fields, quantities as own};
-use crate::spec::Group;
+use crate::spec::{Given, Group};
 
 /// The kind of scene named `droplet`.
 pub static KIND: SceneKind = SceneKind {
@@ -21,7 +23,10 @@ pub static KIND: SceneKind = SceneKind {
     presets: &[("paper", preset::paper)],
     example: include_str!("droplet/example.json"),
     declarations: spec::Droplet::declarations,
-    parse: scene::parse_as::<spec::Droplet>,
+    parse: |given, errors| {
+        let implied = dimensionless::implied(Given::new(given));
+        scene::parse_as::<spec::Droplet>(&implied.under(given.clone()), errors)
+    },
     of_earlier_version: formulation::of_earlier_version,
     quantities: || Quantities {
         fields: frame_fields::all(),

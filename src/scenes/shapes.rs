@@ -4,7 +4,7 @@ use crate::geometry::Vector;
 use crate::geometry::dimension::in_dimension;
 use crate::geometry::surfaces::{Ball, Cuboid, Dumbbell, Ellipsoid, RoundedCuboid, Surface, Torus, Union, ZalesakDisk};
 use crate::scene::cloud::{CloudReference, PointsSource};
-use crate::spec::{AtLeast, Choice, Coordinates, POSITIVE, Parameter, Sign, Violation};
+use crate::spec::{AtLeast, Choice, Coordinates, NOT_NEGATIVE, POSITIVE, Parameter, Sign, Violation};
 use serde_json::{Value, json};
 
 crate::choice! {
@@ -97,6 +97,19 @@ crate::choice! {
             /// the shapes; they must not overlap
             of: Vec<PlainShape>, in AtLeast(1);
         }
+        /// a layer across a periodic box, between two sides at rest or in waves that are crests together (droplet)
+        Layer = "layer" {
+            /// height of its middle, along y
+            height: f64 = 0.0;
+            /// mean distance of its sides
+            thickness: f64, in POSITIVE;
+            /// amplitude of the waves on both sides
+            amplitude: f64 = 0.0, in NOT_NEGATIVE;
+            /// length of the waves along x, which divides the box; that of the box when not given
+            wavelength: Option<f64>, in POSITIVE;
+            /// place of a crest, along x
+            crest: f64 = 0.0;
+        }
         /// points of a VTKHDF file with PointData/phi, which is their level
         Points = "points" {
             /// where the points come from
@@ -133,7 +146,7 @@ impl Shape {
         match self {
             Self::Plain(shape) => shape.dimension(),
             Self::Union { of } => of.iter().find_map(PlainShape::dimension),
-            Self::Points { .. } => None,
+            Self::Points { .. } | Self::Layer { .. } => None,
         }
     }
 
@@ -168,7 +181,7 @@ impl Shape {
     pub fn points_reference(&self, pointer: &'static str, errors: &mut Vec<Violation>) -> Option<CloudReference> {
         match self {
             Self::Points { source } => source.reference(pointer, errors),
-            Self::Plain(_) | Self::Union { .. } => None,
+            Self::Plain(_) | Self::Union { .. } | Self::Layer { .. } => None,
         }
     }
 
@@ -185,6 +198,10 @@ impl Shape {
                     let at = format!("{pointer}/of");
                     vec![Violation::new(at, "conflict", overlap.to_string(), of.to_json(), Value::Null)]
                 })
+            }
+            Self::Layer { .. } => {
+                let detail = "a layer reaches across a periodic box: it belongs to droplet scenes";
+                Err(vec![Violation::new(pointer, "conflict", detail, "layer", Value::Null)])
             }
             Self::Points { .. } => {
                 let detail = "points from outside are not a shape that is known exactly";

@@ -21,6 +21,7 @@ mod checks;
 mod column;
 pub mod config;
 mod dcpse;
+pub mod dimensionless;
 mod droplets;
 mod equations;
 mod flow_state;
@@ -39,15 +40,18 @@ mod pacing;
 mod pair_sums;
 mod pair_workspace;
 pub mod quantities;
+mod pressures;
 mod saved_state;
 mod simulation;
 pub mod species;
+mod standing_wave;
 mod stepping;
 mod strays;
 mod summary;
 mod system;
 pub mod time_step;
 mod volume_form;
+mod wave_record;
 
 pub use config::{
     DensityMethod, Discretization, Geometry, Integrator, PressureConfig, PressureForm, SphConfig, Volumes,
@@ -60,6 +64,7 @@ pub use level_update::LevelUpdate;
 pub use pacing::measurement_interval;
 pub use simulation::WeaklyCompressibleSph;
 pub use species::{Fluids, Species};
+pub use standing_wave::StandingWave;
 pub use system::{Drop, SphSystem};
 
 #[cfg(test)]

@@ -60,6 +60,10 @@ impl Declaration {
     #[must_use]
     pub fn unit(&self) -> Option<&'static str> {
         let units = [("_h", "h"), ("_dn", "δn"), ("_s", "s"), ("_bytes", "bytes")];
+        // A ratio to the spacing has no unit.
+        if self.name.ends_with("_over_h") {
+            return None;
+        }
         units.into_iter().find(|(ending, _)| self.name.ends_with(ending)).map(|(_, unit)| unit)
     }
 

@@ -171,9 +171,10 @@ fn the_first_failure_stops_a_study_and_a_retry_goes_on() {
 
 #[test]
 fn ten_thousand_points_are_made_paged_and_cancelled() {
-    let (_directory, mut service) = service(&["--slots", "1"]);
-    let points: Vec<Value> = (0..10_000).map(|k| json!({"/scene/shape/radius": 0.3 + 1e-5 * f64::from(k)})).collect();
-    let spec = json!({"base": {"scene": {"kind": "redistance", "spacing": 0.1, "shape": {"type": "circle", "radius": 1}}},
+    // Small files and no reserve: the space that 10,000 of them are expected to take must be free.
+    let (_directory, mut service) = service(&["--slots", "1", "--disk-reserve-bytes", "0"]);
+    let points: Vec<Value> = (0..10_000).map(|k| json!({"/scene/shape/radius": 0.6 + 1e-5 * f64::from(k)})).collect();
+    let spec = json!({"base": {"scene": {"kind": "redistance", "spacing": 0.3, "shape": {"type": "circle", "radius": 1}}},
         "sweep": {"mode": "list", "points": points}});
     let id = submit(&service, &spec);
     act(&service, &id, "pause");

@@ -4,6 +4,7 @@
 mod case_files;
 mod droplets;
 mod droplets_in_balance;
+mod droplets_in_frames;
 mod fronts;
 mod linear_theory;
 mod ring;

@@ -1,5 +1,6 @@
 //! Views of studies, uploads and estimates.
 
+use super::FindingView;
 use meniscus_jobs::service::store::{StudyRow, UploadRow};
 use meniscus_jobs::spec::body::JobBody;
 use meniscus_jobs::spec::states::State;
@@ -110,6 +111,10 @@ pub struct EstimateView {
     pub wall_s: Option<f64>,
     /// Measurements on which the times rest.
     pub basis: String,
+    /// Dimensionless numbers of the scene by their names, such as `Re` and `La`; empty where its kind has none.
+    pub numbers: BTreeMap<&'static str, f64>,
+    /// What is doubtful about the scene before it runs.
+    pub warnings: Vec<FindingView>,
 }
 
 impl From<JobBody> for EstimateView {
@@ -127,6 +132,8 @@ impl From<JobBody> for EstimateView {
             cpu_s: time.map(|time| time.cpu_s),
             wall_s: time.map(|time| time.wall_s),
             basis,
+            numbers: body.scene.numbers().into_iter().collect(),
+            warnings: body.scene.warnings().into_iter().map(FindingView::from).collect(),
         }
     }
 }

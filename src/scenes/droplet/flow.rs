@@ -8,6 +8,7 @@ use super::spec::{
 };
 use crate::geometry::Vector;
 use crate::operators::Support;
+use crate::schemes::weakly_compressible_sph::Fluids as SchemeFluids;
 use crate::schemes::weakly_compressible_sph::{BodyForce, DensityMethod, Discretization, Fluid, KernelChoice};
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
@@ -30,6 +31,13 @@ impl From<&FluidSpec> for Fluid {
     fn from(spec: &FluidSpec) -> Self {
         let FluidSpec { density, viscosity, sound_speed, polytropic } = *spec;
         Self { density, viscosity, sound_speed, polytropic }
+    }
+}
+
+impl Fluids {
+    /// The fluids as the scheme takes them.
+    pub(super) fn planned(&self) -> SchemeFluids {
+        SchemeFluids { inside: Fluid::from(&self.inside), outside: Fluid::from(&self.outside) }
     }
 }
 

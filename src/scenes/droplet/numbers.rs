@@ -21,26 +21,39 @@ const TUNING: Tuning = Tuning { capillary: 0.3, stiffness: 100.0 };
 /// Size, tension and acceleration of a scene.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SceneNumbers {
-    /// Radius of the smallest drop as a ball; None for drops that are known by points alone.
+    /// Radius of the smallest drop as a ball, or half the length of a layer's waves; None for drops that are known by points
+    /// alone.
     pub radius: Option<f64>,
     /// Curvature of a ball of that radius, or of one in the shortest side of the box.
     curvature: f64,
-    tension: f64,
+    pub tension: f64,
     /// Size of a constant body force.
-    gravity: f64,
+    pub gravity: f64,
+    /// Size of the velocity at the start.
+    start_speed: f64,
     /// Longest side of the box.
     length: f64,
 }
 
 impl SceneNumbers {
-    pub fn new<const D: usize>(shape: Option<&Shape>, tension: f64, gravity: f64, lengths: &Vector<D>) -> Self {
+    pub fn new<const D: usize>(
+        shape: Option<&Shape>,
+        tension: f64,
+        [gravity, start_speed]: [f64; 2],
+        lengths: &Vector<D>,
+    ) -> Self {
         let radius = shape.and_then(smallest_radius::<D>);
         let curvature = (D - 1) as f64 / radius.unwrap_or(0.5 * lengths.min());
-        Self { radius, curvature, tension, gravity, length: lengths.max() }
+        Self { radius, curvature, tension, gravity, start_speed, length: lengths.max() }
     }
 
-    /// The largest speed that a scene is expected to reach, 0.3 √(2τκ/ρ) + √(2gL).
+    /// The largest speed that a scene is expected to reach, that of the start included.
     pub fn expected_speed(&self, spec: &Droplet) -> f64 {
+        self.expected_inner_speed(spec) + self.start_speed
+    }
+
+    /// The largest speed about the velocity of the start that a scene is expected to reach, 0.3 √(2τκ/ρ) + √(2gL).
+    pub fn expected_inner_speed(&self, spec: &Droplet) -> f64 {
         let density = spec.fluids.inside.density.min(spec.fluids.outside.density);
         TUNING.capillary * (2.0 * self.tension * self.curvature / density).sqrt() + self.falling_speed()
     }
@@ -49,10 +62,9 @@ impl SceneNumbers {
         (2.0 * self.gravity * self.length).sqrt()
     }
 
-    /// The least speed of sound of a fluid: c² = 100 max(τ/(ρR), gL).
+    /// The least speed of sound of a fluid of the scene.
     pub fn least_sound_speed(&self, fluid: &FluidSpec) -> f64 {
-        let capillary = self.radius.map_or(0.0, |radius| self.tension / (fluid.density * radius));
-        (TUNING.stiffness * capillary.max(self.gravity * self.length)).sqrt()
+        least_sound_speed(fluid, self.radius, self.tension, self.gravity * self.length)
     }
 
     /// A warning for each fluid that is softer than c² = 100 max(τ/(ρR), gL).
@@ -86,10 +98,21 @@ impl SceneNumbers {
     }
 }
 
-/// Radius of the smallest ball that has the area or volume of a part of a shape.
-fn smallest_radius<const D: usize>(shape: &Shape) -> Option<f64> {
-    if matches!(shape, Shape::Points { .. }) {
-        return None;
+/// The least speed of sound that keeps a fluid nearly incompressible: c² = 100 max(τ/(ρR), gL). `fall` is gL.
+pub(super) fn least_sound_speed(fluid: &FluidSpec, radius: Option<f64>, tension: f64, fall: f64) -> f64 {
+    let capillary = radius.map_or(0.0, |radius| tension / (fluid.density * radius));
+    (TUNING.stiffness * capillary.max(fall)).sqrt()
+}
+
+/// Radius of the smallest ball that has the area or volume of a part of a shape; half the length of the waves of a layer.
+pub(super) fn smallest_radius<const D: usize>(shape: &Shape) -> Option<f64> {
+    match shape {
+        Shape::Points { .. } => return None,
+        // Half of a wave, or of the layer where it is flat, stands for the radius.
+        Shape::Layer { thickness, amplitude, wavelength, .. } => {
+            return Some(0.5 * wavelength.filter(|_| *amplitude > 0.0).unwrap_or(*thickness));
+        }
+        Shape::Plain(_) | Shape::Union { .. } => {}
     }
     let parts = shape.parts::<D>("/shape").ok()?;
     let radius = |measure: f64| (D - 1) as f64 / ball_curvature::<D>(measure);

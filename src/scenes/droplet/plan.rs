@@ -1,11 +1,14 @@
 //! From the spec of a `droplet` scene to two fluids in a box.
 
 use super::cases::Case;
+use super::dimensionless;
 use super::flow::{FlowPlan, body_force};
 use super::formulation::{Scope, level_and_curvature, pressures};
+use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave};
 use super::numbers::SceneNumbers;
 use super::spec::{
-    Corners, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, Shifting, StopWhen, TensionWord,
+    Corners, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen,
+    TensionWord,
 };
 use super::start_lattice::StartLattice;
 use crate::geometry::domain::Axis;
@@ -21,10 +24,10 @@ use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem,
-    TensionForce, WeaklyCompressibleSph, measurement_interval,
+    DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
+    WeaklyCompressibleSph, measurement_interval,
 };
-use crate::simulation::{OutputPlan, Quantity, Simulation};
+use crate::simulation::{Finding, OutputPlan, Quantity, Simulation};
 use crate::spec::{Coordinates, Parameter, Violation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -60,9 +63,10 @@ impl SceneSpec for Droplet {
     }
 }
 
-fn corner<const D: usize>(name: &str, numbers: &Coordinates, errors: &mut Vec<Violation>) -> Vector<D> {
+/// The numbers of a field as a vector.
+fn vector<const D: usize>(at: &str, numbers: &Coordinates, errors: &mut Vec<Violation>) -> Vector<D> {
     if numbers.len() != D {
-        let (at, detail) = (format!("/domain/{name}"), format!("the scene has {D} dimensions"));
+        let detail = format!("the scene has {D} dimensions");
         errors.push(Violation::new(at, "conflict", detail, numbers.to_json(), format!("{D} numbers")));
     }
     Vector::<D>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(0.0))
@@ -101,8 +105,8 @@ fn geometry(
 
 /// The lower and the upper corner of the box.
 fn corners_of<const D: usize>(corners: &Corners, errors: &mut Vec<Violation>) -> (Vector<D>, Vector<D>) {
-    let low = corner::<D>("low", &corners.low, errors);
-    let high = corner::<D>("high", &corners.high, errors);
+    let low = vector::<D>("/domain/low", &corners.low, errors);
+    let high = vector::<D>("/domain/high", &corners.high, errors);
     let lengths = high - low;
     if lengths.iter().any(|length| *length <= 0.0) {
         let detail = "the upper corner must lie above the lower one along every axis";
@@ -141,8 +145,10 @@ fn drop_shape<const D: usize>(
         return None;
     };
     let points = shape.points_reference("/shape", errors);
-    match &shape {
+    let mut shape = shape;
+    match &mut shape {
         Shape::Points { .. } => {}
+        layer @ Shape::Layer { .. } => check_layer(layer, lengths, errors),
         known => match known.surface::<D>("/shape") {
             Ok(surface) => errors.extend(check_size(surface.as_ref(), lengths, &shape)),
             Err(found) => errors.extend(found),
@@ -175,10 +181,14 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().map(|g| g * g).sum::<f64>().sqrt(),
         Some(ForceChoice::Pulse { .. } | ForceChoice::None) | None => 0.0,
     };
-    let numbers = SceneNumbers::new(shape.as_ref().map(|(shape, _)| shape), tension, gravity, &lengths);
+    let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, &mut errors));
+    let speeds = [gravity, velocity.norm()];
+    let numbers = SceneNumbers::new(shape.as_ref().map(|(shape, _)| shape), tension, speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
     let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
-    let config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
+    let mut config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
+    config.start_velocity = velocity;
+    config.wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     if is_box
         && lattice.count() >= 1.0
@@ -188,6 +198,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         errors.push(Violation::new("/domain", "range", error.to_string(), got, error.least));
     }
     numbers.check_sound_speeds(&spec, &mut errors);
+    dimensionless::complete(&mut spec, &numbers, &mut errors);
     let Some((shape, points)) = shape.filter(|_| errors.is_empty()) else {
         return Err(errors);
     };
@@ -221,7 +232,7 @@ fn sph_config<const D: usize>(
         smoothing_length,
         pressure,
         kernel: flow.kernel,
-        fluids: Fluids { inside: Fluid::from(&spec.fluids.inside), outside: Fluid::from(&spec.fluids.outside) },
+        fluids: spec.fluids.planned(),
         tension: *spec.surface_tension.get_or_insert(case.tension),
         tension_force: match spec.tension_force {
             TensionWord::Balanced => TensionForce::Balanced,
@@ -237,6 +248,8 @@ fn sph_config<const D: usize>(
             IntegratorWord::KickDriftKick => Integrator::KickDriftKick,
             IntegratorWord::PredictorCorrector => Integrator::PredictorCorrector,
         },
+        start_velocity: Vector::<D>::zeros(),
+        wave: None,
         expected_speed,
         is_adaptive: given_step.is_none() && spec.steps.is_none(),
         rest_below: spec.stop_when.as_ref().map(|StopWhen::AtRest { velocity }| *velocity),
@@ -344,6 +357,14 @@ impl<const D: usize> Scene for DropletScene<D> {
         }
     }
 
+    fn warnings(&self) -> Vec<Finding> {
+        self.numbers.soft_fluids(&self.spec)
+    }
+
+    fn numbers(&self) -> Vec<(&'static str, f64)> {
+        self.spec.numbers.as_ref().map_or_else(Vec::new, NumbersSpec::named)
+    }
+
     fn family(&self) -> String {
         let geometry = match &self.config.geometry {
             Geometry::Pcp { method, .. } => work_estimate::method_name(method),
@@ -418,7 +439,10 @@ impl<const D: usize> Scene for DropletScene<D> {
         let lengths = self.lengths();
         let domain = domain_of(&self.low, &lengths);
         let positions = self.lattice.positions(&self.low, &lengths);
-        let (level, measure) = if self.clouds.is_empty() {
+        let (level, measure) = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
+            let area = lengths.product() / lengths[1];
+            (positions.iter().map(|x| distance_from_layer(&layer, lengths[1], x)).collect(), layer.thickness * area)
+        } else if self.clouds.is_empty() {
             let surface = self.shape.surface::<D>("/shape")?;
             (self.levels(surface.as_ref(), &positions), surface.area_or_volume())
         } else {
@@ -433,7 +457,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let chosen = self.chosen.clone();
         let end_time = self.spec.end_time;
         let mut simulation = WeaklyCompressibleSph::new(system, self.time_step, end_time, plan, clock, chosen);
-        simulation.course_mut().findings.extend(self.numbers.soft_fluids(&self.spec));
+        simulation.course_mut().findings.extend(self.warnings());
         Ok(Box::new(simulation))
     }
 }
@@ -442,12 +466,13 @@ impl<const D: usize> DropletScene<D> {
     /// Particles within a band of this width about the drop, about: that of a ball of its measure, which is taken for a fifth of the
     /// box where it is not known.
     fn near(&self, width: f64) -> f64 {
+        let lengths = self.lengths();
         let surface = self.shape.surface::<D>("/shape");
-        let measure = surface.map_or_else(|_| self.lengths().product() / 5.0, |surface| surface.area_or_volume());
-        let area = if D == 2 {
-            2.0 * (std::f64::consts::PI * measure).sqrt()
-        } else {
-            (36.0 * std::f64::consts::PI).cbrt() * measure.powf(2.0 / 3.0)
+        let measure = surface.map_or_else(|_| lengths.product() / 5.0, |surface| surface.area_or_volume());
+        let area = match self.shape {
+            Shape::Layer { .. } => 2.0 * lengths.product() / lengths[1],
+            _ if D == 2 => 2.0 * (std::f64::consts::PI * measure).sqrt(),
+            _ => (36.0 * std::f64::consts::PI).cbrt() * measure.powf(2.0 / 3.0),
         };
         (area * width / self.config.spacing.powi(D as i32)).min(self.count() as f64)
     }

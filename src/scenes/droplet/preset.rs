@@ -22,5 +22,9 @@ pub(super) fn paper(given: Given) -> Preset {
         .set(Droplet::integrator(), IntegratorWord::PredictorCorrector)
         .set(Droplet::geometry(), GeometryChoice::Pcp { band_h: None, method })
         // 2e-4 at 1/32, 1e-4 at 1/64, 5e-5 at 1/128.
-        .set_if(!has_step && case != CaseName::Dividing, Droplet::time_step(), Some(2e-4 * 32.0 * spacing))
+        .set_if(
+            !has_step && !given.has(Droplet::numbers()) && case != CaseName::Dividing,
+            Droplet::time_step(),
+            Some(2e-4 * 32.0 * spacing),
+        )
 }

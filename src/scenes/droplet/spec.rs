@@ -133,6 +133,33 @@ crate::words! {
     }
 }
 
+crate::group! {
+    /// Dimensionless numbers, with the diameter D of the smallest drop and the fluid inside; Re, We and Ca follow, at the largest
+    /// speed that is expected.
+    pub struct NumbersSpec: Default {
+        /// Laplace number τρD/η²
+        laplace as "La": Option<f64>, in NOT_NEGATIVE;
+        /// Ohnesorge number η/√(ρτD), which is 1/√La
+        ohnesorge as "Oh": Option<f64>, in NOT_NEGATIVE;
+        /// Reynolds number ρUD/η
+        reynolds as "Re": Option<f64>, in NOT_NEGATIVE;
+        /// Weber number ρU²D/τ
+        weber as "We": Option<f64>, in NOT_NEGATIVE;
+        /// capillary number ηU/τ
+        capillary as "Ca": Option<f64>, in NOT_NEGATIVE;
+        /// Bond number |ρ − ρ_outside| g D²/τ; given, gravity acts along −y, with balance mean
+        bond as "Bo": Option<f64>, in NOT_NEGATIVE;
+        /// density outside by that inside
+        density_ratio: Option<f64>, in POSITIVE;
+        /// viscosity outside by that inside
+        viscosity_ratio: Option<f64>, in NOT_NEGATIVE;
+        /// diameter by spacing
+        diameter_over_h as "D_over_h": Option<f64>, in POSITIVE;
+        /// radius by spacing
+        radius_over_h as "R_over_h": Option<f64>, in POSITIVE;
+    }
+}
+
 /// Smoothing lengths ε in h.
 const SMOOTHING: Interval = Interval::at_least(1.0).and_at_most(8.0);
 
@@ -255,6 +282,8 @@ crate::group! {
         domain: Option<Corners>;
         /// distance h of neighboring particles: the volume of a particle is about h^D, whatever the lattice
         spacing: f64 = 0.031_25, in POSITIVE;
+        /// velocity of both fluids at the start; 0 when not given
+        velocity: Option<Coordinates>;
         /// scene time at the end
         end_time: f64 = 1.0, in POSITIVE => restart_safe;
         /// time step Δt, kept whatever the speeds; when neither it nor steps is given, the longest stable one, cut into parts
@@ -264,6 +293,9 @@ crate::group! {
         steps: Option<u64>, in whole(1, 1_000_000_000);
         /// the fluids inside and outside
         fluids: Fluids = Fluids::default();
+        /// a scene by dimensionless numbers, with ρ = τ = 1 and, without a shape, R = 1, in place of fluids, surface_tension, spacing
+        /// and domain; in a resolved scene the numbers that follow from it
+        numbers: Option<NumbersSpec>;
         /// surface tension τ; by case when not given; with 0 no interface is computed
         surface_tension: Option<f64>, in NOT_NEGATIVE;
         /// balanced: −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet; balanced_0_1: that of version 0.1;

@@ -20,6 +20,15 @@ pub(super) struct Contents<const D: usize> {
     pub momentum: Vector<D>,
     /// Σ m |u|.
     pub momentum_size: f64,
+    /// Σ m.
+    pub mass: f64,
+}
+
+impl<const D: usize> Contents<D> {
+    /// Kinetic energy of the motion about the mean velocity.
+    pub fn inner_kinetic(&self) -> f64 {
+        self.kinetic - 0.5 * self.momentum.norm_squared() / self.mass
+    }
 }
 
 impl<const D: usize> SphSystem<D> {
@@ -32,9 +41,11 @@ impl<const D: usize> SphSystem<D> {
             interface: self.interface_measure(),
             momentum: Vector::<D>::zeros(),
             momentum_size: 0.0,
+            mass: 0.0,
         };
         for (i, u) in flow.velocity.iter().enumerate() {
             let mass = flow.mass(i);
+            contents.mass += mass;
             contents.kinetic += 0.5 * mass * u.norm_squared();
             contents.momentum += u * mass;
             contents.momentum_size += mass * u.norm();

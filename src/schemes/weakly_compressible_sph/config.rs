@@ -5,7 +5,9 @@ use super::interactions::{BodyForce, TensionForce};
 use super::kernel_choice::KernelChoice;
 use super::level_update::LevelUpdate;
 use super::species::Fluids;
+use super::standing_wave::StandingWave;
 use crate::closest_point::PcpMethod;
+use crate::geometry::Vector;
 use crate::operators::Support;
 
 /// Form of the pressure force between particles with densities by summation.
@@ -126,6 +128,10 @@ pub struct SphConfig<const D: usize> {
     pub body_force: Option<BodyForce<D>>,
     /// The time integrator.
     pub integrator: Integrator,
+    /// Velocity of both fluids at the start.
+    pub start_velocity: Vector<D>,
+    /// The standing wave that a layer starts with.
+    pub wave: Option<StandingWave>,
     /// The speed that the longest step is chosen for; faster particles cut steps into parts.
     pub expected_speed: f64,
     /// Whether a step beyond the stability limits is cut into parts; false where the user gave the time step.

@@ -39,14 +39,14 @@ pub(super) struct Rates<const D: usize> {
 }
 
 impl<const D: usize> FlowState<D> {
-    /// Fluids at rest, with the species of the signed distances in `level`.
-    pub fn at_rest(fluids: Fluids, cell: f64, level: &[f64]) -> Self {
+    /// Fluids with one velocity and no pressure, with the species of the signed distances in `level`.
+    pub fn in_motion(fluids: Fluids, cell: f64, level: &[f64], velocity: Vector<D>) -> Self {
         let species: Vec<Species> = level.iter().map(|level| Species::from_level(*level)).collect();
         let count = species.len();
         Self {
             density: species.iter().map(|species| fluids[*species].density).collect(),
-            velocity: vec![Vector::<D>::zeros(); count],
-            predicted: vec![Vector::<D>::zeros(); count],
+            velocity: vec![velocity; count],
+            predicted: vec![velocity; count],
             volume: vec![cell; count],
             pressure: vec![0.0; count],
             calibration: 1.0,
@@ -118,6 +118,18 @@ impl<const D: usize> FlowState<D> {
         }
     }
 
+    /// The largest speed about the mean velocity Σ m u/Σ m.
+    pub fn largest_relative_speed(&self) -> f64 {
+        let mass: f64 = (0..self.count()).map(|i| self.mass(i)).sum();
+        let momentum: Vector<D> = self.velocity.iter().enumerate().map(|(i, u)| u * self.mass(i)).sum();
+        self.largest_speed_about(&(momentum / mass))
+    }
+
+    /// The largest speed about a velocity.
+    pub fn largest_speed_about(&self, velocity: &Vector<D>) -> f64 {
+        self.velocity.iter().map(|u| (u - velocity).norm_squared()).fold(0.0, f64::max).sqrt()
+    }
+
     /// The largest speed.
     pub fn largest_speed(&self) -> f64 {
         self.velocity.iter().map(Vector::<D>::norm_squared).fold(0.0, f64::max).sqrt()
@@ -136,12 +148,17 @@ impl<const D: usize> Rates<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{FlowState, Fluid, Fluids, Species};
+    use super::{FlowState, Fluid, Fluids, Species, Vector};
 
     #[test]
     fn fluids_at_rest_have_no_pressure_and_volumes_and_densities_lead_back_to_each_other() {
         let fluid = |density| Fluid { density, viscosity: 0.5, sound_speed: 20.0, polytropic: 7.0 };
-        let mut flow = FlowState::<2>::at_rest(Fluids { inside: fluid(3.0), outside: fluid(1.0) }, 0.25, &[-1.0, 1.0]);
+        let mut flow = FlowState::<2>::in_motion(
+            Fluids { inside: fluid(3.0), outside: fluid(1.0) },
+            0.25,
+            &[-1.0, 1.0],
+            Vector::<2>::zeros(),
+        );
         assert_eq!(flow.species, [Species::Inside, Species::Outside]);
         assert_eq!((flow.mass(0), flow.mass(1)), (0.75, 0.25));
         flow.derive_pressures();

@@ -131,7 +131,8 @@ impl<const D: usize> Guard<D> {
         let scale = tension * self.budget.start_interface;
         let radius = (D - 1) as f64 / ball_curvature::<D>(system.droplets.initial_measure);
         let capillary = (system.config.fluids.inside.density * radius.powi(3) / tension).sqrt();
-        if contents.kinetic > LIMITS.rest * scale || contents.kinetic <= 0.0 {
+        let kinetic = contents.inner_kinetic();
+        if kinetic > LIMITS.rest * scale || kinetic <= 0.0 {
             self.rest = [f64::NAN; 2];
             return f64::NAN;
         }

@@ -48,6 +48,11 @@ pub(super) fn names(dimension: usize) -> Vec<&'static Quantity> {
     if dimension == 2 {
         names.extend([&quantities::MODE_2, &quantities::MODE_3, &quantities::MODE_4]);
     }
+    names.extend([
+        &quantities::PRESSURE_JUMP_MEASURED,
+        &quantities::PRESSURE_BALANCED,
+        &quantities::PRESSURE_INSIDE_COUNT,
+    ]);
     names
 }
 
@@ -95,27 +100,6 @@ impl<const D: usize> SphSystem<D> {
         let width =
             if self.interface.level_set().is_some() { 2.0 * self.config.smoothing_length } else { f64::INFINITY };
         spread((0..band.len()).filter(|i| band[*i] == 1 && phi[*i].abs() < width).map(|i| curvature[i]))
-    }
-
-    /// Means of the pressure well inside and well outside: by the equation of state, and with what the balanced force has
-    /// absorbed inside.
-    fn mean_pressures(&self) -> [(f64, f64); 2] {
-        let far = 2.0 * self.config.smoothing_length;
-        let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
-        let mut sums = [[0.0; 3]; Species::ALL.len()];
-        for i in 0..phi.len() {
-            if band[i] == 1 && phi[i].abs() <= far {
-                continue;
-            }
-            let sum = &mut sums[usize::from(self.flow.species[i].code())];
-            sum[0] += 1.0;
-            sum[1] += self.flow.pressure[i];
-            sum[2] += self.flow.pressure[i] + self.absorbed_pressure(i);
-        }
-        [Species::Inside, Species::Outside].map(|species| {
-            let [count, pressure, full] = sums[usize::from(species.code())];
-            (pressure / count, full / count)
-        })
     }
 
     /// Area or volume, center and second moments of the inside, by quadrature on the fits; None without an interface.
@@ -183,11 +167,11 @@ impl<const D: usize> SphSystem<D> {
         row.extend(moments.map_or(nothing, EnclosedMoments::center).iter());
         row.extend(moments.map_or(nothing, |m| m.high - m.low).iter());
         row.push(moments.map_or(f64::NAN, deformation));
-        let [(inside, inside_full), (outside, _)] = self.mean_pressures();
+        let pressures = self.pressures(moments);
         let droplets = if self.config.has_tension() { self.droplets.number() as f64 } else { f64::NAN };
         let speed = self.flow.largest_speed();
         let sound = self.config.fluids.least_sound_speed();
-        row.extend([inside_full, outside, inside - outside, droplets, speed / sound]);
+        row.extend([pressures.inside, pressures.outside, pressures.eos_jump, droplets, speed / sound]);
         let (least, close) = self.pair_distances(crowded);
         row.extend([speed * time_step / self.config.spacing, least, speed, contents.interface]);
         row.extend([self.config.tension * contents.interface, contents.elastic, work]);
@@ -198,6 +182,7 @@ impl<const D: usize> SphSystem<D> {
         if D == 2 {
             row.extend(self.modes(moments));
         }
+        row.extend([pressures.measured_jump, pressures.balanced, pressures.inside_count]);
         (row, close)
     }
 

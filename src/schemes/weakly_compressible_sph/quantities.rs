@@ -27,6 +27,10 @@ quantities! {
         PRESSURE_INSIDE = "pressure_inside", "mass/(length*time^2)", "Mean pressure well inside the inner fluid.";
         PRESSURE_OUTSIDE = "pressure_outside", "mass/(length*time^2)", "Mean pressure well outside the inner fluid.";
         PRESSURE_EOS_JUMP = "pressure_eos_jump", "mass/(length*time^2)", "Jump of the pressure by the equation of state alone.";
+        PRESSURE_JUMP_MEASURED = "pressure_jump_measured", "mass/(length*time^2)", "Jump of the pressure as particles have it: by the equation of state, and what the force of surface tension takes over summed over the particles.";
+        PRESSURE_BALANCED = "pressure_balanced", "mass/(length*time^2)", "Jump tau kappa_0 that the balanced force takes out of the pressure.";
+        PRESSURE_INSIDE_COUNT = "pressure_inside_count", "particles", "Particles over which the pressure inside is a mean.";
+        WAVE_AMPLITUDE = "wave_amplitude", "length", "Amplitude of the wave on the sides of a layer.";
         DROPLETS = "droplets", "", "Connected components of the inner fluid.";
         MACH = "mach", "", "Largest speed by the lower speed of sound.";
         CFL = "cfl", "spacings", "Longest way of a particle in a part of the last step.";
@@ -89,6 +93,7 @@ pub(super) static EXTREMES: [&Quantity; MOST_TURNS] =
 /// Norms of the report.
 #[must_use]
 pub fn norms() -> Vec<&'static Quantity> {
-    let shared: &[&Quantity] = &[&measured_errors::MAX, &measured_errors::MEAN, &measured_errors::RELATIVE];
+    let shared: &[&Quantity] =
+        &[&measured_errors::MAX, &measured_errors::MEAN, &measured_errors::RELATIVE, &measured_errors::RMS];
     without_repetition(&[shared, OWN_NORMS])
 }

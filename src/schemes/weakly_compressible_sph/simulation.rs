@@ -1,17 +1,21 @@
 //! Two fluids step by step.
 
 use super::checks::LIMITS;
+use super::config::SphConfig;
+use super::dimensionless::{DimensionlessNumbers, Scales};
 use super::droplets::ball_curvature;
 use super::format_1;
 use super::frame_fields;
 use super::guard::Guard;
+use super::interactions::BodyForce;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
-use super::quantities::{TIME, TIME_STEP};
+use super::quantities::{TIME, TIME_STEP, WAVE_AMPLITUDE};
 use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, Instant, SphSystem};
 use super::time_step::{StepLimit, longest_step};
+use super::wave_record::WaveRecord;
 use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, entry, support_diagnostics};
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
 use crate::simulation::{
@@ -38,6 +42,7 @@ pub struct WeaklyCompressibleSph<const D: usize> {
     row: Row,
     guard: Guard<D>,
     summary: Summary,
+    wave: Option<WaveRecord>,
     course: Course,
 }
 
@@ -59,6 +64,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         method: BTreeMap<&'static str, String>,
     ) -> Self {
         let pace = Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 });
+        let wave = system.config.wave.clone().map(WaveRecord::new);
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
@@ -71,6 +77,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             resting: 0,
             row: Row::new(),
             summary: Summary::new(end_time),
+            wave,
             course: Course::new(pace, Phases::new(cpu_clock), method),
         };
         this.failure = this.begin().err();
@@ -122,12 +129,13 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         });
         self.row = row;
         let Clock { step, time } = self.clock();
-        self.summary.take_energy(time, contents.kinetic);
+        self.summary.take_energy(time, contents.inner_kinetic());
         let of = |name: &str| self.row_value(name);
         let jump = of("pressure_inside") - of("pressure_outside");
         let momentum = self.row[1..=D].iter().map(|m| m * m).sum::<f64>().sqrt();
-        let numbers = [jump, of("pressure_eos_jump"), of("curvature_mean"), of("curvature_std"), momentum];
-        self.summary.take(time >= 0.8 * self.end().time, numbers);
+        let jumps = [jump, of("pressure_eos_jump"), of("pressure_jump_measured"), of("pressure_balanced")];
+        let curvatures = [of("curvature_mean"), of("curvature_std")];
+        self.summary.take(time >= 0.8 * self.end().time, jumps, curvatures, momentum);
         let is_closed = !system.droplets.has_layer();
         if let Some(moments) = moments.filter(|_| is_closed) {
             let turned = self.summary.take_shape(time, moments.area_or_volume, deformation(&moments));
@@ -138,7 +146,12 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         // At fixed steps, so that the end of a run does not depend on what the series shows.
         let clock = self.clock();
         let last = self.course.pace.last;
-        if clock.step.is_multiple_of(measurement_interval(last)) || clock.step >= last {
+        let is_measured = clock.step.is_multiple_of(measurement_interval(last)) || clock.step >= last;
+        if let Some(wave) = &mut self.wave {
+            wave.take(&self.system, time, is_measured);
+        }
+        if is_measured {
+            self.summary.largest_speed = self.summary.largest_speed.max(self.system.flow.largest_relative_speed());
             let measured = (crowded, self.row_value(if D == 2 { "area" } else { "volume" }));
             self.guard.measure(&self.system, &contents, measured, clock)?;
             let Fastest { speed, sound_speed, .. } = fastest(&self.system);
@@ -147,16 +160,16 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         Ok(())
     }
 
-    /// The largest speed u as u √(ρD/τ), with the diameter D of the ball of the measure at the start.
+    /// The largest speed u about the mean velocity as u √(ρD/τ), with the diameter D of the ball of the measure at the start.
     fn scaled_speed(&self) -> Option<ErrorEntry> {
         if self.system.droplets.has_layer() {
             return None;
         }
         let diameter = 2.0 * (D - 1) as f64 / self.whole_curvature();
         let config = &self.system.config;
-        let scaled =
-            self.system.flow.largest_speed() * (config.fluids.inside.density * diameter / config.tension).sqrt();
-        let reference = "0 for a drop at rest; u sqrt(rho D/tau)";
+        let scaled = self.system.flow.largest_relative_speed()
+            * (config.fluids.inside.density * diameter / config.tension).sqrt();
+        let reference = "0 for a drop at rest; u sqrt(rho D/tau), u about the mean velocity";
         scaled.is_finite().then(|| entry("speed", "scaled", scaled, self.clock().time, reference))
     }
 
@@ -219,13 +232,15 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             let Clock { step, time } = next;
             return Err(StepError::TooFast { particle, speed, sound_speed, time_step, stable, bound, step, time });
         }
+        // In the frame of the start.
+        let about_start = system.flow.largest_speed_about(&system.config.start_velocity);
         self.resting = match system.config.rest_below {
-            Some(limit) if largest_speed < limit => self.resting + 1,
+            Some(limit) if about_start < limit => self.resting + 1,
             _ => 0,
         };
         if self.resting == PACING.steps_of_rest {
             let message =
-                format!("no particle has been faster than {largest_speed:.3e} for {} steps", PACING.steps_of_rest);
+                format!("no particle has been faster than {about_start:.3e} for {} steps", PACING.steps_of_rest);
             self.course.findings.push(Finding::info("came_to_rest", message, (next.step, next.time)));
         }
         Ok(())
@@ -308,6 +323,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     fn observables(&self) -> Observables {
         let mut row: Observables = vec![(&TIME, self.clock().time), (&TIME_STEP, self.time_of_part())];
         row.extend(names(D).into_iter().zip(self.row.iter().copied()));
+        row.extend(self.wave.as_ref().map(|wave| (&WAVE_AMPLITUDE, wave.amplitude)));
         row
     }
 
@@ -328,6 +344,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         state.put_count("resting_steps", self.resting);
         state.put_section("row", |section| save_row::<D>(&self.row, section));
         state.put_component("summary", &self.summary);
+        if let Some(wave) = &self.wave {
+            state.put_section("wave", |section| wave.save(section));
+        }
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
@@ -349,12 +368,16 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             true => Some(state.section("guard", |section| self.guard.load(section))?),
             false => None,
         };
+        let wave = match &self.wave {
+            Some(wave) => Some(state.section("wave", |section| wave.load(section))?),
+            None => None,
+        };
         self.system.load(state)?;
         // 2. From here on nothing fails.
         // An interrupt ends the run before its next step.
         let _ = self.system.derive();
         self.guard = guard.unwrap_or_else(|| Guard::new(&self.system));
-        self.failure = None;
+        (self.failure, self.wave) = (None, wave);
         (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
         (self.row, self.summary) = (row, summary.with_end(self.end_time));
         self.course.pace = pace;
@@ -378,6 +401,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         };
         let mut errors = self.summary.entries(D, self.clock().time, expected);
         errors.extend(self.scaled_speed());
+        errors.extend(self.wave.iter().flat_map(|wave| wave.errors(self.clock().time)));
         Report { errors, health: self.health(), diagnostics: self.diagnostics(), method: self.course.method.clone() }
     }
 
@@ -401,6 +425,24 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 }
 
 impl<const D: usize> WeaklyCompressibleSph<D> {
+    /// Numbers of the run, with the largest speed that was measured.
+    fn numbers(&self) -> DimensionlessNumbers {
+        let SphConfig { fluids, tension, spacing, wave, body_force, .. } = &self.system.config;
+        let largest = self.system.droplets.ball_curvatures.iter().copied().fold(0.0, f64::max);
+        let diameter = match wave {
+            Some(wave) => 2.0 * std::f64::consts::PI / wave.wavenumber,
+            None => 2.0 * (D - 1) as f64 / largest,
+        };
+        DimensionlessNumbers::from(Scales {
+            fluids: *fluids,
+            tension: *tension,
+            diameter,
+            speed: self.summary.largest_speed,
+            gravity: body_force.as_ref().map_or(0.0, BodyForce::constant_strength),
+            spacing: *spacing,
+        })
+    }
+
     fn diagnostics(&self) -> Vec<Diagnostic> {
         let mut diagnostics = Vec::new();
         if let Some(interface) = self.system.interface.level_set() {
@@ -411,6 +453,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         if let Some(flow) = self.system.equations.fits() {
             diagnostics.extend(support_diagnostics(FLOW_FITS, &flow.fit_diagnostics));
         }
+        diagnostics.extend(self.numbers().diagnostics());
         let doc = "Particles without a neighbor of their own fluid that took the side of their neighbors.";
         diagnostics.push(Diagnostic::count("strays.absorbed", self.system.strays.absorbed, doc));
         diagnostics

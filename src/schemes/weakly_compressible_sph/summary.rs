@@ -17,6 +17,8 @@ pub(super) struct Summary {
     pub least_curvature_std: f64,
     /// Largest Σ m u.
     pub momentum: f64,
+    /// Largest speed about the mean velocity.
+    pub largest_speed: f64,
     /// Connected components of the inner fluid.
     pub droplets: f64,
     /// Enclosed area or volume in the last measured state; NaN before.
@@ -41,6 +43,8 @@ pub(super) struct Late {
     pub count: f64,
     pub pressure_jump: f64,
     pub pressure_eos_jump: f64,
+    pub pressure_jump_measured: f64,
+    pub pressure_balanced: f64,
     pub curvature: f64,
 }
 
@@ -100,8 +104,22 @@ const LEAST_SWING: f64 = 0.01;
 
 impl Late {
     fn new(end_time: f64) -> Self {
-        Self { end_time, count: 0.0, pressure_jump: 0.0, pressure_eos_jump: 0.0, curvature: 0.0 }
+        Self {
+            end_time,
+            count: 0.0,
+            pressure_jump: 0.0,
+            pressure_eos_jump: 0.0,
+            pressure_jump_measured: 0.0,
+            pressure_balanced: 0.0,
+            curvature: 0.0,
+        }
     }
+}
+
+/// A sum that earlier versions may not have; NaN where it is not known.
+fn sum_if_any(section: &Section, name: &str) -> Result<f64, LoadError> {
+    let found = if section.has(name) { section.optional(name)? } else { None };
+    Ok(found.unwrap_or(f64::NAN))
 }
 
 impl Component for Late {
@@ -111,6 +129,8 @@ impl Component for Late {
         // Sums of what is not known stay unknown.
         section.put_optional("pressure_jump", known(self.pressure_jump));
         section.put_optional("pressure_eos_jump", known(self.pressure_eos_jump));
+        section.put_optional("pressure_jump_measured", known(self.pressure_jump_measured));
+        section.put_optional("pressure_balanced", known(self.pressure_balanced));
         section.put_optional("curvature", known(self.curvature));
     }
 
@@ -120,6 +140,9 @@ impl Component for Late {
             count: section.real("count")?,
             pressure_jump: section.optional("pressure_jump")?.unwrap_or(f64::NAN),
             pressure_eos_jump: section.optional("pressure_eos_jump")?.unwrap_or(f64::NAN),
+            // Version 0.2.0 did not measure them: its sums stay unknown.
+            pressure_jump_measured: sum_if_any(section, "pressure_jump_measured")?,
+            pressure_balanced: sum_if_any(section, "pressure_balanced")?,
             curvature: section.optional("curvature")?.unwrap_or(f64::NAN),
         })
     }
@@ -147,6 +170,7 @@ impl Component for Summary {
         section.put_optional("curvature_std", known(self.curvature_std));
         section.put_optional("least_curvature_std", known(self.least_curvature_std));
         section.put_real("momentum", self.momentum);
+        section.put_real("largest_speed", self.largest_speed);
         section.put_real("droplets", self.droplets);
         section.put_optional("measure", known(self.measure));
         section.put_component("before_last", &self.before_last);
@@ -175,6 +199,8 @@ impl Component for Summary {
             curvature_std: or_nan("curvature_std")?,
             least_curvature_std: section.optional("least_curvature_std")?.unwrap_or(f64::INFINITY),
             momentum: section.real("momentum")?,
+            // Version 0.2.0 did not measure it.
+            largest_speed: if section.has("largest_speed") { section.real("largest_speed")? } else { 0.0 },
             droplets: section.real("droplets")?,
             measure: or_nan("measure")?,
             before_last: section.component("before_last")?,
@@ -197,6 +223,7 @@ impl Summary {
             curvature_std: f64::NAN,
             least_curvature_std: f64::INFINITY,
             momentum: 0.0,
+            largest_speed: 0.0,
             droplets: 1.0,
             measure: f64::NAN,
             before_last: Shape::UNKNOWN,
@@ -216,13 +243,22 @@ impl Summary {
         self
     }
 
-    /// Takes pressure jump, its part by the equation of state, mean and deviation of the curvature, and |Σ m u|.
-    pub fn take(&mut self, is_late: bool, [jump, eos, mean, deviation, momentum]: [f64; 5]) {
+    /// Takes the pressure jump as a whole, by the equation of state, as measured and as put in; mean and deviation of the
+    /// curvature; and |Σ m u|.
+    pub fn take(&mut self, is_late: bool, jumps: [f64; 4], [mean, deviation]: [f64; 2], momentum: f64) {
         if is_late {
-            self.late.count += 1.0;
-            self.late.pressure_jump += jump;
-            self.late.pressure_eos_jump += eos;
-            self.late.curvature += mean;
+            let late = &mut self.late;
+            late.count += 1.0;
+            late.curvature += mean;
+            let sums = [
+                &mut late.pressure_jump,
+                &mut late.pressure_eos_jump,
+                &mut late.pressure_jump_measured,
+                &mut late.pressure_balanced,
+            ];
+            for (sum, jump) in sums.into_iter().zip(jumps) {
+                *sum += jump;
+            }
         }
         (self.curvature_mean, self.curvature_std) = (mean, deviation);
         self.least_curvature_std = self.least_curvature_std.min(deviation);
@@ -297,10 +333,16 @@ impl Summary {
                 entries.push(entry(quantity, norm, value, time, reference));
             }
         };
-        let Late { count: all, pressure_jump, pressure_eos_jump, curvature: curvatures, .. } = self.late;
-        let [count, jumps, eos, means] = [all, pressure_jump, pressure_eos_jump, curvatures].map(|sum| sum / all);
-        if count.is_finite() && self.droplets < 1.5 {
+        let Late { count, .. } = self.late;
+        let mean = |of: fn(&Late) -> f64| of(&self.late) / count;
+        let [jumps, eos, means] =
+            [mean(|late| late.pressure_jump), mean(|late| late.pressure_eos_jump), mean(|late| late.curvature)];
+        let [measured, balanced] = [mean(|late| late.pressure_jump_measured), mean(|late| late.pressure_balanced)];
+        if count > 0.0 && self.droplets < 1.5 {
             let late = "Young–Laplace, mean of the last fifth";
+            add("pressure_jump_measured", "relative", (measured / jump - 1.0).abs(), time, late);
+            add("pressure_jump_measured", "mean", measured, time, "mean of the last fifth");
+            add("pressure_balanced", "mean", balanced, time, "put in, mean of the last fifth");
             add("pressure_jump", "relative", (jumps / jump - 1.0).abs(), time, late);
             add("pressure_jump", "mean", jumps, time, "mean of the last fifth");
             add("pressure_eos_jump", "relative", (eos / jump).abs(), time, late);
@@ -351,7 +393,7 @@ mod tests {
         assert!((summary.crossings[0] - std::f64::consts::PI / 40.0).abs() < 1e-5);
         assert!((summary.extremes[0].time - std::f64::consts::PI / 20.0).abs() < 1e-5);
         assert!((summary.extremes[0].deformation + 1.0).abs() < 1e-5);
-        summary.take(true, [1.0, 2.0, 3.0, 4.0, 5.0]);
+        summary.take(true, [1.0, 2.0, 3.0, 4.0], [5.0, 6.0], 7.0);
         let mut section = Section::default();
         summary.save(&mut section);
         assert_eq!(section.find_non_finite(), None);

@@ -98,7 +98,7 @@ impl<const D: usize> SphSystem<D> {
             forces.push(Box::new(force));
         }
         Ok(Self {
-            flow: FlowState::at_rest(config.fluids, cell, &drop.level),
+            flow: FlowState::in_motion(config.fluids, cell, &drop.level, config.start_velocity),
             pairs: PairWorkspace::new(lists, kernel, cell, interrupt.clone()),
             interface,
             droplets: Droplets::new(domain.clone(), count, drop.measure),
@@ -276,6 +276,11 @@ impl<const D: usize> SphSystem<D> {
         for force in forces.iter() {
             force.add_to(&mut rates.acceleration, &moment);
         }
+    }
+
+    /// The force of surface tension, where there is one.
+    pub(super) fn tension(&self) -> Option<&SurfaceTension> {
+        self.tension.as_ref()
     }
 
     /// The part of the pressure that the balanced force has absorbed, at a particle.

@@ -42,6 +42,8 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
         is_shifted: false,
         body_force: None,
         integrator: Integrator::KickDriftKick,
+        start_velocity: Vector::<D>::zeros(),
+        wave: None,
         expected_speed: 3.0,
         is_adaptive: true,
         rest_below: None,
@@ -79,7 +81,7 @@ impl<const D: usize> Setting<D> {
     }
 
     pub fn flow(&self) -> FlowState<D> {
-        let mut flow = FlowState::at_rest(self.config.fluids, self.cell, &self.level);
+        let mut flow = FlowState::in_motion(self.config.fluids, self.cell, &self.level, Vector::<D>::zeros());
         flow.velocity.clone_from(&self.velocity);
         flow.predicted.clone_from(&self.velocity);
         flow

@@ -1,9 +1,7 @@
-//! Exact linear theory of oscillating drops and capillary waves, independent of the project's methods.
+//! Exact linear theory of oscillating drops, independent of the project's methods.
 //!
 //! All fluids are viscous and incompressible, amplitudes are small, and the outer fluid has no walls unless a
 //! function says so. The module uses nothing but `nalgebra::Complex`; units are those of the caller.
 
 mod bessel_ratios;
-pub mod capillary_wave;
 pub mod drop_mode;
-mod scaled_erfc;

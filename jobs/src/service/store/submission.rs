@@ -17,6 +17,8 @@ pub struct NewJob {
     pub(super) spec: String,
     pub(super) resolved: String,
     pub(super) estimate: String,
+    /// What is doubtful before it runs.
+    pub(super) warnings: String,
     pub(super) memory_bytes: u64,
     /// Bytes that its files will take.
     pub disk_bytes: u64,
@@ -40,6 +42,7 @@ impl NewJob {
             spec: body.spec.to_string(),
             resolved: body.resolved.to_json().to_string(),
             estimate: json!(body.forecast.record()).to_string(),
+            warnings: json!(body.scene.warnings()).to_string(),
             memory_bytes: body.forecast.memory_bytes,
             disk_bytes: body.forecast.disk_bytes,
             priority: body.resolved.priority,
@@ -125,8 +128,8 @@ pub(super) fn insert(
     transaction
         .prepare_cached(
             "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
-                 restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes)
-             VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17)",
+                 restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings)
+             VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18)",
         )?
         .execute(params![
             id,
@@ -146,6 +149,7 @@ pub(super) fn insert(
             now_s - job.priority as f64 * AGING_S,
             i64::try_from(job.memory_bytes).unwrap_or(i64::MAX),
             i64::try_from(job.disk_bytes).unwrap_or(i64::MAX),
+            job.warnings,
         ])?;
     for upload in &job.uploads {
         let known = transaction

@@ -16,6 +16,8 @@ pub enum BodyForce<const D: usize> {
     WithoutMean(Vector<D>),
     /// An acceleration for each species.
     BySpecies {
+        /// The acceleration g of which the mean force was taken out.
+        whole: Vector<D>,
         /// Of the fluid inside.
         inside: Vector<D>,
         /// Of the fluid outside.
@@ -39,7 +41,7 @@ impl<const D: usize> BodyForce<D> {
     pub fn acceleration(&self, x: &Vector<D>, time: f64, species: Species) -> Vector<D> {
         match self {
             Self::Constant(acceleration) | Self::WithoutMean(acceleration) => *acceleration,
-            Self::BySpecies { inside, outside } => match species {
+            Self::BySpecies { inside, outside, .. } => match species {
                 Species::Inside => *inside,
                 Species::Outside => *outside,
             },
@@ -60,7 +62,16 @@ impl<const D: usize> BodyForce<D> {
     pub fn without_mean(self, mean_density: f64, fluids: &Fluids) -> Self {
         let Self::WithoutMean(acceleration) = self else { return self };
         let share = |species: Species| acceleration * (1.0 - mean_density / fluids[species].density);
-        Self::BySpecies { inside: share(Species::Inside), outside: share(Species::Outside) }
+        Self::BySpecies { whole: acceleration, inside: share(Species::Inside), outside: share(Species::Outside) }
+    }
+
+    /// Size g of a constant acceleration, whether or not its mean force is taken out; 0 of other forces.
+    #[must_use]
+    pub fn constant_strength(&self) -> f64 {
+        match self {
+            Self::Constant(whole) | Self::WithoutMean(whole) | Self::BySpecies { whole, .. } => whole.norm(),
+            Self::Pulse { .. } => 0.0,
+        }
     }
 
     /// The largest acceleration.
@@ -68,7 +79,7 @@ impl<const D: usize> BodyForce<D> {
     pub fn strength(&self) -> f64 {
         match self {
             Self::Constant(acceleration) | Self::WithoutMean(acceleration) => acceleration.norm(),
-            Self::BySpecies { inside, outside } => inside.norm().max(outside.norm()),
+            Self::BySpecies { inside, outside, .. } => inside.norm().max(outside.norm()),
             Self::Pulse { coefficient, .. } => coefficient.abs(),
         }
     }

@@ -32,8 +32,8 @@ impl TensionForce {
 }
 
 /// Share of δ_{ε/2} in the δ of the balanced force, the rest is δ_ε. A force that is spread over the width ε acts on the
-/// interface like ∫ e^{−k|φ|} δ dφ at the wave number k, and generates vorticity as wide: both lower frequency and decay.
-/// With all of δ_ε decay is 10.6 % low at 13 particles a radius, with this share 6 % (measured, La = 8000).
+/// interface like ∫ e^{−k|φ|} δ dφ at the wave number k, and generates vorticity as wide: both lower frequency and decay. With
+/// more of the narrow δ the decay of resolved drops comes out too high (measured; docs/results/droplet-notes.md).
 const NARROW_SHARE: f64 = 0.15;
 
 /// Surface tension: −(τ/ρ) (κ − κ₀) n δ.
@@ -54,7 +54,7 @@ impl SurfaceTension {
     }
 
     /// The δ of the force at a signed distance.
-    fn profile(&self, distance: f64) -> f64 {
+    pub fn profile(&self, distance: f64) -> f64 {
         let wide = smoothed_delta(distance, self.smoothing_length);
         if self.force != TensionForce::Balanced {
             return wide;

@@ -1,7 +1,9 @@
 //! A standing capillary wave between two viscous fluids, from rest.
 
-use super::scaled_erfc::scaled_erfc;
+mod scaled_erfc;
+
 use nalgebra::Complex;
+use scaled_erfc::scaled_erfc;
 
 /// The wave on the plane surface between two unbounded layers of equal kinematic viscosity, without gravity. It starts
 /// at rest with the shape a₀ cos(kx).
@@ -13,7 +15,7 @@ use nalgebra::Complex;
 ///
 /// over the four roots z of `z⁴ − 4β√ε z³ + 2(1−6β)ε z² + 4(1−3β)ε^{3/2} z + (1−4β)ε² + ω₀² = 0`, where Z is the product
 /// of the three differences (other root − z).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CapillaryWave {
     /// ω₀, the frequency without viscosity.
     frequency: f64,
@@ -28,6 +30,7 @@ impl CapillaryWave {
     /// viscosity ν and tension τ.
     ///
     /// In terms of a Laplace number La = ρτλ/η² of the wavelength λ, ν = √(τλ/(ρ La)).
+    #[must_use]
     pub fn new(wavenumber: f64, densities: [f64; 2], kinematic_viscosity: f64, tension: f64) -> Self {
         let density = densities[0] + densities[1];
         let frequency = (tension * wavenumber.powi(3) / density).sqrt();
@@ -44,12 +47,14 @@ impl CapillaryWave {
     }
 
     /// ω₀ = √(τk³/(ρ₁ + ρ₂)), the angular frequency without viscosity.
+    #[must_use]
     pub fn inviscid_frequency(&self) -> f64 {
         self.frequency
     }
 
     /// Amplitude a(t)/a₀ at a time t ≥ 0. Two roots approach each other in strong damping, so that rounding grows to some
     /// 1e-16 (ε/ω₀)².
+    #[must_use]
     pub fn amplitude_ratio(&self, time: f64) -> f64 {
         let t = self.frequency * time;
         let share = (1.0 - 4.0 * self.beta) * self.damping.powi(2);

@@ -1,0 +1,84 @@
+//! Layers across the box, at rest or with a standing wave on both sides.
+
+use super::spec::{Droplet, ForceChoice};
+use crate::geometry::Vector;
+use crate::geometry::surfaces::WavyLayer;
+use crate::scenes::shapes::Shape;
+use crate::schemes::capillary_wave::CapillaryWave;
+use crate::schemes::weakly_compressible_sph::StandingWave;
+use crate::spec::{Parameter, Violation};
+use serde_json::json;
+use std::f64::consts::TAU;
+
+/// The layer that a shape stands for, in a box of a length along x.
+pub(super) fn layer_of(shape: &Shape, length: f64) -> Option<WavyLayer> {
+    let Shape::Layer { height, thickness, amplitude, wavelength, crest } = shape else { return None };
+    let wavelength = wavelength.unwrap_or(length);
+    Some(WavyLayer { height: *height, thickness: *thickness, amplitude: *amplitude, wavelength, crest: *crest })
+}
+
+/// Relative difference of the box from a whole number of waves.
+const WAVE_SLACK: f64 = 1e-9;
+
+/// Checks that a layer fits into a box; its shape gets the wavelength.
+pub(super) fn check_layer<const D: usize>(shape: &mut Shape, lengths: &Vector<D>, errors: &mut Vec<Violation>) {
+    let got = shape.clone();
+    let Shape::Layer { thickness, amplitude, wavelength, .. } = shape else { return };
+    let wavelength = *wavelength.get_or_insert(lengths[0]);
+    let waves = lengths[0] / wavelength;
+    if (waves - waves.round()).abs() > WAVE_SLACK * waves || waves < 0.5 {
+        let detail = "the box is not a whole number of waves long";
+        let allowed = json!(lengths[0] / waves.round().max(1.0));
+        errors.push(Violation::new("/shape/wavelength", "conflict", detail, wavelength, allowed));
+    }
+    if 2.0 * *amplitude >= *thickness {
+        let detail = "the sides of the layer would meet in the troughs";
+        let allowed = format!("a number < {}", 0.5 * *thickness);
+        errors.push(Violation::new("/shape/amplitude", "range", detail, *amplitude, allowed));
+    }
+    if *thickness + 2.0 * *amplitude >= lengths[1] {
+        let detail = "the layer is as thick as the box is high";
+        errors.push(Violation::new("/shape", "conflict", detail, got.to_json(), json!(lengths[1])));
+    }
+}
+
+/// Where linear theory of two unbounded layers holds for a wave of wave number k.
+struct Validity {
+    /// Least k times the thickness of either layer: ω of the waves on two sides differs by e^(−kd), .2 % at 2π.
+    depth: f64,
+    /// Largest k a₀: ω falls by (k a₀)²/16.
+    steepness: f64,
+}
+
+const VALIDITY: Validity = Validity { depth: TAU, steepness: 0.1 };
+
+/// The wave of a layer, with linear theory where it holds: equal kinematic viscosities, no force from outside, deep layers and
+/// flat waves.
+pub(super) fn standing_wave<const D: usize>(
+    shape: &Shape,
+    spec: &Droplet,
+    tension: f64,
+    lengths: &Vector<D>,
+) -> Option<StandingWave> {
+    let layer = layer_of(shape, lengths[0]).filter(|layer| layer.amplitude > 0.0)?;
+    let wavenumber = TAU / layer.wavelength;
+    let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
+    let kinematic = [inside, outside].map(|fluid| fluid.viscosity / fluid.density);
+    let is_alike = (kinematic[0] - kinematic[1]).abs() <= 1e-9 * kinematic[0];
+    let is_free = spec.body_force.as_ref().is_none_or(|force| *force == ForceChoice::None);
+    let thinner = layer.thickness.min(lengths[1] - layer.thickness);
+    let is_linear = wavenumber * thinner >= VALIDITY.depth && wavenumber * layer.amplitude <= VALIDITY.steepness;
+    let theory = (is_alike && is_free && is_linear && tension > 0.0)
+        .then(|| CapillaryWave::new(wavenumber, [inside.density, outside.density], kinematic[0], tension));
+    Some(StandingWave { wavenumber, crest: layer.crest, amplitude: layer.amplitude, theory })
+}
+
+/// Signed distance from the nearest image of a layer, in a box of a height.
+pub(super) fn distance_from_layer<const D: usize>(layer: &WavyLayer, height: f64, x: &Vector<D>) -> f64 {
+    let distance = |turns: f64| {
+        let mut image = *x;
+        image[1] += turns * height;
+        layer.signed_distance(&image)
+    };
+    [-1.0, 0.0, 1.0].into_iter().map(distance).fold(f64::INFINITY, f64::min)
+}
