@@ -13,6 +13,7 @@ pub mod normals;
 pub mod orientation;
 pub mod planes;
 pub mod preparation;
+mod rays;
 pub mod relaxation;
 pub mod star_graph;
 pub mod stars;

@@ -4,8 +4,9 @@
 //! normal is the other. Sides are passed on along the tree of the edges where normal and mirror image differ least.
 //!
 //! Bodies that touch are one part of the graph, and the tree passes sides on through their contact, where normals mean nothing.
-//! So a piece of trusted points that closes on itself is turned outward by itself.
+//! So every piece of trusted points is turned outward by itself.
 
+use super::rays::outward_share;
 use super::star_graph::StarGraph;
 use crate::geometry::Vector;
 use std::cmp::Ordering;
@@ -94,18 +95,86 @@ const CLOSED: f64 = 0.1;
 const LEAST_PIECE: usize = 12;
 /// Least agreement of the normals of neighbors in a piece.
 const SMOOTH: f64 = 0.5;
+/// Share of a part that is most of it: its sides are those that the part got as a whole.
+const MOST: f64 = 0.9;
 
-/// Turns oriented normals outward on every piece of trusted points that closes on itself, and those of other points to the side
-/// of most of their neighbors there. Returns the number of such pieces.
+/// Turns oriented normals outward on every piece of trusted points, and those of other points to the side of their
+/// neighbors there. Returns the number of pieces that close on themselves.
+///
+/// The outer side of a piece is found by rays that leave it along its normals ([`outward_share`]), which does not ask for a closed
+/// piece: near a contact a coarse body has no trusted points. Where rays say nothing, a closed piece goes by its signed volume.
 pub fn orient_pieces<const D: usize>(
     points: &[Vector<D>],
     graph: &StarGraph,
     is_trusted: &[bool],
     normals: &mut [Vector<D>],
 ) -> usize {
-    let mut is_done = vec![false; points.len()];
     let mut is_turned = vec![false; points.len()];
+    let mut is_placed = vec![false; points.len()];
     let mut closed = 0;
+    let sizes = graph.part_sizes();
+    for piece in smooth_pieces(points, graph, is_trusted, normals) {
+        if piece.len() < LEAST_PIECE {
+            continue;
+        }
+        piece.iter().for_each(|i| is_placed[*i] = true);
+        let sum = piece.iter().fold(Vector::<D>::zeros(), |sum, i| sum + normals[*i] * graph.areas[*i]);
+        let whole: f64 = piece.iter().map(|i| graph.areas[*i]).sum();
+        let is_closed = sum.norm() <= CLOSED * whole;
+        closed += usize::from(is_closed);
+        let part = graph.parts[piece[0]];
+        let is_most = piece.len() as f64 > MOST * sizes[part as usize] as f64;
+        let turns = match outward_share(points, normals, graph, &piece).filter(|_| !is_most) {
+            Some(share) => share < 0.5,
+            None => is_closed && points_inward(points, graph, normals, &piece),
+        };
+        if turns {
+            piece.iter().for_each(|i| is_turned[*i] = true);
+        }
+    }
+    normals.iter_mut().zip(&is_turned).filter(|(_, turned)| **turned).for_each(|(n, _)| *n = -*n);
+    let mut is_touched = vec![false; graph.part_count];
+    (0..points.len()).filter(|i| is_turned[*i]).for_each(|i| is_touched[graph.parts[i] as usize] = true);
+    is_placed.iter_mut().zip(&graph.parts).for_each(|(placed, part)| *placed |= !is_touched[*part as usize]);
+    go_along(points, graph, is_placed, normals);
+    closed
+}
+
+/// Turns points that have no side yet to that of their neighbors that have one, layer by layer.
+fn go_along<const D: usize>(
+    points: &[Vector<D>],
+    graph: &StarGraph,
+    mut is_placed: Vec<bool>,
+    normals: &mut [Vector<D>],
+) {
+    loop {
+        let agreed = |i: usize| {
+            let near = graph.neighbors(i).iter().map(|j| *j as usize).filter(|j| is_placed[*j]);
+            near.map(|j| agreement(points, normals, i, j)).reduce(|sum, value| sum + value)
+        };
+        let open = (0..points.len()).filter(|i| !is_placed[*i]);
+        let layer: Vec<(usize, f64)> = open.filter_map(|i| Some((i, agreed(i)?))).collect();
+        if layer.is_empty() {
+            return;
+        }
+        for (i, sum) in layer {
+            is_placed[i] = true;
+            if sum < 0.0 {
+                normals[i] = -normals[i];
+            }
+        }
+    }
+}
+
+/// Pieces of trusted points that are joined by edges along which normals agree.
+fn smooth_pieces<const D: usize>(
+    points: &[Vector<D>],
+    graph: &StarGraph,
+    is_trusted: &[bool],
+    normals: &[Vector<D>],
+) -> Vec<Vec<usize>> {
+    let mut is_done = vec![false; points.len()];
+    let mut pieces = Vec::new();
     for start in (0..points.len()).filter(|i| is_trusted[*i]) {
         if is_done[start] {
             continue;
@@ -122,25 +191,9 @@ pub fn orient_pieces<const D: usize>(
                 }
             }
         }
-        let sum = piece.iter().fold(Vector::<D>::zeros(), |sum, i| sum + normals[*i] * graph.areas[*i]);
-        let whole: f64 = piece.iter().map(|i| graph.areas[*i]).sum();
-        if piece.len() < LEAST_PIECE || sum.norm() > CLOSED * whole {
-            continue;
-        }
-        closed += 1;
-        if points_inward(points, graph, normals, &piece) {
-            piece.iter().for_each(|i| is_turned[*i] = true);
-        }
+        pieces.push(piece);
     }
-    // A point outside of the pieces goes with most of its neighbors.
-    let goes_along = |i: &usize| {
-        let near = graph.neighbors(*i);
-        2 * near.iter().filter(|j| is_turned[**j as usize]).count() > near.len()
-    };
-    let along: Vec<usize> = (0..points.len()).filter(|i| !is_done[*i]).filter(goes_along).collect();
-    along.into_iter().for_each(|i| is_turned[i] = true);
-    normals.iter_mut().zip(&is_turned).filter(|(_, turned)| **turned).for_each(|(n, _)| *n = -*n);
-    closed
+    pieces
 }
 
 /// Least |Σ A n·x| by Σ A |x| of a part that encloses a volume, x measured from its middle.

@@ -79,3 +79,34 @@ fn what_is_no_surface_is_refused() {
     let one = vec![Vector::<3>::x(); 500];
     assert!(matches!(PreparedCloud::new(&one, None, Cleaning::Drop), Err(Unusable::TooFew { count: 1, .. })));
 }
+
+/// Two coarse spheres that touch: near the contact no point can be trusted, so that neither piece is closed.
+#[test]
+fn coarse_bodies_that_touch_face_outward() {
+    for (count, radius, gap) in [(200, 1.0, 0.0), (150, 1.0, 0.02), (200, 0.6, 0.0), (250, 0.8, -0.02)] {
+        let ball = fibonacci::sphere(count);
+        let center = Vector::<3>::new(1.0 + radius + gap, 0.0, 0.0);
+        let points: Vec<Vector<3>> = ball.iter().copied().chain(ball.iter().map(|x| x * radius + center)).collect();
+        let found = PreparedCloud::new(&points, None, Cleaning::Drop).unwrap();
+        let contact = Vector::<3>::x();
+        for (i, n) in found.normals.iter().enumerate() {
+            let outward = ball[found.kept[i] % count];
+            let is_apart = (found.points[i] - contact).norm() > 0.7;
+            assert!(!is_apart || n.dot(&outward) > 0.8, "{count} {radius} {gap}: point {i} {}", n.dot(&outward));
+        }
+    }
+}
+
+/// A row of three balls that touch: every body by itself.
+#[test]
+fn a_row_of_bodies_faces_outward() {
+    let ball = fibonacci::sphere(220);
+    let centers = [0.0, 2.0, 4.0].map(|x| Vector::<3>::new(x, 0.0, 0.0));
+    let points: Vec<Vector<3>> = centers.iter().flat_map(|c| ball.iter().map(move |x| x + c)).collect();
+    let found = PreparedCloud::new(&points, None, Cleaning::Drop).unwrap();
+    let wrong = (0..points.len()).filter(|i| {
+        let is_apart = [1.0, 3.0].iter().all(|x| (found.points[*i] - Vector::<3>::x() * *x).norm() > 0.7);
+        is_apart && found.normals[*i].dot(&ball[*i % 220]) < 0.8
+    });
+    assert_eq!(wrong.count(), 0);
+}
