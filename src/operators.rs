@@ -19,4 +19,4 @@ pub use construction::{Construction, construct};
 pub use derivative_tensor::{Tensor, derivative_tensor, divergence, sum_of_minors};
 pub use evaluation::Evaluation;
 pub use fits::{Support, SupportDiagnostics};
-pub use star_rows::{RowKind, StarCloud, StarRows, StarSupport, construct_star_rows};
+pub use star_rows::{EdgeRule, RowKind, StarCloud, StarRows, StarSupport, construct_star_rows};

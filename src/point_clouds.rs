@@ -6,6 +6,7 @@
 
 pub mod bump;
 pub mod cleaning;
+pub mod edges;
 pub mod examination;
 pub mod given_normals;
 pub mod local_spacing;

@@ -75,6 +75,25 @@ impl<const M: usize> Basis<M> {
         }
     }
 
+    /// Derivatives of all functions along `direction` at the scaled coordinates `x`.
+    pub fn slopes(&self, x: [f64; M], direction: [f64; M], out: &mut Vec<f64>) {
+        let mut t = [[1.0; MAX_DEGREE + 1]; M];
+        let mut slope = [[0.0; MAX_DEGREE + 1]; M];
+        for ((t, slope), x) in t.iter_mut().zip(&mut slope).zip(x) {
+            (t[1], slope[1]) = (x, 1.0);
+            for n in 2..=self.degree {
+                t[n] = 2.0 * x * t[n - 1] - t[n - 2];
+                slope[n] = 2.0 * t[n - 1] + 2.0 * x * slope[n - 1] - slope[n - 2];
+            }
+        }
+        let derivative = |a: &[u8; M], along: usize| -> f64 {
+            (0..M).map(|d| if d == along { slope[d] } else { t[d] }[usize::from(a[d])]).product()
+        };
+        let at = |(a, _): &([u8; M], f64)| (0..M).map(|d| direction[d] * derivative(a, d)).sum::<f64>();
+        out.clear();
+        out.extend(self.functions.iter().map(at));
+    }
+
     /// Derivatives ∂^α of all functions at the origin, in scaled coordinates. None for α = 0 or beyond the degree.
     pub fn derivative(&self, alpha: &[u8; M]) -> Option<&[f64]> {
         let place = self.functions.iter().position(|(a, _)| a == alpha)?;
@@ -107,6 +126,15 @@ mod tests {
             }
         }
         assert!(basis.derivative(&[0; M]).is_none());
+        // Slopes away from the origin, by central differences.
+        let (x, direction) = ([0.3; M], std::array::from_fn::<f64, M, _>(|d| 1.0 - 0.4 * d as f64));
+        let moved = |by: f64| at(&basis, std::array::from_fn(|d| x[d] + by * direction[d]));
+        let (up, down) = (moved(1e-5), moved(-1e-5));
+        let mut slopes = Vec::new();
+        basis.slopes(x, direction, &mut slopes);
+        for k in 0..basis.size() {
+            assert!(((up[k] - down[k]) / 2e-5 - slopes[k]).abs() < 1e-7 * (1.0 + slopes[k].abs()), "{k}");
+        }
     }
 
     #[test]

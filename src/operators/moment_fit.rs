@@ -18,12 +18,25 @@ pub struct Node<const M: usize> {
     pub height: f64,
 }
 
+/// A condition on a fit: its derivative vanishes along a direction at a place, as at an edge without flux.
+#[derive(Debug, Clone, Copy)]
+pub struct SlopeCondition<const M: usize> {
+    /// Coordinates relative to the center, divided by the radius of the support.
+    pub at: [f64; M],
+    /// Direction, of length one or less where it leaves the plane of the chart.
+    pub direction: [f64; M],
+    /// Weight in the fit, not negative.
+    pub window: f64,
+}
+
 /// Workspace of the fits of up to four points.
 #[derive(Debug, Default)]
 pub(super) struct MomentFit<const M: usize> {
     systems: LaneSystems,
     /// The neighbors in the support of each lane.
     pub near: [Vec<Node<M>>; LANES],
+    /// Conditions on the slopes of each lane.
+    pub slopes: [Vec<SlopeCondition<M>>; LANES],
     /// Values of the basis functions, node by node.
     values: Vec<Lanes>,
     /// Weights of the nodes in the fit.
@@ -41,6 +54,36 @@ impl<const M: usize> MomentFit<M> {
     /// Computes the moment matrices Σ W p pᵀ of the present supports and factorizes them. Returns the smallest pivot
     /// ratio of each lane.
     pub fn factorize(&mut self, basis: &Basis<M>) -> [f64; LANES] {
+        self.accumulate(basis);
+        self.systems.factorize().to_array()
+    }
+
+    /// Whether any lane has conditions on its slopes.
+    pub fn has_slopes(&self) -> bool {
+        self.slopes.iter().any(|slopes| !slopes.is_empty())
+    }
+
+    /// Does the same with Σ W s sᵀ of the conditions added, where s are the slopes of the functions. Solutions then keep to
+    /// the conditions as far as their weights say.
+    pub fn factorize_with_slopes(&mut self, basis: &Basis<M>) -> [f64; LANES] {
+        self.accumulate(basis);
+        let mut values = Vec::new();
+        for (lane, slopes) in self.slopes.iter().enumerate() {
+            for SlopeCondition { at, direction, window } in slopes {
+                basis.slopes(*at, *direction, &mut values);
+                let matrix = self.systems.matrix_mut();
+                for (a, value) in values.iter().enumerate() {
+                    for (entry, other) in matrix[packed_row(a)..=packed_row(a) + a].iter_mut().zip(&values[..=a]) {
+                        entry.as_mut_array()[lane] += window * value * other;
+                    }
+                }
+            }
+        }
+        self.systems.factorize().to_array()
+    }
+
+    /// Computes the moment matrices.
+    fn accumulate(&mut self, basis: &Basis<M>) {
         let number = basis.size();
         let rows = self.near.iter().map(Vec::len).max().unwrap_or(0);
         self.systems.reset(number);
@@ -70,7 +113,6 @@ impl<const M: usize> MomentFit<M> {
                 }
             }
         }
-        self.systems.factorize().to_array()
     }
 
     /// Fits the heights of the nodes. The coefficients are then in `solution`.

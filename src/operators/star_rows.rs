@@ -7,6 +7,9 @@
 //! 3. A positive row: a quadratic fit that drops neighbors until no weight is negative.
 //! 4. The row of the Voronoi cell of the point.
 //!
+//! At an edge without flux fits keep to that condition at the points of the edge in their support. So they have their order there,
+//! too, and are bounded. Where values at points are wanted, fits at edges are one-sided and need no bound.
+//!
 //! A row is bounded if its weight w_ii is negative and R_i = Σ_{j≠i} |w_ij|/|w_ii| is at most 3. Measured on 120 operators on
 //! clouds of all kinds: with a limit of 1.5 to 6 no operator has a growing mode, with 10 and more some have.
 
@@ -25,6 +28,21 @@ use growth::GrowingFits;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 use walk::Walk;
 
+/// What the rows of points near an edge keep to.
+#[derive(Debug, Clone, Copy)]
+pub enum EdgeRule<'a, const D: usize> {
+    /// Values at points are wanted: a fit whose support has points of the edge need not be bounded.
+    OneSided,
+    /// An equation is solved. The derivative of the field along the conormal vanishes at the points that have one, and a fit with
+    /// such points in its support keeps to that condition. The rows of points that hold a value are not used, whatever they are.
+    Equation {
+        /// Conormals of points that nothing flows through; may be empty.
+        conormals: &'a [Option<Vector<D>>],
+        /// Whether each point holds a value; may be empty.
+        is_held: &'a [bool],
+    },
+}
+
 /// A cloud with its stars.
 #[derive(Debug, Clone, Copy)]
 pub struct StarCloud<'a, const D: usize> {
@@ -38,6 +56,8 @@ pub struct StarCloud<'a, const D: usize> {
     pub graph: &'a StarGraph,
     /// Origin of the metric.
     pub metric: Metric,
+    /// What the rows of points near an edge keep to.
+    pub edges: EdgeRule<'a, D>,
 }
 
 /// Degree of polynomials, and the radius of supports in local spacings.
@@ -107,7 +127,7 @@ fn ratio(weights: impl Iterator<Item = f64>) -> f64 {
 /// ```
 /// use meniscus::geometry::{Vector, fibonacci};
 /// use meniscus::operators::charts::tangent::Metric;
-/// use meniscus::operators::{Functional, StarCloud, StarSupport, construct_star_rows};
+/// use meniscus::operators::{EdgeRule, Functional, StarCloud, StarSupport, construct_star_rows};
 /// use meniscus::parallel::Interrupt;
 /// use meniscus::point_clouds::{PreparedCloud, cleaning::Cleaning};
 ///
@@ -120,6 +140,7 @@ fn ratio(weights: impl Iterator<Item = f64>) -> f64 {
 ///     spacings: &found.spacings,
 ///     graph: &found.graph,
 ///     metric: Metric::FromHeights,
+///     edges: EdgeRule::OneSided,
 /// };
 /// let supports = [StarSupport { degree: 3, cutoff: 2.4 }];
 /// let built = construct_star_rows::<3, 2>(cloud, &supports, &[Functional::LaplaceBeltrami], &Interrupt::default()).unwrap();

@@ -1,5 +1,6 @@
 //! `surface_pde`: operators and equations on surfaces (Surface DC-PSE paper).
 
+mod edges;
 mod points;
 mod preparation;
 mod problems;

@@ -284,14 +284,14 @@ fn equations_are_solved_on_uploaded_surfaces_with_and_without_normals() {
 #[test]
 fn what_is_wrong_with_an_uploaded_surface_is_an_event_or_ends_the_job_with_the_points_named() {
     let (_directory, service) = service(&["--slots", "1"]);
-    let job = |bytes: &[u8]| {
+    let job = |bytes: &[u8], clean: &str| {
         let surface = upload(&service, "surface", bytes);
-        let surface = json!({"type": "points", "upload": surface["id"]});
+        let surface = json!({"type": "points", "upload": surface["id"], "clean": clean});
         service.submit(&json!({"scene": {"kind": "surface_pde", "surface": surface, "problem": "curvature"}}))
     };
     let whole = String::from_utf8(sphere_xyz(true)).unwrap();
     let lines: Vec<&str> = whole.lines().collect();
-    let holed = job(lines[..1450].join("\n").as_bytes());
+    let holed = job(lines[..1450].join("\n").as_bytes(), "drop");
     service.wait_for(&holed, &["succeeded"]);
     let events = service.get(&format!("/v1/jobs/{holed}/events?limit=100")).json();
     let findings: Vec<&Value> =
@@ -320,8 +320,12 @@ fn what_is_wrong_with_an_uploaded_surface_is_an_event_or_ends_the_job_with_the_p
     let bits = frame.dataset("VTKHDF/PointData/finding").unwrap().read_raw::<i64>().unwrap();
     let marked: Vec<usize> = (0..bits.len()).filter(|point| bits[*point] & bit != 0).collect();
     assert_eq!(json!(marked), finding["points"]);
-    let twins = job(format!("{whole}{}\n", lines[3]).as_bytes());
-    let failed = service.wait_for(&twins, &["failed"]);
+    // Twins are left out and told, or refused where that is asked for.
+    let twins = format!("{whole}{}\n", lines[3]);
+    let merged = service.wait_for(&job(twins.as_bytes(), "drop"), &["succeeded"]);
+    assert_eq!(merged["health"]["findings"][0]["code"], "points.merged", "{merged}");
+    assert!(merged.to_string().contains("point 1500:"), "{merged}");
+    let failed = service.wait_for(&job(twins.as_bytes(), "refuse"), &["failed"]);
     assert_eq!(failed["reason"], "input.damaged");
     assert!(failed.to_string().contains("points 3, 1500:"), "{failed}");
 }

@@ -49,18 +49,23 @@ fn positive_row<const D: usize, const M: usize>(
 ) -> Option<Row<M>> {
     let mut near = Vec::new();
     workspace.walk.gather(&builder.cloud, i, radius, &mut near);
+    let slopes = workspace.walk.slopes.clone();
     for _ in 0..REFITS {
         if near.len() < basis.size() {
             return None;
         }
         let Workspace { fits, .. } = workspace;
         fits.fit.near.iter_mut().for_each(|lane| lane.clone_from(&near));
+        fits.fit.slopes.iter_mut().for_each(|lane| lane.clone_from(&slopes));
         // A pivot that is no number is not large enough either.
         if fits.fit.factorize(basis)[0] > LEAST_PIVOT {
             let found = match builder.cloud.metric {
                 Metric::FromHeights => heights(basis, &mut fits.fit, [radius; LANES], [true; LANES])[0],
                 Metric::FromNormals => flat(),
             };
+            if fits.fit.has_slopes() {
+                fits.fit.factorize_with_slopes(basis);
+            }
             let weights = solve(builder, basis, (i, radius, Functional::LaplaceBeltrami, &found), workspace);
             let largest = weights[..near.len()].iter().fold(0.0_f64, |most, w| most.max(w.abs()));
             let is_negative = |place: usize| weights[place] < -NEGATIVE * largest;

@@ -33,6 +33,8 @@ pub(super) struct Workspace<const M: usize> {
 struct Candidate {
     point: usize,
     growth: f64,
+    /// Whether its row must be bounded.
+    is_bounded: bool,
 }
 
 impl<const M: usize> GrowingFits<M> {
@@ -58,20 +60,25 @@ impl<const M: usize> GrowingFits<M> {
             for (lane, place) in lanes.iter_mut().enumerate() {
                 while place.is_none() {
                     let Some(point) = open.next() else { break };
-                    *place = self.gather(builder, Candidate { point, growth: 1.0 }, lane, workspace);
+                    *place = self.gather(builder, Candidate { point, growth: 1.0, is_bounded: true }, lane, workspace);
                 }
             }
             let Some(full) = lanes.iter().position(Option::is_some) else { return };
             for lane in (0..LANES).filter(|lane| lanes[*lane].is_none()) {
                 // Spare lanes repeat one with a point.
-                let copy = workspace.fits.fit.near[full].clone();
-                workspace.fits.fit.near[lane] = copy;
+                let fit = &mut workspace.fits.fit;
+                (fit.near[lane], fit.slopes[lane]) = (fit.near[full].clone(), fit.slopes[full].clone());
             }
             let shared = lanes.map(|lane| lane.or(lanes[full]));
             self.solve(builder, shared, &mut lanes, workspace, &mut take);
             for (lane, place) in lanes.iter_mut().enumerate() {
-                if let Some(Candidate { point, growth }) = *place {
-                    *place = self.gather(builder, Candidate { point, growth: growth * GROWTH }, lane, workspace);
+                if let Some(Candidate { point, growth, .. }) = *place {
+                    *place = self.gather(
+                        builder,
+                        Candidate { point, growth: growth * GROWTH, is_bounded: true },
+                        lane,
+                        workspace,
+                    );
                 }
             }
         }
@@ -86,12 +93,15 @@ impl<const M: usize> GrowingFits<M> {
         lane: usize,
         workspace: &mut BlockWorkspace<M>,
     ) -> Option<Candidate> {
-        let Candidate { point, mut growth } = candidate;
-        let near = &mut workspace.fits.fit.near[lane];
+        let Candidate { point, mut growth, .. } = candidate;
+        let BlockWorkspace { walk, fits, .. } = workspace;
+        let near = &mut fits.fit.near[lane];
         while growth <= MAX_GROWTH {
-            workspace.walk.gather(&builder.cloud, point, self.radius(builder, Candidate { point, growth }), near);
+            let radius = growth * self.cutoff * builder.cloud.spacings[point];
+            walk.gather(&builder.cloud, point, radius, near);
             if near.len() >= self.wanted {
-                return Some(Candidate { point, growth });
+                fits.fit.slopes[lane].clone_from(&walk.slopes);
+                return Some(Candidate { point, growth, is_bounded: walk.is_bounded });
             }
             growth *= GROWTH;
         }
@@ -113,28 +123,36 @@ impl<const M: usize> GrowingFits<M> {
     ) {
         let workspace = &mut workspace.fits;
         let pivots = workspace.fit.factorize(&self.basis);
-        let sound = pivots.map(|pivot| pivot > MIN_PIVOT);
+        let mut sound = pivots.map(|pivot| pivot > MIN_PIVOT);
         let radius = shared.map(|lane| lane.map_or(1.0, |candidate| self.radius(builder, candidate)));
         let flat = Heights { first: [0.0; M], second: [[0.0; M]; M] };
         let heights = match builder.cloud.metric {
             Metric::FromHeights => heights(&self.basis, &mut workspace.fit, radius, sound),
             Metric::FromNormals => [flat; LANES],
         };
+        if workspace.fit.has_slopes() {
+            // Heights keep to no condition, so that they were fitted before.
+            let pivots = workspace.fit.factorize_with_slopes(&self.basis);
+            sound.iter_mut().zip(pivots).for_each(|(sound, pivot)| *sound &= pivot > MIN_PIVOT);
+        }
         let at = |lane: usize| shared[lane].map_or(0, |candidate| candidate.point);
         self.weigh(builder, Functional::LaplaceBeltrami, (at, &heights, radius), workspace);
         let ratios: [f64; LANES] = std::array::from_fn(|lane| {
             let weights = &workspace.fit.weights[..workspace.fit.near[lane].len()];
             ratio(weights.iter().map(|w| w.as_array()[lane]))
         });
-        let is_taken = |lane: usize| sound[lane] && ratios[lane] <= MOST_RATIO;
+        let is_bounded = |lane: usize| lanes[lane].is_none_or(|candidate| candidate.is_bounded);
+        let taken: [bool; LANES] =
+            std::array::from_fn(|lane| sound[lane] && (ratios[lane] <= MOST_RATIO || !is_bounded(lane)));
         let mut rows: [Option<Row<M>>; LANES] = std::array::from_fn(|lane| {
-            let candidate = lanes[lane].filter(|_| is_taken(lane))?;
+            let candidate = lanes[lane].filter(|_| taken[lane])?;
             let near = &workspace.fit.near[lane];
             let mut columns: Vec<u32> = near.iter().map(|node| node.index).collect();
             columns.push(candidate.point as u32);
             let is_grown = candidate.growth > 1.0;
             let weights = Vec::with_capacity(builder.functionals.len());
-            Some(Row { columns, weights, heights: heights[lane], kind: RowKind::Full, is_grown, ratio: ratios[lane] })
+            let ratio = if candidate.is_bounded { ratios[lane] } else { f64::NAN };
+            Some(Row { columns, weights, heights: heights[lane], kind: RowKind::Full, is_grown, ratio })
         });
         if rows.iter().all(Option::is_none) {
             return;

@@ -1,4 +1,4 @@
-use super::{MOST_RATIO, RowKind, StarCloud, StarRows, StarSupport, construct_star_rows};
+use super::{EdgeRule, MOST_RATIO, RowKind, StarCloud, StarRows, StarSupport, construct_star_rows};
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Vector, fibonacci};
 use crate::operators::Functional;
@@ -18,8 +18,17 @@ fn prepared(points: &[Vector<3>]) -> PreparedCloud<3> {
 }
 
 fn built(cloud: &PreparedCloud<3>, supports: &[StarSupport], functionals: &[Functional<2>]) -> StarRows<2> {
+    built_with(cloud, EdgeRule::Equation { conormals: &[], is_held: &[] }, supports, functionals)
+}
+
+fn built_with(
+    cloud: &PreparedCloud<3>,
+    edges: EdgeRule<3>,
+    supports: &[StarSupport],
+    functionals: &[Functional<2>],
+) -> StarRows<2> {
     let PreparedCloud { points, normals, spacings, graph, .. } = cloud;
-    let cloud = StarCloud { points, normals, spacings, graph, metric: Metric::FromHeights };
+    let cloud = StarCloud { points, normals, spacings, graph, metric: Metric::FromHeights, edges };
     construct_star_rows(cloud, supports, functionals, &Interrupt::default()).unwrap()
 }
 
@@ -118,4 +127,34 @@ fn no_point_is_without_a_row() {
         assert!((value[151] - exact).abs() < 1e-6, "{}", value[151]);
     }
     assert!(rows.heights.iter().all(|h| h.first.iter().all(|slope| slope.abs() < 1e-6)));
+}
+
+/// A function of one coordinate.
+type Function = fn(f64) -> f64;
+
+/// A patch of 20 by 20 points. One-sided fits reproduce cubic polynomials up to the edge; fits without flux reproduce those
+/// whose slope vanishes on the edge that they see, and are bounded.
+#[test]
+fn rows_at_edges_keep_their_degree() {
+    let random = CounterRandom::new(3);
+    let inside = |k: i64| if k % 20 > 0 && k % 20 < 19 && k / 20 > 0 && k / 20 < 19 { 0.15 } else { 0.0 };
+    let at = |k: i64, d: i64| (if d == 0 { k % 20 } else { k / 20 }) as f64 + inside(k) * random.symmetric(&[k, d]);
+    let points: Vec<Vector<3>> = (0..400).map(|k| Vector::<3>::new(at(k, 0), at(k, 1), 0.0)).collect();
+    let cloud = prepared(&points);
+    let laplacian = [Functional::LaplaceBeltrami];
+    let conormals = crate::point_clouds::edges::conormals(&points, &cloud.normals, &cloud.graph);
+    let free = EdgeRule::Equation { conormals: &conormals, is_held: &[] };
+    let fields: [(EdgeRule<3>, Function, Function); 2] =
+        [(EdgeRule::OneSided, |x| x * x * x - x * x, |x| 6.0 * x - 2.0), (free, |x| x * x, |_| 2.0)];
+    for (edges, field, exact) in fields {
+        let rows = built_with(&cloud, edges, &ORDERS[2..], &laplacian);
+        assert!(rows.kinds.iter().all(|kind| *kind == RowKind::Full));
+        let values: Vec<f64> = points.iter().map(|x| field(x[0])).collect();
+        let mut found = vec![0.0; 400];
+        rows.operators[0].apply(&values, &mut found);
+        // The second field has a slope on the far edge.
+        for (x, found) in points.iter().zip(&found).filter(|(x, _)| x[0] < 12.0) {
+            assert!((found - exact(x[0])).abs() < 1e-8, "{x}: {found}");
+        }
+    }
 }

@@ -1,14 +1,20 @@
 //! The neighbors of a point, found by walking along the edges of stars. A sheet over or under the point is not entered.
 
-use super::StarCloud;
+use super::{EdgeRule, StarCloud};
+use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
 use crate::operators::charts::Node;
 use crate::operators::charts::tangent::SAME_SHEET;
+use crate::operators::moment_fit::SlopeCondition;
 
 /// Largest sine of the elevation of a neighbor over the tangent plane.
 const ELEVATION: f64 = 0.6;
 /// Radius of the walk by that of the support: the way to a neighbor may lead around it.
 const DETOUR: f64 = 1.25;
+
+/// Weight of a condition on the slope at an edge by that of a node at the same place. Measured on hemispheres, patches and cylinders:
+/// with 1, 10 and 100 errors agree to 2 % and have orders 1.9 to 2.0.
+const SLOPE: f64 = 10.0;
 
 /// Workspace of walks.
 #[derive(Debug, Default)]
@@ -19,6 +25,10 @@ pub(super) struct Walk<const M: usize> {
     number: u32,
     /// Points that were entered, with the sign that brings their normal to the side of the first one.
     queue: Vec<(u32, f64)>,
+    /// Conditions on slopes at the points of an edge in the support.
+    pub slopes: Vec<SlopeCondition<M>>,
+    /// Whether the row of the point of the last walk must be bounded.
+    pub is_bounded: bool,
 }
 
 impl<const M: usize> Walk<M> {
@@ -28,12 +38,19 @@ impl<const M: usize> Walk<M> {
     /// it lies within a flat cone about the tangent plane. Only points that were entered are continued from.
     pub fn gather<const D: usize>(&mut self, cloud: &StarCloud<'_, D>, i: usize, radius: f64, near: &mut Vec<Node<M>>) {
         near.clear();
+        self.slopes.clear();
+        self.is_bounded = match cloud.edges {
+            EdgeRule::OneSided => !cloud.graph.is_open(i),
+            EdgeRule::Equation { is_held, .. } => !is_held.get(i).copied().unwrap_or(false),
+        };
+        let is_one_sided = matches!(cloud.edges, EdgeRule::OneSided);
         self.begin(cloud.points.len());
         let (x, n) = (cloud.points[i], cloud.normals[i]);
         let t = tangents::<D, M>(&n);
         let (inverse, reach) = (1.0 / radius, (DETOUR * radius).powi(2));
         self.entered[i] = self.number;
         self.queue.push((i as u32, 1.0));
+        self.add_slope(cloud, i, ([0.0; M], 1.0), &t);
         let mut place = 0;
         while let Some((from, sign)) = self.queue.get(place).copied() {
             place += 1;
@@ -59,8 +76,25 @@ impl<const M: usize> Walk<M> {
                     let window = remainder * remainder;
                     let at = t.map(|t| d.dot(&t) * inverse);
                     near.push(Node { index: *j, at, window: window * window, height: height * inverse });
+                    self.is_bounded &= !(is_one_sided && cloud.graph.is_open(index));
+                    self.add_slope(cloud, index, (at, window * window), &t);
                 }
             }
+        }
+    }
+
+    /// Adds the condition of a point of an edge without flux.
+    fn add_slope<const D: usize>(
+        &mut self,
+        cloud: &StarCloud<'_, D>,
+        j: usize,
+        (at, window): ([f64; M], f64),
+        tangents: &[Vector<D>; M],
+    ) {
+        let EdgeRule::Equation { conormals, .. } = cloud.edges else { return };
+        if let Some(conormal) = conormals.get(j).copied().flatten() {
+            let direction = tangents.map(|t| t.dot(&conormal));
+            self.slopes.push(SlopeCondition { at, direction, window: SLOPE * window });
         }
     }
 

@@ -1,6 +1,7 @@
 //! From the spec of a `surface_pde` scene to points, a method and a problem. Points from outside are unknown until a run is
 //! built (`points`).
 
+use super::edges;
 use super::problems::{self, ProblemChoice};
 use super::spec::{
     CleanWord, EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice,
@@ -115,6 +116,11 @@ fn plan(mut spec: SurfacePde) -> Planned {
     let (scheme, problem) = choices(&mut spec, (&shape, sampling, count), &mut errors);
     check_together(&given, &shape, scheme.as_ref(), problem.as_ref(), &mut errors);
     check_form(&given, scheme.as_ref(), problem.as_ref(), &mut errors);
+    let form = match &scheme {
+        Some(Scheme::Dcpse(Method { form, .. })) => Some(*form),
+        _ => None,
+    };
+    edges::check(&given, &shape, form, problem.as_ref(), &mut errors);
     let (Some(scheme), Some(problem)) = (scheme, problem.filter(|_| errors.is_empty())) else {
         return Err(errors);
     };
@@ -322,6 +328,9 @@ fn shape(spec: &SurfacePde, errors: &mut Vec<Violation>) -> Shape {
 }
 
 /// The points that operators are made on.
+/// Points of a surface with fewer of them do not support fits of order 4.
+const FEW_FOR_ORDER_4: u64 = 160;
+
 #[derive(Clone, Copy)]
 struct Points<'a> {
     shape: &'a Shape,
@@ -351,7 +360,11 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
             let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
             Some(Scheme::Embedding { order: *order as usize, spacing: grid })
         }
-        MethodSpec::Auto { order, cutoff_dn } => points.by_stars(*order, cutoff_dn, true, errors),
+        MethodSpec::Auto { order, cutoff_dn } => {
+            let is_curvature = matches!(spec.problem, ProblemSpec::Curvature);
+            let order = *order.get_or_insert(if is_curvature { points.order_of_curvature() } else { 2 });
+            points.by_stars(order, cutoff_dn, true, errors)
+        }
         MethodSpec::Conservative => {
             // The support of the lowest order stands for lengths and counts.
             let support = points.by_stars(2, &mut None, false, errors)?;
@@ -399,6 +412,13 @@ impl Points<'_> {
     /// Whether they come from outside.
     fn is_given(self) -> bool {
         matches!(self.shape, Shape::Points(_))
+    }
+
+    /// Order of curvatures where none is asked for. Second derivatives of heights have the errors of order 2 on 300 points of a sphere:
+    /// 2.5 %, and 0.1 % with order 4. Noise counts as much with either.
+    fn order_of_curvature(self) -> u64 {
+        let is_known = !matches!(self.shape, Shape::Points(extent) if !extent.is_known);
+        if is_known && self.count < FEW_FOR_ORDER_4 { 2 } else { 4 }
     }
 
     fn support(self, order: u64, is_copies: bool, errors: &mut Vec<Violation>) -> Option<(usize, f64)> {

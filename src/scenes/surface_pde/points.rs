@@ -2,6 +2,7 @@
 //! them. No exact answer is known on such a surface. Its report has no errors, and the plan refuses problems that need an
 //! exact answer.
 
+use super::edges::Edges;
 use super::plan::{Normals, Scheme, SurfaceScene, choices};
 use super::preparation::Preparation;
 use super::problems::ProblemChoice;
@@ -126,7 +127,10 @@ impl<const D: usize> Found<D> {
         }
         let is_equation =
             !matches!(scene.problem, ProblemChoice::LaplaceBeltrami { .. } | ProblemChoice::Curvature { .. });
-        let Preparation { findings, marks, counted } = Preparation::new(&prepared, is_equation);
+        let edges = Edges::new(&prepared, &scene.spec.edges);
+        edges.check(&prepared, &scene.spec.edges)?;
+        let Preparation { findings, marks, mut counted } = Preparation::new(&prepared, is_equation, edges.held_count());
+        counted.extend(edges.counted());
         let measure = prepared.graph.areas.iter().sum();
         let origin = format!(
             "{} of them, {:.4e} apart, {} normals, {} {}, {} of {measure:.6e}",
@@ -140,7 +144,8 @@ impl<const D: usize> Found<D> {
         let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
         let areas = Some(graph.areas.clone());
         let rows = points.len();
-        let cloud = SurfaceCloud { rows, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
+        let mut cloud = SurfaceCloud { rows, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
+        edges.put_into(&mut cloud);
         Ok(Self { cloud, measure, origin, findings, marks, counted })
     }
 }

@@ -18,10 +18,11 @@ const START: (u64, f64) = (0, 0.0);
 
 impl Preparation {
     /// Collects what was found. At edges an equation has its natural condition, while values at points are one-sided.
-    pub fn new<const D: usize>(cloud: &PreparedCloud<D>, is_equation: bool) -> Self {
+    /// `held` points of edges hold a value.
+    pub fn new<const D: usize>(cloud: &PreparedCloud<D>, is_equation: bool, held: usize) -> Self {
         let mut found = Self { findings: Vec::new(), marks: Vec::new(), counted: Vec::new() };
         found.left_out(cloud);
-        found.edges(cloud, is_equation);
+        found.edges(cloud, is_equation, held);
         found.normals(cloud);
         found.parts(cloud);
         found
@@ -50,7 +51,7 @@ impl Preparation {
         ]);
     }
 
-    fn edges<const D: usize>(&mut self, cloud: &PreparedCloud<D>, is_equation: bool) {
+    fn edges<const D: usize>(&mut self, cloud: &PreparedCloud<D>, is_equation: bool, held: usize) {
         let open = PointList::from_condition(cloud.points.len(), |i| cloud.graph.is_open(i));
         self.counted.push(Diagnostic::count(
             "stars.open",
@@ -59,8 +60,10 @@ impl Preparation {
         ));
         let Some(open) = open else { return };
         let mut detail = "neighbors on one side alone, so the surface has a hole or an edge there".to_owned();
-        if is_equation {
+        if is_equation && held == 0 {
             detail += "; nothing flows through it";
+        } else if is_equation {
+            detail += &format!("; {held} points of it hold a value, and nothing flows through the other ones");
         }
         let finding = if is_equation { Finding::info } else { Finding::warning };
         self.about(&open, finding("holes", format!("{}: {detail}", in_file(cloud, &open)), START));

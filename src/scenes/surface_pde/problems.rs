@@ -407,7 +407,9 @@ impl ProblemChoice {
             Self::Curvature { of_heights } => Box::new(Curvature::new(cloud.rows, *of_heights)),
             Self::Poisson { field, is_dirichlet, solver } => {
                 let values = values(field, cloud);
-                let condition = if *is_dirichlet {
+                let condition = if !cloud.held.is_empty() {
+                    Condition::Dirichlet(cloud.held.clone())
+                } else if *is_dirichlet {
                     Condition::Dirichlet(held(shape, cloud).into_iter().map(|i| (i, values[i])).collect())
                 } else {
                     Condition::ZeroMean { alpha: shape.least_eigenvalue() }

@@ -140,6 +140,23 @@ crate::words! {
 }
 
 crate::choice! {
+    /// What equations keep to at the edges of points from outside: points with neighbors on one side alone.
+    pub enum EdgesChoice {
+        /// nothing flows through the edges
+        Neumann = "neumann",
+        /// points of the edges hold a value
+        Dirichlet = "dirichlet" {
+            /// the value
+            value: f64 = 0.0;
+            /// with it, points x of edges with normal·x ≥ offset hold the value, and nothing flows through the other ones
+            normal: Option<Coordinates>;
+            /// offset of the half-space of `normal`
+            offset: f64 = 0.0;
+        }
+    }
+}
+
+crate::choice! {
     /// The integrator of time.
     pub enum EvolutionChoice {
         /// the pair of Dormand and Prince, explicit
@@ -254,8 +271,9 @@ crate::choice! {
     pub enum MethodSpec {
         /// fits with supports along stars; where an equation is solved and too many points have no bounded fit, the conservative form
         Auto = "auto" {
-            /// 2, 4 or 6: polynomials of degree 3, 5 or 7; the conservative form has order 2
-            order: u64 = 2, in whole(2, 6);
+            /// 2, 4 or 6: polynomials of degree 3, 5 or 7; the conservative form has order 2. For `curvature` 4 where there are 160
+            /// points, else 2, when not given
+            order: Option<u64>, in whole(2, 6);
             /// cutoff radius r_c in local spacings; 2.4, 3.3, 4.2 (on curves 3.4, 5.4, 7.4) when not given
             cutoff_dn: Option<f64>, in Interval::above(1.0).and_at_most(20.0);
         }
@@ -378,6 +396,8 @@ crate::group! {
         method: Option<MethodSpec>;
         /// the normals that operators are made with; `given` for points, else `exact`, when not given
         normals: Option<NormalsChoice>;
+        /// what equations keep to at the edges of points from outside
+        edges: EdgesChoice = EdgesChoice::Neumann;
         /// how systems of equations are solved: those of `poisson` and of `bdf2`; `auto` for points, else `bicgstab`, when not given
         solver: Option<SolverChoice>;
         /// seed of random points and normals

@@ -31,9 +31,21 @@ pub struct SurfaceCloud<const D: usize> {
     pub spacings: Vec<f64>,
     /// The graph of stars; empty where operators do not need it.
     pub graph: StarGraph,
+    /// The direction out of the surface at points of an edge that nothing flows through; empty where there are none.
+    pub conormals: Vec<Option<Vector<D>>>,
+    /// Points of an edge that hold a value in equations, with the value.
+    pub held: Vec<(usize, f64)>,
 }
 
 impl<const D: usize> SurfaceCloud<D> {
+    /// Whether each point holds a value.
+    #[must_use]
+    pub fn held_mask(&self) -> Vec<bool> {
+        let mut mask = vec![false; self.rows];
+        self.held.iter().for_each(|(i, _)| mask[*i] = true);
+        mask
+    }
+
     /// Σ area f, or the mean where areas are not known.
     #[must_use]
     pub fn integral(&self, field: &[f64]) -> f64 {

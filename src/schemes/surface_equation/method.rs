@@ -6,8 +6,8 @@ use super::row_quality::RowQuality;
 use crate::linear_algebra::SparseRows;
 use crate::operators::charts::tangent::Metric;
 use crate::operators::{
-    Construction, Functional, NormalCopies, StarCloud, StarSupport, Support, SupportDiagnostics, TangentChart,
-    charts::Heights, construct, construct_star_rows,
+    Construction, EdgeRule, Functional, NormalCopies, StarCloud, StarSupport, Support, SupportDiagnostics,
+    TangentChart, charts::Heights, construct, construct_star_rows,
 };
 use crate::parallel::{Interrupt, Interrupted};
 use crate::point_clouds::StarGraph;
@@ -74,6 +74,8 @@ pub struct Operators {
     pub rows: Vec<SparseRows>,
     /// κ = ∇·n and the Gauss curvature of the fitted surface, where heights were fitted.
     pub curvatures: Option<Vec<[f64; 2]>>,
+    /// Slopes of the fitted surface over the tangent plane of each point, where heights were fitted along stars; else empty.
+    pub slopes: Vec<[f64; 2]>,
     /// What became of the points.
     pub fit_diagnostics: SupportDiagnostics,
     /// Kinds of rows, of fits by stars.
@@ -89,11 +91,32 @@ const LOWER_ON_CURVES: [StarSupport; 2] =
     [StarSupport { degree: 5, cutoff: 5.4 }, StarSupport { degree: 3, cutoff: 3.4 }];
 
 impl Method {
-    /// Operators on a cloud in D dimensions, M = D − 1.
+    /// Operators on a cloud in D dimensions, M = D − 1. In equations the rows of held points are empty, so that their values stay.
     ///
     /// # Errors
     /// [`Interrupted`].
     pub fn build<const D: usize, const M: usize>(
+        &self,
+        cloud: &SurfaceCloud<D>,
+        wanted: &[Wanted],
+        purpose: Use,
+        interrupt: &Interrupt,
+    ) -> Result<Operators, Interrupted> {
+        let mut built = self.build_free::<D, M>(cloud, wanted, purpose, interrupt)?;
+        let laplacian = wanted.iter().position(|wanted| *wanted == Wanted::LaplaceBeltrami);
+        if let (Use::Equation, Some(place), false) = (purpose, laplacian, cloud.held.is_empty()) {
+            let is_held = cloud.held_mask();
+            built.rows[place].change_rows(|i, _, weights| {
+                if is_held[i] {
+                    weights.fill(0.0);
+                }
+            });
+        }
+        Ok(built)
+    }
+
+    /// Operators before rows of held points are emptied.
+    fn build_free<const D: usize, const M: usize>(
         &self,
         cloud: &SurfaceCloud<D>,
         wanted: &[Wanted],
@@ -119,8 +142,13 @@ impl Method {
                 Ok(operators(construct::<D>(&chart, self.support, &functionals(wanted), interrupt)?, None))
             }
             Form::Stars { metric, cutoff, may_switch } => {
-                let SurfaceCloud { points, normals, spacings, graph, .. } = cloud;
-                let cloud = StarCloud { points, normals, spacings, graph, metric };
+                let SurfaceCloud { points, normals, spacings, graph, conormals, .. } = cloud;
+                let is_held = &cloud.held_mask();
+                let edges = match purpose {
+                    Use::Equation => EdgeRule::Equation { conormals, is_held },
+                    Use::Pointwise => EdgeRule::OneSided,
+                };
+                let cloud = StarCloud { points, normals, spacings, graph, metric, edges };
                 self.by_stars::<D, M>(cloud, (cutoff, may_switch), wanted, purpose, interrupt)
             }
             Form::Conservative => Ok(conservative_operators(&cloud.graph, None)),
@@ -154,6 +182,11 @@ impl Method {
         Ok(Operators {
             rows: built.operators,
             curvatures,
+            slopes: built
+                .heights
+                .iter()
+                .map(|h| std::array::from_fn(|a| h.first.get(a).copied().unwrap_or(0.0)))
+                .collect(),
             fit_diagnostics,
             quality: Some(quality),
             is_conservative: false,
@@ -171,7 +204,8 @@ fn functionals<const M: usize>(wanted: &[Wanted]) -> Vec<Functional<M>> {
 
 fn operators<const M: usize>(built: Construction<M>, curvatures: Option<Vec<[f64; 2]>>) -> Operators {
     let fit_diagnostics = built.fit_diagnostics;
-    Operators { rows: built.operators, curvatures, fit_diagnostics, quality: None, is_conservative: false }
+    let (slopes, quality, is_conservative) = (Vec::new(), None, false);
+    Operators { rows: built.operators, curvatures, slopes, fit_diagnostics, quality, is_conservative }
 }
 
 /// The conservative form of Δ_S; `quality` is that of the rows whose place it takes.
@@ -179,6 +213,7 @@ fn conservative_operators(graph: &StarGraph, quality: Option<RowQuality>) -> Ope
     Operators {
         rows: vec![conservative::rows(graph)],
         curvatures: None,
+        slopes: Vec::new(),
         fit_diagnostics: SupportDiagnostics::default(),
         quality,
         is_conservative: true,

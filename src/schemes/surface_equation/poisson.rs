@@ -84,10 +84,14 @@ impl Poisson {
         if let Condition::Dirichlet(held) = &self.condition {
             let mut held_at = vec![None; right.len()];
             held.iter().for_each(|(i, value)| held_at[*i] = Some(*value));
+            // Rows of points at held edges are empty.
+            let largest =
+                (0..right.len()).flat_map(|i| operator.row(i).1).fold(f64::MIN_POSITIVE, |most, w| most.max(w.abs()));
             rows.change_rows(|i, columns, weights| {
                 if let Some(value) = held_at[i] {
                     let diagonal = columns.iter().zip(weights.iter()).find(|(j, _)| **j as usize == i);
-                    let size = diagonal.map_or(1.0, |(_, w)| *w);
+                    let size = diagonal.map_or(0.0, |(_, w)| *w);
+                    let size = if size == 0.0 { -largest } else { size };
                     for (j, w) in columns.iter().zip(weights.iter_mut()) {
                         *w = if *j as usize == i { size } else { 0.0 };
                     }

@@ -6,6 +6,8 @@ use super::method::{Form, Method, Operators, Use};
 use super::problem::{Problem, Tools};
 use super::quantities::{CURVATURE, NORMAL, TIME};
 use super::row_quality::RowQuality;
+use crate::geometry::Vector;
+use crate::geometry::frame::tangents;
 use crate::linear_algebra::SparseRows;
 use crate::operators::{Support, SupportDiagnostics};
 use crate::parallel::Interrupt;
@@ -24,6 +26,8 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     method: Method,
     problem: Box<dyn Problem<D>>,
     operators: Option<Operators>,
+    /// Normals of the fitted surface, where heights were fitted along stars; empty before.
+    fitted_normals: Vec<Vector<D>>,
     fit_diagnostics: SupportDiagnostics,
     /// Of fits by stars: kinds of rows.
     quality: Option<RowQuality>,
@@ -41,6 +45,23 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
 
 /// |κ| r_c beyond which a fit does not see the surface as nearly flat.
 const COARSE: f64 = 0.5;
+
+/// Slopes of the fitted surface over the tangent plane of a point beyond which they are no correction of its normal.
+const MOST_SLOPE: f64 = 0.3;
+
+/// The normals n − Σ h_a t_a of fitted heights with slopes h_a over the planes of normals n.
+fn fitted_normals<const D: usize, const M: usize>(cloud: &SurfaceCloud<D>, slopes: &[[f64; 2]]) -> Vec<Vector<D>> {
+    let at = |(n, slopes): (&Vector<D>, &[f64; 2])| {
+        let slopes = &slopes[..M];
+        let steepness = slopes.iter().map(|slope| slope * slope).sum::<f64>().sqrt();
+        if steepness.is_nan() || steepness > MOST_SLOPE {
+            return *n;
+        }
+        let tangents = tangents::<D, M>(n);
+        slopes.iter().zip(tangents).fold(*n, |normal, (slope, t)| normal - t * *slope).normalize()
+    };
+    cloud.normals.iter().zip(slopes).map(at).collect()
+}
 
 /// Points of a curvature, exact or else fitted, that is large for their support.
 fn coarse_points<const D: usize>(cloud: &SurfaceCloud<D>, method: &Method, built: &Operators) -> u64 {
@@ -75,6 +96,7 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
             method,
             problem,
             operators: None,
+            fitted_normals: Vec::new(),
             fit_diagnostics: SupportDiagnostics::default(),
             quality: None,
             coarse: 0,
@@ -124,6 +146,7 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
             course.findings.extend(findings_of(&built, problem.purpose(), method, to));
         }
         self.quality.clone_from(&built.quality);
+        self.fitted_normals = fitted_normals::<D, M>(cloud, &built.slopes);
         self.operators = Some(built);
         Ok(())
     }
@@ -219,7 +242,8 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         for quantity in self.problem.columns() {
             fields.scalar(quantity, || self.problem.column(quantity, self.clock()));
         }
-        fields.vector(&NORMAL, || self.cloud.normals[..rows].iter().copied());
+        let normals = if self.fitted_normals.is_empty() { &self.cloud.normals } else { &self.fitted_normals };
+        fields.vector(&NORMAL, || normals[..rows].iter().copied());
         if !self.cloud.curvatures.is_empty() {
             fields.scalar(&CURVATURE, || self.cloud.curvatures.clone());
         }
@@ -247,6 +271,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         (self.fit_diagnostics, self.coarse, self.quality) = (soundness, coarse, quality);
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
+        self.fitted_normals.clear();
         if clock.step > 0 {
             // They were told at the start.
             self.course.findings.clear();

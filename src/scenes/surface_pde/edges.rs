@@ -1,0 +1,125 @@
+//! What equations keep to at the edges of points from outside.
+
+use super::problems::ProblemChoice;
+use super::spec::{EdgesChoice, ProblemSpec, SolverChoice, SurfacePde};
+use super::surfaces::Shape;
+use crate::geometry::Vector;
+use crate::point_clouds::{PreparedCloud, edges};
+use crate::schemes::surface_equation::{Form, SurfaceCloud};
+use crate::simulation::Diagnostic;
+use crate::spec::{Choice, Parameter, Violation};
+use serde_json::{Value, json};
+
+/// Refuses edges that hold a value where there are none, or where a problem does not keep to them.
+pub(super) fn check(
+    given: &SurfacePde,
+    shape: &Shape,
+    form: Option<Form>,
+    problem: Option<&ProblemChoice>,
+    errors: &mut Vec<Violation>,
+) {
+    let EdgesChoice::Dirichlet { normal, offset, .. } = &given.edges else { return };
+    let conflict =
+        |at: &str, detail: &str, given: Value, allowed: Value| Violation::new(at, "conflict", detail, given, allowed);
+    if !matches!(shape, Shape::Points(_)) {
+        let detail = "only points from outside have edges that hold a value";
+        errors.push(conflict("/edges", detail, json!("dirichlet"), json!(["neumann"])));
+    } else if form.is_some_and(|form| !matches!(form, Form::Stars { .. } | Form::Conservative)) {
+        let detail = "edges are found by the stars of points";
+        errors.push(conflict("/edges", detail, json!("dirichlet"), json!(["neumann"])));
+    }
+    let is_linear = matches!(given.problem, ProblemSpec::Poisson { .. } | ProblemSpec::Diffusion { .. });
+    if problem.is_some() && !is_linear {
+        let detail = "edges hold a value in the problems `poisson` and `diffusion`";
+        errors.push(conflict("/edges", detail, json!(given.problem.name()), json!(["poisson", "diffusion"])));
+    }
+    if matches!(given.solver, Some(SolverChoice::Cg { .. })) {
+        let detail = "conjugate gradients need a symmetric system, which held points do not leave";
+        errors.push(conflict("/solver", detail, json!("cg"), json!(["auto", "bicgstab", "gmres", "sparse_lu"])));
+    }
+    let dimension = shape.dimension();
+    match normal {
+        Some(normal) if normal.len() != dimension || normal.iter().all(|c| *c == 0.0) => {
+            let detail = format!("a direction has {dimension} numbers, which are not all zero");
+            errors.push(Violation::new("/edges/normal", "range", detail, normal.to_json(), dimension));
+        }
+        None if *offset != 0.0 => {
+            errors.push(conflict(
+                "/edges/offset",
+                "without a normal there is no half-space",
+                json!(offset),
+                json!(0.0),
+            ));
+        }
+        _ => {}
+    }
+}
+
+/// Conormals where nothing flows, and points that hold a value.
+pub(super) struct Edges<const D: usize> {
+    conormals: Vec<Option<Vector<D>>>,
+    held: Vec<(usize, f64)>,
+}
+
+impl<const D: usize> Edges<D> {
+    /// The edges of a prepared cloud.
+    pub fn new(cloud: &PreparedCloud<D>, choice: &EdgesChoice) -> Self {
+        let mut found =
+            Self { conormals: edges::conormals(&cloud.points, &cloud.normals, &cloud.graph), held: Vec::new() };
+        if let EdgesChoice::Dirichlet { value, normal, offset } = choice {
+            for (i, x) in cloud.points.iter().enumerate().filter(|(i, _)| cloud.graph.is_open(*i)) {
+                let is_in = |normal: &[f64]| x.iter().zip(normal).map(|(x, n)| x * n).sum::<f64>() >= *offset;
+                if normal.as_ref().is_none_or(|normal| is_in(normal)) {
+                    found.held.push((i, *value));
+                    found.conormals[i] = None;
+                }
+            }
+        }
+        found
+    }
+
+    /// Number of points that hold a value.
+    pub fn held_count(&self) -> usize {
+        self.held.len()
+    }
+
+    /// Refuses edges that hold a value where a part has none of them: the equation then has no solution, or none alone.
+    ///
+    /// # Errors
+    /// One [`Violation`].
+    pub fn check(&self, cloud: &PreparedCloud<D>, choice: &EdgesChoice) -> Result<(), Vec<Violation>> {
+        if matches!(choice, EdgesChoice::Neumann) {
+            return Ok(());
+        }
+        let mut has_held = vec![false; cloud.graph.part_count];
+        self.held.iter().for_each(|(i, _)| has_held[cloud.graph.parts[*i] as usize] = true);
+        let without = has_held.iter().filter(|held| !**held).count();
+        if without == 0 {
+            return Ok(());
+        }
+        let detail = format!(
+            "{without} of {} parts of the surface have no point of an edge that would hold the value; {} points have \
+             neighbors on one side alone",
+            has_held.len(),
+            cloud.graph.open_count()
+        );
+        Err(vec![Violation::new("/edges", "data", detail, choice.to_json(), json!(["neumann"]))])
+    }
+
+    /// Counts for the report.
+    pub fn counted(&self) -> Vec<Diagnostic> {
+        let closed = self.conormals.iter().flatten().count() as u64;
+        vec![
+            Diagnostic::count("edges.no_flux", closed, "Points of edges that fits keep free of flux."),
+            Diagnostic::count("edges.held", self.held.len() as u64, "Points of edges that hold a value in equations."),
+        ]
+    }
+
+    /// Puts the edges into the cloud of a simulation.
+    pub fn put_into(self, cloud: &mut SurfaceCloud<D>) {
+        (cloud.conormals, cloud.held) = (self.conormals, self.held);
+    }
+}
+
+#[cfg(test)]
+mod tests;
