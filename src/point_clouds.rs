@@ -18,6 +18,7 @@ mod rays;
 pub mod relaxation;
 pub mod star_graph;
 pub mod stars;
+pub mod triangulation;
 
 pub use bump::Bump;
 pub use examination::Examined;

@@ -42,6 +42,8 @@ pub struct PointList {
     pub first: Vec<usize>,
     /// Number of all points.
     pub count: usize,
+    /// Indices of all points, ascending.
+    pub all: Vec<usize>,
 }
 
 impl PointList {
@@ -55,7 +57,7 @@ impl PointList {
     pub(super) fn from_indices(mut found: Vec<usize>) -> Option<Self> {
         found.sort_unstable();
         let first = found.iter().take(NAMED).copied().collect();
-        (!found.is_empty()).then_some(Self { first, count: found.len() })
+        (!found.is_empty()).then_some(Self { first, count: found.len(), all: found })
     }
 }
 

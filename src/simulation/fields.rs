@@ -51,6 +51,8 @@ pub struct Fields<'a> {
     pub columns: Vec<Field>,
     /// Points that findings are about.
     pub marks: Vec<Mark>,
+    /// Triangles between the points, by the indices of their corners; empty where points are not those of one surface.
+    pub triangles: Vec<[u32; 3]>,
     selection: Selection<'a>,
 }
 
@@ -145,7 +147,13 @@ impl<'a> Fields<'a> {
     /// Points without fields.
     #[must_use]
     pub fn new<const D: usize>(points: &[Vector<D>], selection: Selection<'a>) -> Self {
-        Self { points: points.iter().map(embed).collect(), columns: Vec::new(), marks: Vec::new(), selection }
+        Self {
+            points: points.iter().map(embed).collect(),
+            columns: Vec::new(),
+            marks: Vec::new(),
+            triangles: Vec::new(),
+            selection,
+        }
     }
 
     /// Adds numbers, if they are wanted.

@@ -1,4 +1,4 @@
-//! Frames as VTKHDF `PolyData` (version 2.0): every particle is a vertex. ParaView, VTK, PyVista and h5py open them.
+//! Frames as VTKHDF `PolyData` (version 2.0): every particle is a vertex, and triangles of a surface are polygons. ParaView, VTK, PyVista and h5py open them.
 //!
 //! VTK's reader needs all four topology groups, and numbers only under `FieldData`.
 
@@ -25,9 +25,11 @@ pub fn write_frame(path: &Path, fields: &Fields, time: f64, step: u64) -> hdf5::
     write(&root, "Points", 3, fields.points.as_flattened())?;
     let places: Vec<i64> = (0..=count as i64).collect();
     topology(&root, "Vertices", &places, &places[..count])?;
-    for name in ["Lines", "Polygons", "Strips"] {
-        topology(&root, name, &[0], &[])?;
-    }
+    let corners: Vec<i64> = fields.triangles.as_flattened().iter().map(|corner| i64::from(*corner)).collect();
+    let ends: Vec<i64> = (0..=fields.triangles.len() as i64).map(|k| 3 * k).collect();
+    topology(&root, "Lines", &[0], &[])?;
+    topology(&root, "Polygons", &ends, &corners)?;
+    topology(&root, "Strips", &[0], &[])?;
     let data = root.create_group("PointData")?;
     for field in &fields.columns {
         match &field.values {

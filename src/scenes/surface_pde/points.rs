@@ -12,6 +12,7 @@ use crate::geometry::Vector;
 use crate::point_clouds::cleaning::Cleaning;
 use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
 use crate::point_clouds::normals;
+use crate::point_clouds::triangulation::triangles;
 use crate::point_clouds::{Examined, PreparedCloud};
 use crate::scene::BuildContext;
 use crate::scene::cloud::{self, Clouds};
@@ -101,7 +102,7 @@ impl<const D: usize> Found<D> {
             flaws.iter().map(|flaw| format!("; {flaw}")).collect::<String>()
         );
         let findings = flaws.iter().map(finding).collect();
-        let marks = flaws.iter().map(|flaw| Mark { code: flaw.name(), points: flaw.points().first.clone() }).collect();
+        let marks = flaws.iter().map(|flaw| Mark { code: flaw.name(), points: flaw.points().all.clone() }).collect();
         let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
         Ok(Self { cloud, measure, origin, findings, marks, counted: Vec::new() })
     }
@@ -141,10 +142,12 @@ impl<const D: usize> Found<D> {
             if prepared.graph.part_count == 1 { "part" } else { "parts" },
             if D == 2 { "a length" } else { "an area" },
         );
+        let triangles = triangles(&prepared.points, &prepared.normals, &prepared.stars);
         let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
         let areas = Some(graph.areas.clone());
         let rows = points.len();
         let mut cloud = SurfaceCloud { rows, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
+        cloud.triangles = triangles;
         edges.put_into(&mut cloud);
         Ok(Self { cloud, measure, origin, findings, marks, counted })
     }

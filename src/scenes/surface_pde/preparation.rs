@@ -134,7 +134,7 @@ impl Preparation {
     /// Adds a finding about points of the cloud, and a mark.
     fn about(&mut self, list: &PointList, finding: Finding) {
         if let std::borrow::Cow::Borrowed(code) = finding.code {
-            self.marks.push(Mark { code, points: list.first.clone() });
+            self.marks.push(Mark { code, points: list.all.clone() });
         }
         self.findings.push(finding.about(&list.first).with_count(list.count as u64));
     }
@@ -142,5 +142,6 @@ impl Preparation {
 
 /// The points by their numbers in the file.
 fn in_file<const D: usize>(cloud: &PreparedCloud<D>, list: &PointList) -> PointList {
-    PointList { first: list.first.iter().map(|i| cloud.kept[*i]).collect(), count: list.count }
+    let numbers = |indices: &[usize]| indices.iter().map(|i| cloud.kept[*i]).collect();
+    PointList { first: numbers(&list.first), count: list.count, all: numbers(&list.all) }
 }

@@ -222,6 +222,7 @@ fn reaction(choice: &ModelChoice) -> Model {
     match *choice {
         ModelChoice::GrayScott { feed, kill } => Model::GrayScott { feed, kill },
         ModelChoice::Brusselator { a, b } => Model::Brusselator { a, b },
+        ModelChoice::Schnakenberg { a, b, gamma } => Model::Schnakenberg { a, b, gamma },
     }
 }
 
@@ -471,7 +472,7 @@ fn begin<const D: usize>(
                     let off = noise * random.symmetric(&[i as i64]);
                     [u, v * (1.0 + off)]
                 }
-                (None, Model::Brusselator { .. }) => {
+                (None, Model::Brusselator { .. } | Model::Schnakenberg { .. }) => {
                     [0, 1].map(|k| rest[k] * (1.0 + noise * random.symmetric(&[i as i64, k as i64])))
                 }
             };

@@ -187,6 +187,15 @@ crate::choice! {
             /// rate b
             b: f64 = 9.0, in POSITIVE;
         }
+        /// γ (a − u + u² v), γ (b − u² v)
+        Schnakenberg = "schnakenberg" {
+            /// supply a
+            a: f64 = 0.1, in NOT_NEGATIVE;
+            /// supply b
+            b: f64 = 0.9, in POSITIVE;
+            /// rate γ
+            gamma: f64 = 1.0, in POSITIVE;
+        }
     }
 }
 

@@ -107,9 +107,13 @@ impl Scene for SurfaceScene {
     }
 
     fn view(&self) -> View {
-        let has_values = self.problem.fields(&self.shape).iter().any(|field| **field == VALUE);
-        let field = View::SurfaceField { field: "value", normal: "normal", is_plane: self.shape.is_curve() };
-        if has_values { field } else { View::Nothing }
+        let fields = self.problem.fields(&self.shape);
+        let shown = fields.iter().find(|field| ***field == VALUE).or(fields.first());
+        shown.map_or(View::Nothing, |field| View::SurfaceField {
+            field: field.name,
+            normal: "normal",
+            is_plane: self.shape.is_curve(),
+        })
     }
 
     fn fields(&self) -> Vec<&'static Quantity> {
@@ -133,8 +137,8 @@ impl Scene for SurfaceScene {
             // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.
             Scheme::Dcpse(method) => {
                 let entries = self.entries(method);
-                // Neighbors, stars and their graph.
-                let stars = if let Form::Stars { .. } | Form::Conservative = method.form { 700.0 } else { 0.0 };
+                // Neighbors, stars and their graph, triangles.
+                let stars = if let Form::Stars { .. } | Form::Conservative = method.form { 850.0 } else { 0.0 };
                 points
                     * (250.0
                         + stars

@@ -31,6 +31,8 @@ pub struct SurfaceCloud<const D: usize> {
     pub spacings: Vec<f64>,
     /// The graph of stars; empty where operators do not need it.
     pub graph: StarGraph,
+    /// Triangles of the surface for pictures; empty where they are not known.
+    pub triangles: Vec<[u32; 3]>,
     /// The direction out of the surface at points of an edge that nothing flows through; empty where there are none.
     pub conormals: Vec<Option<Vector<D>>>,
     /// Points of an edge that hold a value in equations, with the value.

@@ -17,6 +17,15 @@ pub enum Model {
         /// Rate b.
         b: f64,
     },
+    /// γ (a − u + u² v) and γ (b − u² v) (Schnakenberg 1979).
+    Schnakenberg {
+        /// Supply a.
+        a: f64,
+        /// Supply b.
+        b: f64,
+        /// Rate γ.
+        gamma: f64,
+    },
 }
 
 impl Model {
@@ -33,6 +42,10 @@ impl Model {
                 let made = u * u * v;
                 [a - (b + 1.0) * u + made, b * u - made]
             }
+            Self::Schnakenberg { a, b, gamma } => {
+                let made = u * u * v;
+                [gamma * (a - u + made), gamma * (b - made)]
+            }
         }
     }
 
@@ -42,6 +55,7 @@ impl Model {
         match self {
             Self::GrayScott { .. } => [1.0, 0.0],
             Self::Brusselator { a, b } => [a, b / a],
+            Self::Schnakenberg { a, b, .. } => [a + b, b / (a + b).powi(2)],
         }
     }
 }
@@ -92,7 +106,8 @@ mod tests {
 
     #[test]
     fn rest_does_not_react() {
-        for model in [Model::GrayScott { feed: 0.04, kill: 0.06 }, Model::Brusselator { a: 3.0, b: 9.0 }] {
+        let schnakenberg = Model::Schnakenberg { a: 0.1, b: 0.9, gamma: 2.0 };
+        for model in [Model::GrayScott { feed: 0.04, kill: 0.06 }, Model::Brusselator { a: 3.0, b: 9.0 }, schnakenberg] {
             let [u, v] = model.rest();
             assert!(model.rates(u, v).iter().all(|rate| rate.abs() < 1e-14), "{model:?}");
         }
@@ -101,7 +116,12 @@ mod tests {
     /// du/dt of the manufactured solution by differences equals diffusion, terms and forcing.
     #[test]
     fn forcing_makes_the_solution_exact() {
-        let model = Model::Brusselator { a: 1.0, b: 2.0 };
+        for model in [Model::Brusselator { a: 1.0, b: 2.0 }, Model::Schnakenberg { a: 0.1, b: 0.9, gamma: 2.0 }] {
+            check_forcing(model);
+        }
+    }
+
+    fn check_forcing(model: Model) {
         let reaction = Reaction { model, diffusivity: [0.01, 0.1], manufactured: None };
         let (f, t, step) = (0.4, 0.7, 1e-5);
         let laplacian = -6.0 * f;

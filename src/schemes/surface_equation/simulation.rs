@@ -249,6 +249,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         }
         fields.particle_id();
         fields.marks.clone_from(&self.marks);
+        fields.triangles.clone_from(&self.cloud.triangles);
         fields
     }
 
