@@ -454,3 +454,42 @@ fn what_points_cannot_do_is_refused_at_its_place() {
     let sizes = CloudSizes::from([("/surface", 123_456)]);
     assert_eq!(scene(&body(&json!({}))).estimate(&sizes).particles, 123_456);
 }
+
+/// On a torus the larger curvature goes around the tube, 1/r, and the smaller one around the axis, cos θ/(R + r cos θ).
+#[test]
+fn principal_curvatures_of_a_torus_and_their_directions() {
+    for normals in ["exact", "estimated"] {
+        let method = json!({"type": "surface_dcpse", "order": 4});
+        let given = json!({"kind": "surface_pde", "surface": "torus", "problem": "curvature", "count": 6000, "method": method, "normals": normals});
+        let simulation = finished(&given, &Cloud::default());
+        let fields = simulation.fields(Selection::All);
+        let vectors = |name: &str| match &fields.columns.iter().find(|c| c.name == name).unwrap().values {
+            FieldValues::Vector(values) => values.clone(),
+            _ => panic!("{name} is no vector a point"),
+        };
+        let (larger, smaller) = (
+            column(simulation.as_ref(), "principal_curvature_1"),
+            column(simulation.as_ref(), "principal_curvature_2"),
+        );
+        let (along, row) = (vectors("principal_direction_2"), vectors("shape_tensor_x"));
+        for (i, [x, y, _]) in fields.points.iter().enumerate() {
+            let distance = x.hypot(*y);
+            let cosine = (distance - 1.0) / 0.4;
+            assert!((larger[i] - 2.5).abs() < 2e-2, "{normals} {i}: {}", larger[i]);
+            assert!((smaller[i] - cosine / distance).abs() < 2e-2, "{normals} {i}: {}", smaller[i]);
+            let around = (along[i][1] * x - along[i][0] * y) / distance;
+            assert!(around.abs() > 0.999, "{normals} {i}: {around}");
+            // e_x · S e_x = k₁ (v₁·e_x)² + k₂ (v₂·e_x)².
+            let first = vectors_at(&fields, "principal_direction_1", i);
+            let exact = larger[i] * first[0].powi(2) + smaller[i] * along[i][0].powi(2);
+            assert!((row[i][0] - exact).abs() < 2e-2, "{normals} {i}: {} {exact}", row[i][0]);
+        }
+    }
+}
+
+fn vectors_at(fields: &meniscus::simulation::Fields, name: &str, i: usize) -> [f64; 3] {
+    match &fields.columns.iter().find(|c| c.name == name).unwrap().values {
+        FieldValues::Vector(values) => values[i],
+        _ => panic!("{name} is no vector a point"),
+    }
+}

@@ -21,6 +21,7 @@ mod problem;
 pub mod quantities;
 mod reactions;
 mod row_quality;
+mod shape_tensor;
 mod simulation;
 mod solver;
 
@@ -44,7 +45,7 @@ pub fn all_fields() -> Vec<&'static Quantity> {
         &Evolution::shown_fields(true, true),
         &Pointwise::shown_fields(true),
         &Poisson::shown_fields(true),
-        &Curvature::shown_fields(),
+        &Curvature::shown_fields(3),
         &[&quantities::NORMAL, &quantities::CURVATURE],
         COMMON_FIELDS,
     ])

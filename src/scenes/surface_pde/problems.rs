@@ -324,7 +324,7 @@ impl ProblemChoice {
         match self {
             Self::LaplaceBeltrami { .. } => Pointwise::shown_fields(is_exact),
             Self::Poisson { .. } => Poisson::shown_fields(is_exact),
-            Self::Curvature { .. } => Curvature::shown_fields(),
+            Self::Curvature { .. } => Curvature::shown_fields(shape.dimension()),
             Self::Evolution { start: Start::Field(field), .. } => Evolution::shown_fields(
                 false,
                 matches!(field, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. }),

@@ -6,6 +6,8 @@ use super::format_1;
 use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
 use super::quantities::{CURVATURE_MEAN, GAUSS_INTEGRAL};
+use super::shape_tensor::{self, ShapeTensor};
+use crate::geometry::Vector;
 use crate::operators::{derivative_tensor, divergence, sum_of_minors};
 use crate::schemes::measured_errors::against_exact;
 use crate::simulation::quantity::quantities;
@@ -21,26 +23,45 @@ quantities! {
     }
 }
 
+quantities! {
+    /// Fields that frames show of surfaces in space.
+    SPACE_FIELDS {
+        PRINCIPAL_1 = "principal_curvature_1", "1/length", "Larger principal curvature; NaN before the first step.";
+        PRINCIPAL_2 = "principal_curvature_2", "1/length", "Smaller principal curvature; NaN before the first step.";
+        DIRECTION_1 = "principal_direction_1", "", "Unit direction of the larger principal curvature, its largest component positive; NaN before the first step.";
+        DIRECTION_2 = "principal_direction_2", "", "Unit direction of the smaller principal curvature, its largest component positive; NaN before the first step.";
+        SHAPE_X = "shape_tensor_x", "1/length", "Row x of the shape tensor, the surface gradient of the normal; NaN before the first step.";
+        SHAPE_Y = "shape_tensor_y", "1/length", "Row y of the shape tensor; NaN before the first step.";
+        SHAPE_Z = "shape_tensor_z", "1/length", "Row z of the shape tensor; NaN before the first step.";
+    }
+}
+
+/// The fields of vectors.
+static VECTORS: [&Quantity; 5] = [&DIRECTION_1, &DIRECTION_2, &SHAPE_X, &SHAPE_Y, &SHAPE_Z];
+
 /// Computed curvatures.
 #[derive(Debug, Default)]
 pub struct Curvature {
     /// H = ∇·n/2 in space, κ = ∇·n in the plane.
     mean: Vec<f64>,
     gauss: Vec<f64>,
+    /// The shape tensor at each point in space; NaN before the first step.
+    shapes: Vec<ShapeTensor>,
     of_heights: bool,
 }
 
 impl Curvature {
-    /// The fields that frames show, the surface's own excepted.
+    /// The fields that frames show of a surface in a space of this dimension, the surface's own excepted.
     #[must_use]
-    pub fn shown_fields() -> Vec<&'static Quantity> {
-        FIELDS.to_vec()
+    pub fn shown_fields(dimension: usize) -> Vec<&'static Quantity> {
+        let in_space = if dimension == 3 { SPACE_FIELDS } else { &[] };
+        FIELDS.iter().chain(in_space).copied().collect()
     }
 
     /// Of so many points; `of_heights`: heights are fitted.
     #[must_use]
     pub fn new(rows: usize, of_heights: bool) -> Self {
-        Self { mean: vec![0.0; rows], gauss: vec![0.0; rows], of_heights }
+        Self { mean: vec![0.0; rows], gauss: vec![0.0; rows], shapes: vec![[f64::NAN; 6]; rows], of_heights }
     }
 }
 
@@ -60,22 +81,49 @@ impl<const D: usize> Problem<D> for Curvature {
             for (i, [bend, gauss]) in curvatures.iter().enumerate() {
                 (self.mean[i], self.gauss[i]) = (share(D) * bend, *gauss);
             }
+            self.shapes.clone_from(&operators.shapes);
             return Ok(());
         }
         phases.measure("operators/application", || {
             for (i, shape) in derivative_tensor(&operators.rows, &cloud.normals).iter().enumerate() {
                 self.mean[i] = share(D) * divergence(shape);
                 self.gauss[i] = if D == 3 { sum_of_minors(shape) } else { 0.0 };
+                self.shapes[i] = shape_tensor::from_derivatives(shape);
             }
         });
         Ok(())
     }
 
     fn columns(&self) -> Vec<&'static Quantity> {
-        Self::shown_fields()
+        let mut columns = Self::shown_fields(D);
+        columns.retain(|quantity| !VECTORS.contains(quantity));
+        columns
+    }
+
+    fn vector_columns(&self) -> Vec<&'static Quantity> {
+        if D == 3 { VECTORS.to_vec() } else { Vec::new() }
+    }
+
+    fn vector_column(&self, quantity: &Quantity, cloud: &SurfaceCloud<D>) -> Vec<Vector<D>> {
+        let at = |(shape, n): (&ShapeTensor, &Vector<D>)| {
+            let n = Vector::<3>::from_fn(|d, _| n[d % D]);
+            let found = match VECTORS.iter().position(|vector| *vector == quantity) {
+                Some(place @ 0..=1) if shape[0].is_finite() => shape_tensor::principal(shape, &n)[place].1,
+                Some(place @ 2..) => shape_tensor::row(shape, place - 2),
+                _ => Vector::<3>::repeat(f64::NAN),
+            };
+            Vector::<D>::from_fn(|d, _| found[d])
+        };
+        self.shapes.iter().zip(&cloud.normals).map(at).collect()
     }
 
     fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {
+        if let Some(sign) = [(&PRINCIPAL_1, 1.0), (&PRINCIPAL_2, -1.0)].iter().find(|(known, _)| *known == quantity) {
+            // Roots of k² − 2 H k + K; rounding must not make them complex.
+            let root = |(h, k): (&f64, &f64)| h + sign.1 * (h * h - k).max(0.0).sqrt();
+            let values = self.mean.iter().zip(&self.gauss).map(root);
+            return if clock.step == 0 { vec![f64::NAN; self.mean.len()] } else { values.collect() };
+        }
         let values = if *quantity == GAUSS_CURVATURE { &self.gauss } else { &self.mean };
         if clock.step == 0 { vec![f64::NAN; values.len()] } else { values.clone() }
     }
@@ -112,11 +160,20 @@ impl<const D: usize> Problem<D> for Curvature {
     fn save(&self, section: &mut Section) {
         section.put_reals("mean_curvature", &self.mean);
         section.put_reals("gauss_curvature", &self.gauss);
+        if self.shapes.iter().all(|shape| shape[0].is_finite()) {
+            section.put_reals("shape_tensor", self.shapes.as_flattened());
+        }
     }
 
     fn load(&mut self, section: &Section) -> Result<(), LoadError> {
         let mean = section.reals_of("mean_curvature", self.mean.len())?;
         let gauss = section.reals_of("gauss_curvature", self.gauss.len())?;
+        // There is none before the step, and in checkpoints of earlier versions.
+        let shapes =
+            if section.has("shape_tensor") { section.reals_of("shape_tensor", 6 * self.mean.len())? } else { &[] };
+        for (to, from) in self.shapes.iter_mut().zip(shapes.as_chunks::<6>().0) {
+            *to = *from;
+        }
         self.mean.copy_from_slice(mean);
         self.gauss.copy_from_slice(gauss);
         Ok(())

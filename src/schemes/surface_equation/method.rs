@@ -3,6 +3,8 @@
 use super::cloud::SurfaceCloud;
 use super::conservative;
 use super::row_quality::RowQuality;
+use super::shape_tensor::{self, ShapeTensor};
+use crate::geometry::Vector;
 use crate::linear_algebra::SparseRows;
 use crate::operators::charts::tangent::Metric;
 use crate::operators::{
@@ -74,6 +76,8 @@ pub struct Operators {
     pub rows: Vec<SparseRows>,
     /// κ = ∇·n and the Gauss curvature of the fitted surface, where heights were fitted.
     pub curvatures: Option<Vec<[f64; 2]>>,
+    /// Shape tensors of the fitted surface, where heights were fitted and no operator is wanted; else empty.
+    pub shapes: Vec<ShapeTensor>,
     /// Slopes of the fitted surface over the tangent plane of each point, where heights were fitted along stars; else empty.
     pub slopes: Vec<[f64; 2]>,
     /// What became of the points.
@@ -135,7 +139,8 @@ impl Method {
                 }
                 let built = construct::<M>(&chart, self.support, &functionals(wanted), interrupt)?;
                 let curvatures = (!built.heights.is_empty()).then(|| built.heights.iter().map(bends).collect());
-                Ok(operators(built, curvatures))
+                let shapes = shapes(wanted, &cloud.normals, &built.heights);
+                Ok(Operators { shapes, ..operators(built, curvatures) })
             }
             Form::Copies { layers, spacing } => {
                 let chart = NormalCopies::new(&cloud.points, &cloud.normals, layers, spacing, radius);
@@ -182,6 +187,7 @@ impl Method {
         Ok(Operators {
             rows: built.operators,
             curvatures,
+            shapes: shapes(wanted, cloud.normals, &built.heights),
             slopes: built
                 .heights
                 .iter()
@@ -205,7 +211,15 @@ fn functionals<const M: usize>(wanted: &[Wanted]) -> Vec<Functional<M>> {
 fn operators<const M: usize>(built: Construction<M>, curvatures: Option<Vec<[f64; 2]>>) -> Operators {
     let fit_diagnostics = built.fit_diagnostics;
     let (slopes, quality, is_conservative) = (Vec::new(), None, false);
-    Operators { rows: built.operators, curvatures, slopes, fit_diagnostics, quality, is_conservative }
+    Operators {
+        rows: built.operators,
+        curvatures,
+        shapes: Vec::new(),
+        slopes,
+        fit_diagnostics,
+        quality,
+        is_conservative,
+    }
 }
 
 /// The conservative form of Δ_S; `quality` is that of the rows whose place it takes.
@@ -213,11 +227,24 @@ fn conservative_operators(graph: &StarGraph, quality: Option<RowQuality>) -> Ope
     Operators {
         rows: vec![conservative::rows(graph)],
         curvatures: None,
+        shapes: Vec::new(),
         slopes: Vec::new(),
         fit_diagnostics: SupportDiagnostics::default(),
         quality,
         is_conservative: true,
     }
+}
+
+/// Shape tensors of fitted heights, for problems that want no operator but the surface itself.
+fn shapes<const D: usize, const M: usize>(
+    wanted: &[Wanted],
+    normals: &[Vector<D>],
+    heights: &[Heights<M>],
+) -> Vec<ShapeTensor> {
+    if !wanted.is_empty() {
+        return Vec::new();
+    }
+    normals.iter().zip(heights).map(|(n, h)| shape_tensor::from_heights(n, h)).collect()
 }
 
 /// ∇·n = −g^ab h_ab/√det g and K = det h_ab/(det g)² of a graph over its plane.

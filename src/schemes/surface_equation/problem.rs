@@ -2,6 +2,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::{Operators, Use, Wanted};
+use crate::geometry::Vector;
 use crate::parallel::Interrupt;
 use crate::simulation::{
     Check, Diagnostic, ErrorEntry, Finding, LoadError, Observables, Phases, Quantity, Section, StepError,
@@ -49,6 +50,16 @@ pub trait Problem<const D: usize>: Send {
 
     /// The values of a field at the points.
     fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64>;
+
+    /// The fields of vectors that frames show; their values are computed by [`Self::vector_column`].
+    fn vector_columns(&self) -> Vec<&'static Quantity> {
+        Vec::new()
+    }
+
+    /// The values of a field of vectors at the points of the cloud.
+    fn vector_column(&self, _quantity: &Quantity, _cloud: &SurfaceCloud<D>) -> Vec<Vector<D>> {
+        Vec::new()
+    }
 
     /// The unknowns whose finiteness is watched, by name.
     fn watched(&self) -> Watched<'_>;

@@ -107,7 +107,8 @@ mod tests {
     #[test]
     fn rest_does_not_react() {
         let schnakenberg = Model::Schnakenberg { a: 0.1, b: 0.9, gamma: 2.0 };
-        for model in [Model::GrayScott { feed: 0.04, kill: 0.06 }, Model::Brusselator { a: 3.0, b: 9.0 }, schnakenberg] {
+        for model in [Model::GrayScott { feed: 0.04, kill: 0.06 }, Model::Brusselator { a: 3.0, b: 9.0 }, schnakenberg]
+        {
             let [u, v] = model.rest();
             assert!(model.rates(u, v).iter().all(|rate| rate.abs() < 1e-14), "{model:?}");
         }

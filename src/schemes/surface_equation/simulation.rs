@@ -242,6 +242,9 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         for quantity in self.problem.columns() {
             fields.scalar(quantity, || self.problem.column(quantity, self.clock()));
         }
+        for quantity in self.problem.vector_columns() {
+            fields.vector(quantity, || self.problem.vector_column(quantity, &self.cloud).into_iter());
+        }
         let normals = if self.fitted_normals.is_empty() { &self.cloud.normals } else { &self.fitted_normals };
         fields.vector(&NORMAL, || normals[..rows].iter().copied());
         if !self.cloud.curvatures.is_empty() {
