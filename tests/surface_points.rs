@@ -493,3 +493,27 @@ fn vectors_at(fields: &meniscus::simulation::Fields, name: &str, i: usize) -> [f
         _ => panic!("{name} is no vector a point"),
     }
 }
+
+#[test]
+fn gradients_of_a_wave_are_tangential_and_known_on_own_surfaces() {
+    let problem = json!({"type": "gradient", "field": {"type": "plane_wave", "k": [2, -1, 3]}});
+    let own = json!({"kind": "surface_pde", "problem": problem, "count": 2000});
+    let simulation = finished(&own, &Cloud::default());
+    let errors = simulation.report().errors;
+    // 3.4e-4 measured.
+    assert!(errors[0].quantity == "gradient" && errors[0].value < 5e-4, "{errors:?}");
+    // On points from outside nothing is exact, and the divergence is that of the wave's operator about.
+    let cloud = bare(sphere(2000, 1.0, [0.0; 3]));
+    let simulation = finished(&body(&json!({"problem": problem})), &cloud);
+    assert!(simulation.report().errors.is_empty());
+    let divergence = column(simulation.as_ref(), "divergence");
+    let wave = Vector::<3>::new(2.0, -1.0, 3.0);
+    let fields = simulation.fields(Selection::All);
+    for (i, x) in fields.points.iter().enumerate() {
+        let x = Vector::<3>::from(*x);
+        let (along, gradient) = (wave.dot(&x), Vector::<3>::from(vectors_at(&fields, "gradient", i)));
+        assert!(gradient.dot(&x).abs() < 2e-2 && (gradient - (wave - x * along) * along.cos()).norm() < 2e-2);
+        let exact = -(wave.norm_squared() - along * along) * along.sin() - 2.0 * along * along.cos();
+        assert!((divergence[i] - exact).abs() < 0.5, "{i}: {} {exact}", divergence[i]);
+    }
+}

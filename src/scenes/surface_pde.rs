@@ -5,6 +5,7 @@ mod points;
 mod preparation;
 mod problems;
 mod plan;
+mod solvers;
 pub mod spec;
 mod surface_scene;
 mod surfaces;

@@ -24,6 +24,7 @@ mod row_quality;
 mod shape_tensor;
 mod simulation;
 mod solver;
+pub mod surface_gradient;
 
 pub use cloud::SurfaceCloud;
 pub use curvature::Curvature;
@@ -37,6 +38,7 @@ pub use reactions::{Model, Reaction};
 pub use row_quality::RowQuality;
 pub use simulation::SurfaceEquation;
 pub use solver::Solver;
+pub use surface_gradient::SurfaceGradient;
 
 /// Every field that frames of this scheme may show.
 #[must_use]
@@ -46,6 +48,7 @@ pub fn all_fields() -> Vec<&'static Quantity> {
         &Pointwise::shown_fields(true),
         &Poisson::shown_fields(true),
         &Curvature::shown_fields(3),
+        &surface_gradient::shown_fields(),
         &[&quantities::NORMAL, &quantities::CURVATURE],
         COMMON_FIELDS,
     ])

@@ -3,6 +3,7 @@
 
 use super::edges;
 use super::problems::{self, ProblemChoice};
+use super::solvers;
 use super::spec::{
     CleanWord, EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice,
     StoppingSpec, SupportsWord, SurfaceChoice, SurfacePde,
@@ -126,7 +127,9 @@ fn plan(mut spec: SurfacePde) -> Planned {
     };
     let fixed = match &problem {
         ProblemChoice::LaplaceBeltrami { .. } => FixedStep { time_step: 1.0, steps: spec.repeat },
-        ProblemChoice::Poisson { .. } | ProblemChoice::Curvature { .. } => FixedStep { time_step: 1.0, steps: 1 },
+        ProblemChoice::Poisson { .. } | ProblemChoice::Curvature { .. } | ProblemChoice::Gradient { .. } => {
+            FixedStep { time_step: 1.0, steps: 1 }
+        }
         ProblemChoice::Evolution { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
     };
     fill_in_steps(&mut spec.problem, &problem, fixed);
@@ -176,7 +179,7 @@ fn check_form(
 ) {
     let Some(Scheme::Dcpse(Method { form, .. })) = scheme else { return };
     let is_conservative = *form == Form::Conservative;
-    let is_pointwise = matches!(problem, Some(ProblemChoice::LaplaceBeltrami { .. } | ProblemChoice::Curvature { .. }));
+    let is_pointwise = problem.is_some_and(ProblemChoice::is_pointwise);
     if is_conservative && is_pointwise {
         let detail = "the rows of the conservative form are right in equations only, not point by point";
         errors.push(Violation::new("/method", "conflict", detail, "conservative", json!(["auto", "surface_dcpse"])));
@@ -251,7 +254,10 @@ fn fill_in_steps(spec: &mut ProblemSpec, planned: &ProblemChoice, fixed: FixedSt
             *time_step = Some(fixed.time_step);
             *tolerance = controlled;
         }
-        ProblemSpec::LaplaceBeltrami { .. } | ProblemSpec::Poisson { .. } | ProblemSpec::Curvature => {}
+        ProblemSpec::LaplaceBeltrami { .. }
+        | ProblemSpec::Gradient { .. }
+        | ProblemSpec::Poisson { .. }
+        | ProblemSpec::Curvature => {}
     }
 }
 
@@ -271,7 +277,7 @@ pub(super) fn choices(
         }
         _ => Metric::FromHeights,
     };
-    let solver = problems::solver(spec.solver.get_or_insert_with(|| default_solver(shape)));
+    let solver = solvers::solver(spec.solver.get_or_insert_with(|| default_solver(shape)));
     let scheme = scheme(spec, Points { shape, sampling, count, metric }, errors);
     (scheme, problems::plan(spec, shape, (metric, solver), errors))
 }

@@ -126,8 +126,7 @@ impl<const D: usize> Found<D> {
                           (/normals/metric); `heights` estimates others";
             return Err(refuse(detail.to_owned()));
         }
-        let is_equation =
-            !matches!(scene.problem, ProblemChoice::LaplaceBeltrami { .. } | ProblemChoice::Curvature { .. });
+        let is_equation = !scene.problem.is_pointwise();
         let edges = Edges::new(&prepared, &scene.spec.edges);
         edges.check(&prepared, &scene.spec.edges)?;
         let Preparation { findings, marks, mut counted } = Preparation::new(&prepared, is_equation, edges.held_count());

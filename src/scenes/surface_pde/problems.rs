@@ -1,18 +1,15 @@
 //! The problem of a scene: what it is made of, what it costs.
 
-use super::spec::{
-    ConditionWord, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SolverChoice, StoppingSpec,
-    SurfacePde,
-};
+use super::solvers::explicit;
+use super::spec::{ConditionWord, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SurfacePde};
 use super::surfaces::{DEFAULT_COUNT, Shape};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
-use crate::linear_algebra::krylov::Stopping;
 use crate::operators::charts::tangent::Metric;
 use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{
     Condition, Curvature, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, ExactField, Model, Pointwise,
-    Poisson, Problem, Reaction, Solver, SurfaceCloud,
+    Poisson, Problem, Reaction, Solver, SurfaceCloud, SurfaceGradient, surface_gradient,
 };
 use crate::simulation::Quantity;
 use crate::spec::{Choice, Coordinates, Parameter, Violation};
@@ -22,6 +19,7 @@ use serde_json::{Value, json};
 #[derive(Debug, Clone)]
 pub(super) enum ProblemChoice {
     LaplaceBeltrami { field: ExactField },
+    Gradient { field: ExactField },
     Poisson { field: ExactField, is_dirichlet: bool, solver: Solver },
     Curvature { of_heights: bool },
     Evolution { start: Start, end_time: f64, time_step: f64, integrator: EvolutionIntegrator },
@@ -36,8 +34,6 @@ pub(super) enum Start {
 
 /// Steps of a run whose Δt is not given.
 const DEFAULT_STEPS: f64 = 100.0;
-/// Tolerance where neither it nor Δt is given.
-const DEFAULT_TOLERANCE: f64 = 1e-7;
 /// Wave vector that is not given, by the extent of the surface.
 const DEFAULT_WAVE: [f64; 3] = [2.0, -1.0, 3.0];
 /// Wave numbers, by the extent of the surface, for which a wave has a length that numbers can tell.
@@ -163,6 +159,10 @@ pub(super) fn plan(
             let field = field.get_or_insert_with(|| default_field(shape));
             Some(ProblemChoice::LaplaceBeltrami { field: site("/problem/field").field(field, errors) })
         }
+        ProblemSpec::Gradient { field } => {
+            let field = field.get_or_insert(FieldChoice::PlaneWave { k: None });
+            Some(ProblemChoice::Gradient { field: site("/problem/field").field(field, errors) })
+        }
         ProblemSpec::Poisson { field, condition } => {
             let field = field.get_or_insert_with(|| default_field(shape));
             let field = site("/problem/field").field(field, errors);
@@ -239,32 +239,6 @@ fn check_poisson(shape: &Shape, condition: ConditionWord, name: &str, errors: &m
     }
 }
 
-/// An explicit integrator: steps are controlled where a tolerance is given, or where no time step is.
-fn explicit(tolerance: Option<f64>, time_step: Option<f64>) -> EvolutionIntegrator {
-    match (tolerance, time_step) {
-        (Some(tolerance), _) => EvolutionIntegrator::Controlled { tolerance },
-        (None, None) => EvolutionIntegrator::Controlled { tolerance: DEFAULT_TOLERANCE },
-        (None, Some(_)) => EvolutionIntegrator::FixedSteps,
-    }
-}
-
-impl From<&StoppingSpec> for Stopping {
-    fn from(spec: &StoppingSpec) -> Self {
-        Self { tolerance: spec.tolerance, max_iterations: spec.max_iterations }
-    }
-}
-
-/// The solver of a choice.
-pub(super) fn solver(choice: &SolverChoice) -> Solver {
-    match choice {
-        SolverChoice::Auto { stopping } => Solver::Automatic(stopping.into()),
-        SolverChoice::Cg { stopping } => Solver::Cg(stopping.into()),
-        SolverChoice::Bicgstab { stopping } => Solver::BiCgStab(stopping.into()),
-        SolverChoice::Gmres { restart, stopping } => Solver::Gmres { restart: *restart, stopping: stopping.into() },
-        SolverChoice::SparseLu => Solver::SparseLu,
-    }
-}
-
 /// A point in space, z = 0 in the plane.
 fn raised<const D: usize>(x: &Vector<D>) -> Vector<3> {
     Vector::<3>::from_fn(|d, _| if d < D { x[d] } else { 0.0 })
@@ -296,9 +270,15 @@ impl ProblemChoice {
         }
     }
 
+    /// Whether values at points are the result, and no equation is solved.
+    pub fn is_pointwise(&self) -> bool {
+        matches!(self, Self::LaplaceBeltrami { .. } | Self::Gradient { .. } | Self::Curvature { .. })
+    }
+
     pub fn name(&self) -> &'static str {
         match self {
             Self::LaplaceBeltrami { .. } => "applied",
+            Self::Gradient { .. } => "gradient",
             Self::Poisson { solver: Solver::SparseLu, .. } => "poisson_lu",
             Self::Poisson { .. } => "poisson",
             Self::Curvature { .. } => "curvature",
@@ -312,6 +292,7 @@ impl ProblemChoice {
     pub fn copies(&self) -> f64 {
         match self {
             Self::Curvature { .. }
+            | Self::Gradient { .. }
             | Self::Poisson { .. }
             | Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => 3.0,
             _ => 1.0,
@@ -323,6 +304,7 @@ impl ProblemChoice {
         let is_exact = !matches!(shape, Shape::Points(_));
         match self {
             Self::LaplaceBeltrami { .. } => Pointwise::shown_fields(is_exact),
+            Self::Gradient { .. } => surface_gradient::shown_fields(),
             Self::Poisson { .. } => Poisson::shown_fields(is_exact),
             Self::Curvature { .. } => Curvature::shown_fields(shape.dimension()),
             Self::Evolution { start: Start::Field(field), .. } => Evolution::shown_fields(
@@ -341,7 +323,9 @@ impl ProblemChoice {
         match self {
             Self::LaplaceBeltrami { .. } => vec![PhaseWork::every_step("operators/application", application * steps)],
             Self::Curvature { of_heights: true } => Vec::new(),
-            Self::Curvature { .. } => vec![PhaseWork::every_step("operators/application", 9.0 * application)],
+            Self::Curvature { .. } | Self::Gradient { .. } => {
+                vec![PhaseWork::every_step("operators/application", 9.0 * application)]
+            }
             Self::Poisson { solver: Solver::SparseLu, .. } => vec![
                 PhaseWork::every_step("solver/assembly", application),
                 // Nested dissection of a plane fills n ln n entries and takes n^1.5 operations.
@@ -404,6 +388,13 @@ impl ProblemChoice {
         Ok(match self {
             Self::LaplaceBeltrami { field } => {
                 Box::new(Pointwise::new(values(field, cloud), operated(field, shape, cloud)))
+            }
+            Self::Gradient { field } => {
+                let at = |x: &Vector<D>| field.gradient(&raised(x), &shape.normal(&raised(x))?);
+                let exact: Option<Vec<Vector<3>>> = cloud.points[..cloud.rows].iter().map(at).collect();
+                let flat = |g: &Vector<3>| Vector::<D>::from_fn(|d, _| g[d]);
+                let exact = exact.map(|exact| exact.iter().map(flat).collect());
+                Box::new(SurfaceGradient::new(values(field, cloud), exact))
             }
             Self::Curvature { of_heights } => Box::new(Curvature::new(cloud.rows, *of_heights)),
             Self::Poisson { field, is_dirichlet, solver } => {

@@ -210,6 +210,11 @@ crate::choice! {
             /// the field; `spherical_harmonic` on spheres, `sin_plus_cos` on circles, else `plane_wave` when not given
             field: Option<FieldChoice>;
         }
+        /// ∇ₛ of a field, and its divergence
+        Gradient = "gradient" {
+            /// the field; `plane_wave` when not given
+            field: Option<FieldChoice>;
+        }
         /// Δₛ u = Δₛ of a field: `value` is u, `reference` the field; on points Δₛ u = the field less its mean
         Poisson = "poisson" {
             /// the field; `spherical_harmonic` on spheres, `sin_plus_cos` on circles, else `plane_wave` when not given

@@ -67,6 +67,15 @@ impl ExactField {
         }
     }
 
+    /// ∇_S at a point with unit normal `n`: the tangential part of the gradient in space. None where it is not known here.
+    #[must_use]
+    pub fn gradient(&self, x: &Vector<3>, n: &Vector<3>) -> Option<Vector<3>> {
+        match self {
+            Self::PlaneWave { k } => Some((k - n * k.dot(n)) * k.dot(x).cos()),
+            Self::SphericalHarmonic { .. } | Self::SinPlusCos { .. } | Self::TruncatedGaussian { .. } => None,
+        }
+    }
+
     /// λ with Δ_S f = −λ f on a sphere or a circle of a radius, for eigenfunctions.
     #[must_use]
     pub fn decay(&self, radius: f64) -> Option<f64> {

@@ -90,6 +90,8 @@ pub struct Operators {
 
 /// Degree and radius in local spacings of the fits that take the place of others, in order.
 const LOWER: [StarSupport; 2] = [StarSupport { degree: 5, cutoff: 3.3 }, StarSupport { degree: 3, cutoff: 2.4 }];
+/// Degree of fits with the order of the conservative form.
+const LOWEST_DEGREE: usize = 3;
 /// The same on curves.
 const LOWER_ON_CURVES: [StarSupport; 2] =
     [StarSupport { degree: 5, cutoff: 5.4 }, StarSupport { degree: 3, cutoff: 3.4 }];
@@ -177,7 +179,8 @@ impl Method {
         let built = construct_star_rows::<D, M>(cloud, &supports, &functionals(wanted), interrupt)?;
         let laplacian = wanted.iter().position(|wanted| *wanted == Wanted::LaplaceBeltrami);
         let judged = laplacian.filter(|_| purpose == Use::Equation).map(|place| &built.operators[place]);
-        let quality = RowQuality::new(&built, judged, interrupt);
+        let open = if degree == LOWEST_DEGREE { cloud.graph.open_count() } else { 0 };
+        let quality = RowQuality::new(&built, judged, interrupt).with_open_points(open);
         interrupt.check()?;
         if may_switch && purpose == Use::Equation && quality.reason_to_switch().is_some() {
             return Ok(conservative_operators(cloud.graph, Some(quality)));
