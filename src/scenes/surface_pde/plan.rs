@@ -368,12 +368,16 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
         }
         MethodSpec::Auto { order, cutoff_dn } => {
             let is_curvature = matches!(spec.problem, ProblemSpec::Curvature);
-            let order = *order.get_or_insert(if is_curvature { points.order_of_curvature() } else { 2 });
-            points.by_stars(order, cutoff_dn, true, errors)
+            let may_lower = is_curvature && order.is_none();
+            if may_lower {
+                // It is known when the points are read, so that it stays open in the resolved body, and the cutoff with it.
+                return points.by_stars(points.order_of_curvature(), &mut { *cutoff_dn }, (true, true), errors);
+            }
+            points.by_stars(*order.get_or_insert(2), cutoff_dn, (true, false), errors)
         }
         MethodSpec::Conservative => {
             // The support of the lowest order stands for lengths and counts.
-            let support = points.by_stars(2, &mut None, false, errors)?;
+            let support = points.by_stars(2, &mut None, (false, false), errors)?;
             let Scheme::Dcpse(Method { support, .. }) = support else { return None };
             Some(Scheme::Dcpse(Method { support, form: Form::Conservative }))
         }
@@ -403,7 +407,7 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
             }
             let default = if points.is_given() { SupportsWord::Stars } else { SupportsWord::Ball };
             if *supports.get_or_insert(default) == SupportsWord::Stars {
-                return points.by_stars(*order, cutoff_dn, false, errors);
+                return points.by_stars(*order, cutoff_dn, (false, false), errors);
             }
             let (degree, default_cutoff) = points.support(*order, false, errors)?;
             let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
@@ -440,14 +444,14 @@ impl Points<'_> {
         self,
         order: u64,
         cutoff_dn: &mut Option<f64>,
-        may_switch: bool,
+        (may_switch, may_lower): (bool, bool),
         errors: &mut Vec<Violation>,
     ) -> Option<Scheme> {
         let (degree, default_cutoff) = Self { sampling: Sampling::Given, ..self }.support(order, false, errors)?;
         let cutoff = *cutoff_dn.get_or_insert(default_cutoff);
         self.check_fit(degree, cutoff, errors);
         let support = Support { degree, radius: cutoff * self.shape.spacing(self.count) };
-        let form = Form::Stars { metric: self.metric, cutoff, may_switch };
+        let form = Form::Stars { metric: self.metric, cutoff, may_switch, may_lower };
         Some(Scheme::Dcpse(Method { support, form }))
     }
 

@@ -285,8 +285,8 @@ crate::choice! {
     pub enum MethodSpec {
         /// fits with supports along stars; where an equation is solved and too many points have no bounded fit, the conservative form
         Auto = "auto" {
-            /// 2, 4 or 6: polynomials of degree 3, 5 or 7; the conservative form has order 2. For `curvature` 4 where there are 160
-            /// points, else 2, when not given
+            /// 2, 4 or 6: polynomials of degree 3, 5 or 7; the conservative form has order 2. For `curvature` 4 when not given, where
+            /// the points resolve the surface for it; else 2
             order: Option<u64>, in whole(2, 6);
             /// cutoff radius r_c in local spacings; 2.4, 3.3, 4.2 (on curves 3.4, 5.4, 7.4) when not given
             cutoff_dn: Option<f64>, in Interval::above(1.0).and_at_most(20.0);

@@ -8,7 +8,7 @@ use crate::geometry::Vector;
 use crate::linear_algebra::SparseRows;
 use crate::operators::charts::tangent::Metric;
 use crate::operators::{
-    Construction, EdgeRule, Functional, NormalCopies, StarCloud, StarSupport, Support, SupportDiagnostics,
+    Construction, EdgeRule, Functional, NormalCopies, RowKind, StarCloud, StarSupport, Support, SupportDiagnostics,
     TangentChart, charts::Heights, construct, construct_star_rows,
 };
 use crate::parallel::{Interrupt, Interrupted};
@@ -37,6 +37,8 @@ pub enum Form {
         cutoff: f64,
         /// Whether the conservative form takes the place of rows that would not hold.
         may_switch: bool,
+        /// Whether fits of order 2 take the place of those of a higher one where the surface is not resolved for it.
+        may_lower: bool,
     },
     /// The conservative form, exchange between Voronoi cells.
     Conservative,
@@ -84,12 +86,17 @@ pub struct Operators {
     pub fit_diagnostics: SupportDiagnostics,
     /// Kinds of rows, of fits by stars.
     pub quality: Option<RowQuality>,
+    /// Whether fits of order 2 took the place of those of a higher one.
+    pub is_lowered: bool,
     /// Whether Δ_S is the conservative form, symmetric in areas.
     pub is_conservative: bool,
 }
 
 /// Degree and radius in local spacings of the fits that take the place of others, in order.
 const LOWER: [StarSupport; 2] = [StarSupport { degree: 5, cutoff: 3.3 }, StarSupport { degree: 3, cutoff: 2.4 }];
+/// Share of points without a bounded fit of a higher order beyond which order 2 is better for curvatures. Measured: 0 on random points of
+/// spheres, 2.7 % on the bunny of 1,839 points. There order 2 ranks mean curvatures like a fine mesh with a correlation of 0.94, order 4 with 0.91.
+const MOST_UNRESOLVED: f64 = 2e-3;
 /// Degree of fits with the order of the conservative form.
 const LOWEST_DEGREE: usize = 3;
 /// The same on curves.
@@ -148,7 +155,7 @@ impl Method {
                 let chart = NormalCopies::new(&cloud.points, &cloud.normals, layers, spacing, radius);
                 Ok(operators(construct::<D>(&chart, self.support, &functionals(wanted), interrupt)?, None))
             }
-            Form::Stars { metric, cutoff, may_switch } => {
+            Form::Stars { metric, cutoff, may_switch, may_lower } => {
                 let SurfaceCloud { points, normals, spacings, graph, conormals, .. } = cloud;
                 let is_held = &cloud.held_mask();
                 let edges = match purpose {
@@ -156,7 +163,7 @@ impl Method {
                     Use::Pointwise => EdgeRule::OneSided,
                 };
                 let cloud = StarCloud { points, normals, spacings, graph, metric, edges };
-                self.by_stars::<D, M>(cloud, (cutoff, may_switch), wanted, purpose, interrupt)
+                self.by_stars::<D, M>(cloud, (cutoff, may_switch, may_lower), wanted, purpose, interrupt)
             }
             Form::Conservative => Ok(conservative_operators(&cloud.graph, None)),
         }
@@ -166,7 +173,7 @@ impl Method {
     fn by_stars<const D: usize, const M: usize>(
         &self,
         cloud: StarCloud<'_, D>,
-        (cutoff, may_switch): (f64, bool),
+        (cutoff, may_switch, may_lower): (f64, bool, bool),
         wanted: &[Wanted],
         purpose: Use,
         interrupt: &Interrupt,
@@ -176,7 +183,12 @@ impl Method {
         let first = StarSupport { degree, cutoff };
         let supports: Vec<StarSupport> =
             std::iter::once(first).chain(lower.into_iter().filter(|support| support.degree < degree)).collect();
-        let built = construct_star_rows::<D, M>(cloud, &supports, &functionals(wanted), interrupt)?;
+        let mut built = construct_star_rows::<D, M>(cloud, &supports, &functionals(wanted), interrupt)?;
+        let unresolved = built.kinds.iter().filter(|kind| **kind != RowKind::Full).count();
+        let is_lowered = may_lower && unresolved as f64 > MOST_UNRESOLVED * built.kinds.len() as f64;
+        if is_lowered {
+            built = construct_star_rows::<D, M>(cloud, &lower[lower.len() - 1..], &functionals(wanted), interrupt)?;
+        }
         let laplacian = wanted.iter().position(|wanted| *wanted == Wanted::LaplaceBeltrami);
         let judged = laplacian.filter(|_| purpose == Use::Equation).map(|place| &built.operators[place]);
         let open = if degree == LOWEST_DEGREE { cloud.graph.open_count() } else { 0 };
@@ -198,6 +210,7 @@ impl Method {
                 .collect(),
             fit_diagnostics,
             quality: Some(quality),
+            is_lowered,
             is_conservative: false,
         })
     }
@@ -221,6 +234,7 @@ fn operators<const M: usize>(built: Construction<M>, curvatures: Option<Vec<[f64
         slopes,
         fit_diagnostics,
         quality,
+        is_lowered: false,
         is_conservative,
     }
 }
@@ -234,6 +248,7 @@ fn conservative_operators(graph: &StarGraph, quality: Option<RowQuality>) -> Ope
         slopes: Vec::new(),
         fit_diagnostics: SupportDiagnostics::default(),
         quality,
+        is_lowered: false,
         is_conservative: true,
     }
 }

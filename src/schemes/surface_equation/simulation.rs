@@ -28,6 +28,8 @@ pub struct SurfaceEquation<const D: usize, const M: usize> {
     operators: Option<Operators>,
     /// Normals of the fitted surface, where heights were fitted along stars; empty before.
     fitted_normals: Vec<Vector<D>>,
+    /// Whether fits of order 2 took the place of those of a higher one.
+    is_lowered: bool,
     fit_diagnostics: SupportDiagnostics,
     /// Of fits by stars: kinds of rows.
     quality: Option<RowQuality>,
@@ -97,6 +99,7 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
             problem,
             operators: None,
             fitted_normals: Vec::new(),
+            is_lowered: false,
             fit_diagnostics: SupportDiagnostics::default(),
             quality: None,
             coarse: 0,
@@ -147,6 +150,7 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
         }
         self.quality.clone_from(&built.quality);
         self.fitted_normals = fitted_normals::<D, M>(cloud, &built.slopes);
+        self.is_lowered = built.is_lowered;
         self.operators = Some(built);
         Ok(())
     }
@@ -164,6 +168,11 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
             Form::Stars { cutoff, may_switch, .. } => match is_switched {
                 Some(reason) if may_switch && self.problem.purpose() == Use::Equation => {
                     format!("conservative: {reason}")
+                }
+                _ if self.is_lowered => {
+                    format!(
+                        "rows: degree 3, since more than 0.2 % of the points have no bounded fit of degree {degree}"
+                    )
                 }
                 _ => format!("rows: degree {degree}, supports of {cutoff} local spacings along stars"),
             },
@@ -263,16 +272,19 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         state.put_count("coarse_points", self.coarse);
         if let Some(quality) = &self.quality {
             state.put_component("quality", quality);
+            state.put_count("is_lowered", u64::from(self.is_lowered));
         }
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
         let clock = self.course.check(state)?;
         let (soundness, coarse) = (state.component("fits")?, state.count("coarse_points")?);
+        let is_lowered = state.has("is_lowered") && state.count("is_lowered")? > 0;
         let quality = if state.has("quality") { Some(state.component("quality")?) } else { None };
         state.section("problem", |section| self.problem.load(section))?;
         // From here on nothing fails.
         (self.fit_diagnostics, self.coarse, self.quality) = (soundness, coarse, quality);
+        self.is_lowered = is_lowered;
         // They are a function of the points alone; the next step makes them again.
         self.operators = None;
         self.fitted_normals.clear();
