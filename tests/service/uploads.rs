@@ -332,7 +332,7 @@ fn what_is_wrong_with_an_uploaded_surface_is_an_event_or_ends_the_job_with_the_p
     assert!(merged.to_string().contains("point 1500:"), "{merged}");
     let failed = service.wait_for(&job(twins.as_bytes(), "refuse"), &["failed"]);
     assert_eq!(failed["reason"], "input.damaged");
-    assert!(failed.to_string().contains("points 3, 1500:"), "{failed}");
+    assert!(failed.to_string().contains("points 3 and 1500 are"), "{failed}");
 }
 
 #[test]

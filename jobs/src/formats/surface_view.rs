@@ -45,9 +45,15 @@ fn spread(points: &[[f64; 3]], sight: [f64; 3]) -> f64 {
     (product(0, 0) * product(1, 1) - product(0, 1).powi(2)).max(0.0).sqrt()
 }
 
+/// Fewer points have no wide side.
+const FEW: usize = 12;
+
 /// The line of sight from a good side.
 fn good_sight(points: &[[f64; 3]]) -> [f64; 3] {
     let sights = SIGHTS.map(scaled_to_one);
+    if points.len() < FEW {
+        return sights[0];
+    }
     let first = spread(points, sights[0]);
     let wider = sights.map(|sight| (sight, spread(points, sight)));
     let best = wider.iter().fold(wider[0], |best, next| if next.1 > best.1 { *next } else { best });

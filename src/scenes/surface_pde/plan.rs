@@ -366,15 +366,7 @@ fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) ->
             let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
             Some(Scheme::Embedding { order: *order as usize, spacing: grid })
         }
-        MethodSpec::Auto { order, cutoff_dn } => {
-            let is_curvature = matches!(spec.problem, ProblemSpec::Curvature);
-            let may_lower = is_curvature && order.is_none();
-            if may_lower {
-                // It is known when the points are read, so that it stays open in the resolved body, and the cutoff with it.
-                return points.by_stars(points.order_of_curvature(), &mut { *cutoff_dn }, (true, true), errors);
-            }
-            points.by_stars(*order.get_or_insert(2), cutoff_dn, (true, false), errors)
-        }
+        MethodSpec::Auto { order, cutoff_dn } => points.auto(order, cutoff_dn, &spec.problem, errors),
         MethodSpec::Conservative => {
             // The support of the lowest order stands for lengths and counts.
             let support = points.by_stars(2, &mut None, (false, false), errors)?;
@@ -437,6 +429,21 @@ impl Points<'_> {
             errors.push(wrong_order(order, json!([2, 4, 6])));
         }
         found
+    }
+
+    /// The automatic choice: order 2, of curvatures 4 where nothing is asked for and the points resolve the surface for it.
+    fn auto(
+        self,
+        order: &mut Option<u64>,
+        cutoff_dn: &mut Option<f64>,
+        problem: &ProblemSpec,
+        errors: &mut Vec<Violation>,
+    ) -> Option<Scheme> {
+        if matches!(problem, ProblemSpec::Curvature) && order.is_none() {
+            // It is known when the points are read, so that it stays open in the resolved body, and the cutoff with it.
+            return self.by_stars(self.order_of_curvature(), &mut { *cutoff_dn }, (true, true), errors);
+        }
+        self.by_stars(*order.get_or_insert(2), cutoff_dn, (true, false), errors)
     }
 
     /// Fits by stars; the spec gets the cutoff. Supports grow by themselves, so random points take the cutoff of others.

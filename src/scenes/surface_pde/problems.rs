@@ -144,6 +144,12 @@ impl Site<'_> {
     }
 }
 
+/// The gradient of a field, which gets what was left open.
+fn gradient(site: Site, field: &mut Option<FieldChoice>, errors: &mut Vec<Violation>) -> ProblemChoice {
+    let field = field.get_or_insert(FieldChoice::PlaneWave { k: None });
+    ProblemChoice::Gradient { field: site.field(field, errors) }
+}
+
 /// Plans the problem on a shape; the spec gets what was left open.
 pub(super) fn plan(
     spec: &mut SurfacePde,
@@ -159,10 +165,7 @@ pub(super) fn plan(
             let field = field.get_or_insert_with(|| default_field(shape));
             Some(ProblemChoice::LaplaceBeltrami { field: site("/problem/field").field(field, errors) })
         }
-        ProblemSpec::Gradient { field } => {
-            let field = field.get_or_insert(FieldChoice::PlaneWave { k: None });
-            Some(ProblemChoice::Gradient { field: site("/problem/field").field(field, errors) })
-        }
+        ProblemSpec::Gradient { field } => Some(gradient(site("/problem/field"), field, errors)),
         ProblemSpec::Poisson { field, condition } => {
             let field = field.get_or_insert_with(|| default_field(shape));
             let field = site("/problem/field").field(field, errors);
