@@ -184,16 +184,7 @@ fn check_form(
         let detail = "the rows of the conservative form are right in equations only, not point by point";
         errors.push(Violation::new("/method", "conflict", detail, "conservative", json!(["auto", "surface_dcpse"])));
     }
-    if matches!(given.solver, Some(SolverChoice::Cg { .. })) && !is_conservative {
-        let detail = "conjugate gradients need a symmetric system, which only the method `conservative` always has";
-        errors.push(Violation::new(
-            "/solver",
-            "conflict",
-            detail,
-            "cg",
-            json!(["auto", "bicgstab", "gmres", "sparse_lu"]),
-        ));
-    }
+    solvers::check_cg(given.solver.as_ref(), is_conservative, problem, errors);
     if matches!(given.surface, SurfaceChoice::Bump { .. })
         && !matches!(form, Form::Intrinsic { .. } | Form::Copies { .. })
     {

@@ -1,8 +1,11 @@
 //! Solvers and integrators of a scene, from their specs.
 
+use super::problems::ProblemChoice;
 use super::spec::{SolverChoice, StoppingSpec};
 use crate::linear_algebra::krylov::Stopping;
 use crate::schemes::surface_equation::{EvolutionIntegrator, Solver};
+use crate::spec::Violation;
+use serde_json::json;
 
 /// Tolerance where neither it nor Δt is given.
 const DEFAULT_TOLERANCE: f64 = 1e-7;
@@ -30,5 +33,47 @@ pub(super) fn solver(choice: &SolverChoice) -> Solver {
         SolverChoice::Bicgstab { stopping } => Solver::BiCgStab(stopping.into()),
         SolverChoice::Gmres { restart, stopping } => Solver::Gmres { restart: *restart, stopping: stopping.into() },
         SolverChoice::SparseLu => Solver::SparseLu,
+    }
+}
+
+/// Refuses conjugate gradients where the system is not symmetric.
+pub(super) fn check_cg(
+    solver: Option<&SolverChoice>,
+    is_conservative: bool,
+    problem: Option<&ProblemChoice>,
+    errors: &mut Vec<Violation>,
+) {
+    if !matches!(solver, Some(SolverChoice::Cg { .. })) {
+        return;
+    }
+    let detail = match problem {
+        _ if !is_conservative => {
+            "conjugate gradients need a symmetric system, which only the method `conservative` always has"
+        }
+        Some(ProblemChoice::Poisson { is_dirichlet: true, .. }) => {
+            "conjugate gradients need a symmetric system, which held points do not leave"
+        }
+        _ => return,
+    };
+    let allowed = json!(["auto", "bicgstab", "gmres", "sparse_lu"]);
+    errors.push(Violation::new("/solver", "conflict", detail, "cg", allowed));
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene;
+    use serde_json::{Value, json};
+
+    #[test]
+    fn cg_is_refused_where_points_hold_their_value() {
+        let refused = |condition: &str, solver: &str| {
+            let problem = json!({"type": "poisson", "condition": condition});
+            let body = json!({"kind": "surface_pde", "method": "conservative", "problem": problem, "solver": solver});
+            let errors = scene::parse(&body, crate::scenes::SCENES).err().unwrap_or_default();
+            errors.iter().map(|error| (error.pointer.clone(), error.got.clone())).collect::<Vec<_>>()
+        };
+        assert_eq!(refused("dirichlet", "cg"), [("/solver".to_owned(), Value::from("cg"))]);
+        assert_eq!(refused("dirichlet", "auto"), []);
+        assert_eq!(refused("zero_mean", "cg"), []);
     }
 }

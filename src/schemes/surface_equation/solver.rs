@@ -100,8 +100,11 @@ impl LinearSystem {
     /// symmetric and positive (semi-)definite, and the solver takes them as such; the weights of the term are equal then.
     ///
     /// # Errors
-    /// The reason for which the rows could not be factorized.
+    /// The reason for which the rows could not be factorized, or conjugate gradients for rows that are not symmetric.
     pub fn new(rows: SparseRows, term: Option<MeanTerm>, solver: Solver, is_symmetric: bool) -> Result<Self, String> {
+        if matches!(solver, Solver::Cg(_)) && !is_symmetric {
+            return Err("conjugate gradients need a symmetric system".to_owned());
+        }
         let factors = if is_symmetric {
             Factors::Symmetric(SymmetricFactors::from_rows(&rows))
         } else if solver == Solver::SparseLu {
@@ -250,6 +253,12 @@ mod tests {
         assert!(found.is_within(STOPPING), "{found:?}");
         assert!(system.name().contains("stalled, then GMRES"), "{}", system.name());
         assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).abs() < 1e-5));
+    }
+
+    #[test]
+    fn conjugate_gradients_take_symmetric_systems_alone() {
+        let made = LinearSystem::new(hard(20), None, Solver::Cg(STOPPING), false);
+        assert!(made.is_err_and(|reason| reason.contains("symmetric")));
     }
 
     #[test]
