@@ -22,6 +22,46 @@ pub fn conormals<const D: usize>(
     (0..points.len()).map(|i| if graph.is_open(i) { at(i) } else { None }).collect()
 }
 
+/// Fewest points with a conormal in a row. Open stars by chance lie alone or in small groups.
+const LEAST_ROW: usize = 5;
+
+/// Whether each point is of an edge: its star is open, and it has a conormal or lies beside a point that has one, in a row of
+/// several. At a sharp corner a point has no conormal of its own.
+#[must_use]
+pub fn in_rows<const D: usize>(conormals: &[Option<Vector<D>>], graph: &StarGraph) -> Vec<bool> {
+    let count = conormals.len();
+    if D == 2 {
+        return conormals.iter().map(Option::is_some).collect();
+    }
+    let mut is_seen = vec![false; count];
+    let mut is_in_row = vec![false; count];
+    for start in 0..count {
+        if is_seen[start] || conormals[start].is_none() {
+            continue;
+        }
+        is_seen[start] = true;
+        let mut row = vec![start];
+        let mut place = 0;
+        while let Some(i) = row.get(place).copied() {
+            place += 1;
+            for j in open_neighbors(graph, i) {
+                if conormals[j].is_some() && !is_seen[j] {
+                    is_seen[j] = true;
+                    row.push(j);
+                }
+            }
+        }
+        if row.len() >= LEAST_ROW {
+            for i in row {
+                is_in_row[i] = true;
+                let beside = graph.neighbors(i).iter().map(|j| *j as usize).filter(|j| graph.is_open(*j));
+                beside.for_each(|j| is_in_row[j] = true);
+            }
+        }
+    }
+    is_in_row
+}
+
 /// The conormal at the end of a curve.
 fn at_end<const D: usize>(points: &[Vector<D>], graph: &StarGraph, i: usize) -> Option<Vector<D>> {
     let [j] = graph.neighbors(i) else { return None };

@@ -59,15 +59,19 @@ pub(super) fn check(
 pub(super) struct Edges<const D: usize> {
     conormals: Vec<Option<Vector<D>>>,
     held: Vec<(usize, f64)>,
+    /// Number of points with open stars that are in no row, and so of no edge.
+    single: usize,
 }
 
 impl<const D: usize> Edges<D> {
     /// The edges of a prepared cloud.
     pub fn new(cloud: &PreparedCloud<D>, choice: &EdgesChoice) -> Self {
-        let mut found =
-            Self { conormals: edges::conormals(&cloud.points, &cloud.normals, &cloud.graph), held: Vec::new() };
+        let conormals = edges::conormals(&cloud.points, &cloud.normals, &cloud.graph);
+        let is_edge = edges::in_rows(&conormals, &cloud.graph);
+        let single = cloud.graph.open_count() - is_edge.iter().filter(|is_edge| **is_edge).count();
+        let mut found = Self { conormals, held: Vec::new(), single };
         if let EdgesChoice::Dirichlet { value, normal, offset } = choice {
-            for (i, x) in cloud.points.iter().enumerate().filter(|(i, _)| cloud.graph.is_open(*i)) {
+            for (i, x) in cloud.points.iter().enumerate().filter(|(i, _)| is_edge[*i]) {
                 let is_in = |normal: &[f64]| x.iter().zip(normal).map(|(x, n)| x * n).sum::<f64>() >= *offset;
                 if normal.as_ref().is_none_or(|normal| is_in(normal)) {
                     found.held.push((i, *value));
@@ -99,9 +103,10 @@ impl<const D: usize> Edges<D> {
         }
         let detail = format!(
             "{without} of {} parts of the surface have no point of an edge that would hold the value; {} points have \
-             neighbors on one side alone",
+             neighbors on one side alone, {} of them not in a row",
             has_held.len(),
-            cloud.graph.open_count()
+            cloud.graph.open_count(),
+            self.single
         );
         Err(vec![Violation::new("/edges", "data", detail, choice.to_json(), json!(["neumann"]))])
     }
@@ -112,6 +117,7 @@ impl<const D: usize> Edges<D> {
         vec![
             Diagnostic::count("edges.no_flux", closed, "Points of edges that fits keep free of flux."),
             Diagnostic::count("edges.held", self.held.len() as u64, "Points of edges that hold a value in equations."),
+            Diagnostic::count("edges.single", self.single as u64, "Points with open stars that are in no row."),
         ]
     }
 

@@ -1,8 +1,11 @@
 //! Orders up to the edge on hemispheres, patches and cylinders, by slopes that are fitted over four spacings.
 
+use super::{Edges, EdgesChoice};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::parallel::Interrupt;
+use crate::point_clouds::PreparedCloud;
+use crate::point_clouds::cleaning::Cleaning;
 use crate::scene::{self, BuildContext, Cloud, Clouds};
 use crate::simulation::{CpuClock, FieldValues, OutputPlan, Selection, Simulation};
 use serde_json::{Value, json};
@@ -242,6 +245,30 @@ fn ragged_edges_hold() {
         // The least mode decays by exp(−2).
         assert!(largest < 0.3, "{method}: {largest}");
     }
+}
+
+/// Independent random points on the unit sphere.
+fn random_sphere(count: usize) -> Vec<Vector<3>> {
+    let random = CounterRandom::new(11);
+    let draw = |i: i64| Vector::<3>::from_fn(|d, _| random.symmetric(&[i, d as i64]));
+    (0..).map(draw).filter(|x| (0.1..1.0).contains(&x.norm())).map(|x| x.normalize()).take(count).collect()
+}
+
+/// Single open stars among random points are no edge.
+#[test]
+fn edges_are_open_stars_in_a_row() {
+    let given = body(&poisson([0.0, 0.0, 2.0]), &json!("dirichlet"), "auto");
+    let points = random_sphere(4000);
+    let built = scene::parse(&given, crate::scenes::SCENES).unwrap().build(context(&points));
+    assert_eq!(built.err().unwrap()[0].pointer, "/edges");
+    let half: Vec<_> = points.into_iter().filter(|x| x[2] > 0.0).collect();
+    let cloud = PreparedCloud::new(&half, None, Cleaning::Drop).unwrap();
+    let choice = EdgesChoice::Dirichlet { value: 1.0, normal: None, offset: 0.0 };
+    let edges = Edges::new(&cloud, &choice);
+    // Points are 0.056 apart.
+    assert!(edges.held_count() > 60, "{}", edges.held_count());
+    let inside = edges.held.iter().filter(|(i, _)| cloud.points[*i][2] > 0.25).count();
+    assert_eq!(inside, 0, "{} held, {} single", edges.held_count(), edges.single);
 }
 
 #[test]
