@@ -93,6 +93,9 @@ pub enum Unusable {
         /// Distance of this pair.
         distance: f64,
     },
+    /// Points at a place with so many others that their local spacing is zero.
+    #[error("{0}: so many others lie at the same place that there is no spacing; `clean`: \"drop\" keeps one of them")]
+    Stacked(PointList),
     /// Points far from all others.
     #[error("{0}: far from all other points; leave them out")]
     Strays(PointList),

@@ -63,7 +63,9 @@ impl<const D: usize> PreparedCloud<D> {
         let present: Vec<Vector<D>> = cleaned.kept.iter().map(|i| points[*i]).collect();
         too_few(present.len())?;
         let nearest = Nearest::new(&present, CANDIDATES[D - 2]);
-        let spacings = local_spacing::smoothed::<D>(&local_spacing::at_each_point(&present, &nearest), &nearest);
+        let unsmoothed = local_spacing::at_each_point(&present, &nearest);
+        let spacings = local_spacing::smoothed::<D>(&unsmoothed, &nearest);
+        check_spacings(&cleaned.kept, &unsmoothed, &spacings)?;
         let spacing = median(&mut spacings.clone());
         check_scale(&present, spacing)?;
         let planes = planes(&present, &nearest);
@@ -123,6 +125,16 @@ pub fn spacings_and_graph<const D: usize>(points: &[Vector<D>], normals: &[Vecto
     let spacings = local_spacing::smoothed::<D>(&local_spacing::at_each_point(points, &nearest), &nearest);
     let graph = StarGraph::new(&Stars::new(points, &nearest, normals, &spacings));
     (spacings, graph)
+}
+
+/// Refuses points without a spacing, by their numbers in the given cloud.
+fn check_spacings(kept: &[usize], unsmoothed: &[f64], smoothed: &[f64]) -> Result<(), Unusable> {
+    // The spacing of a point beside them is zero only when smoothed.
+    let without = |spacings: &[f64]| -> Vec<usize> {
+        kept.iter().zip(spacings).filter(|(_, spacing)| **spacing <= 0.0).map(|(i, _)| *i).collect()
+    };
+    let stacked = PointList::from_indices(without(unsmoothed)).or_else(|| PointList::from_indices(without(smoothed)));
+    stacked.map_or(Ok(()), |list| Err(Unusable::Stacked(list)))
 }
 
 /// Whether differences of the coordinates have digits enough.

@@ -80,6 +80,19 @@ fn what_is_no_surface_is_refused() {
     assert!(matches!(PreparedCloud::new(&one, None, Cleaning::Drop), Err(Unusable::TooFew { count: 1, .. })));
 }
 
+#[test]
+fn a_place_with_many_points_is_refused_where_they_are_kept() {
+    let mut points: Vec<Vector<3>> = fibonacci::sphere(300);
+    points.extend(vec![points[0]; 20]);
+    let refused = PreparedCloud::new(&points, None, Cleaning::Off).err().unwrap();
+    assert!(
+        matches!(&refused, Unusable::Stacked(list) if list.count == 21 && list.first[..2] == [0, 300]),
+        "{refused}"
+    );
+    assert!(refused.to_string().contains("\"drop\""));
+    assert_eq!(PreparedCloud::new(&points, None, Cleaning::Drop).unwrap().points.len(), 300);
+}
+
 /// Two coarse spheres that touch: near the contact no point can be trusted, so that neither piece is closed.
 #[test]
 fn coarse_bodies_that_touch_face_outward() {
