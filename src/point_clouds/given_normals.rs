@@ -69,6 +69,12 @@ pub(super) fn judge<const D: usize>(
 }
 
 impl Verdict {
+    /// Whether too few points can be trusted to hold the given normals against.
+    #[must_use]
+    pub fn is_unchecked(&self) -> bool {
+        self.wrong_share.is_nan()
+    }
+
     /// The given normals with wrong ones replaced; None where they are wrong together.
     pub(super) fn corrected<const D: usize>(
         &self,

@@ -11,6 +11,7 @@ use super::surfaces::{Extent, Sampling, Shape};
 use crate::geometry::Vector;
 use crate::point_clouds::cleaning::Cleaning;
 use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
+use crate::point_clouds::given_normals::Verdict;
 use crate::point_clouds::normals;
 use crate::point_clouds::triangulation::triangles;
 use crate::point_clouds::{Examined, PreparedCloud};
@@ -126,6 +127,11 @@ impl<const D: usize> Found<D> {
                           (/normals/metric); `heights` estimates others";
             return Err(refuse(detail.to_owned()));
         }
+        if must_be_right && prepared.verdict.as_ref().is_some_and(Verdict::is_unchecked) {
+            let detail = "the points resolve the surface too little to check their normals, so these cannot be taken as \
+                          exact (/normals/metric); `heights` uses them as a guess alone";
+            return Err(refuse(detail.to_owned()));
+        }
         let is_equation = !scene.problem.is_pointwise();
         let edges = Edges::new(&prepared, &scene.spec.edges);
         edges.check(&prepared, &scene.spec.edges)?;
@@ -171,4 +177,41 @@ fn given_normals<const D: usize>(clouds: &Clouds, wanted: Normals) -> Result<Opt
 
 fn refuse(detail: String) -> Vec<Violation> {
     vec![Violation::new(PLACE, "data", detail, Value::Null, Value::Null)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Vector;
+    use crate::geometry::fibonacci;
+    use crate::geometry::random::CounterRandom;
+    use crate::parallel::Interrupt;
+    use crate::scene::{self, BuildContext, Cloud, Clouds};
+    use crate::simulation::{CpuClock, OutputPlan};
+    use serde_json::json;
+
+    /// On points so rough that none can be trusted, given normals are told to be unchecked, and never taken as exact.
+    #[test]
+    fn normals_that_cannot_be_checked_are_told_or_refused() {
+        let random = CounterRandom::new(3);
+        let ball: Vec<Vector<3>> = fibonacci::sphere(300);
+        let array = |x: &Vector<3>| [x[0], x[1], x[2]];
+        let rough = |(i, x): (usize, &Vector<3>)| array(&(x * (1.0 + 0.4 * random.symmetric(&[i as i64]))));
+        let positions: Vec<_> = ball.iter().enumerate().map(rough).collect();
+        let build = |metric: &str| {
+            let normals = Some(ball.iter().map(array).collect());
+            let cloud = Cloud { positions: positions.clone(), level: None, normals };
+            let clouds = Clouds::from([("/surface", cloud)]);
+            let plan = OutputPlan { every_time: None, series_every_steps: 1 };
+            let (interrupt, cpu_clock) = (Interrupt::default(), CpuClock::still());
+            let given = json!({"type": "given", "metric": metric});
+            let surface = json!({"type": "points", "upload": "upl_x"});
+            let body = json!({"kind": "surface_pde", "surface": surface, "problem": "curvature", "normals": given});
+            let scene = scene::parse(&body, crate::scenes::SCENES).map_err(|errors| format!("{errors:?}")).unwrap();
+            scene.build(BuildContext { plan, interrupt, cpu_clock, clouds })
+        };
+        let refused = build("normals").err().unwrap();
+        assert!(refused[0].detail.contains("`heights`"), "{refused:?}");
+        let mut built = build("heights").map_err(|errors| format!("{errors:?}")).unwrap();
+        assert!(built.take_findings().iter().any(|finding| finding.code == "normals.unchecked"));
+    }
 }

@@ -101,6 +101,12 @@ impl Preparation {
                 let message = format!("{}: {detail}", in_file(cloud, list));
                 self.about(list, Finding::warning("inconsistent_normals", message, START));
             }
+            if verdict.is_unchecked() {
+                let message =
+                    "too few points lie on a smooth surface to check the given normals, which are used as they are";
+                let finding = Finding::warning("normals.unchecked", message.to_owned(), START);
+                self.findings.push(finding.with_advice("more points, or smoother ones, help"));
+            }
             if verdict.is_turned_anew {
                 let message = "many neighbors have normals to different sides, so all sides were found anew".to_owned();
                 self.findings.push(Finding::warning("normals.turned", message, START));
