@@ -83,7 +83,8 @@ impl SurfaceScene {
         }
         if let Scheme::Dcpse(Method { form: Form::Stars { .. } | Form::Conservative, .. }) = self.scheme {
             (cloud.spacings, cloud.graph) = spacings_and_graph(&cloud.points, &cloud.normals);
-            cloud.areas.get_or_insert_with(|| cloud.graph.areas.clone());
+            // What the operator keeps is measured with its own areas.
+            cloud.areas = Some(cloud.graph.areas.clone());
         }
         Ok(cloud)
     }
@@ -243,5 +244,33 @@ impl Scene for SurfaceScene {
                 Ok(Box::new(EmbeddingClosestPoint::new(surface, field, data, parts, interrupt, cpu_clock)))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::parallel::Interrupt;
+    use crate::scene::{self, BuildContext, Clouds};
+    use crate::simulation::{CpuClock, OutputPlan};
+    use serde_json::json;
+
+    #[test]
+    fn the_conservative_form_keeps_the_integral_on_even_points() {
+        let start = json!({"type": "truncated_gaussian", "center": [0, 0, 1], "sigma": 1});
+        let problem =
+            json!({"type": "diffusion", "initial": start, "end_time": 0.1, "time_step": 0.02, "integrator": "bdf2"});
+        let body = json!({"kind": "surface_pde", "count": 400, "sampling": "fibonacci", "method": "conservative",
+            "solver": "cg", "problem": problem});
+        let scene = scene::parse(&body, crate::scenes::SCENES).map_err(|errors| format!("{errors:?}")).unwrap();
+        let plan = OutputPlan { every_time: None, series_every_steps: 1 };
+        let (interrupt, cpu_clock) = (Interrupt::default(), CpuClock::still());
+        let built = scene.build(BuildContext { plan, interrupt, cpu_clock, clouds: Clouds::default() });
+        let mut simulation = built.map_err(|errors| format!("{errors:?}")).unwrap();
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+        }
+        let report = simulation.report();
+        let mass = report.errors.iter().find(|error| error.quantity == "mass").unwrap();
+        assert!(mass.value < 1e-13, "{}", mass.value);
     }
 }
