@@ -4,7 +4,7 @@ use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::{Interruptible, ritz};
 use crate::operators::{RowKind, StarRows};
 use crate::parallel::Interrupt;
-use crate::simulation::{Component, Diagnostic, LoadError, Section};
+use crate::simulation::{Check, Component, Diagnostic, Finding, LoadError, Section};
 
 /// Share of positive and Voronoi rows beyond which the conservative form is better. Measured: 0 to 0.22 % on clouds that are
 /// resolved, 1.3 to 45 % on others.
@@ -123,10 +123,28 @@ impl RowQuality {
         (self.voronoi, &self.first_voronoi)
     }
 
-    /// Share of positive and Voronoi rows.
-    #[must_use]
-    pub fn fallback_share(&self) -> f64 {
-        self.fallback_share
+    /// Share of positive and Voronoi rows, held against its limit where the rows are kept.
+    pub(super) fn check_of_fallbacks(&self, are_kept: bool) -> Check {
+        let share = Some(self.fallback_share);
+        if are_kept {
+            Check::at_most("fallback_rows", share, MOST_FALLBACKS, "")
+        } else {
+            Check::watched("fallback_rows", share, "")
+        }
+    }
+
+    /// A finding where more rows that are kept are no bounded fits than a result can rely on.
+    pub(super) fn finding_of_fallbacks(&self, at: (u64, f64)) -> Option<Finding> {
+        let count = self.positive + self.voronoi;
+        let message = format!(
+            "{count} of {} points have no bounded fit, {:.2} % (limit {} %)",
+            self.count,
+            100.0 * self.fallback_share,
+            100.0 * MOST_FALLBACKS
+        );
+        let advice = "more points help; in equations `auto` and `conservative` take another form";
+        let finding = Finding::warning("operator.fallback_rows", message, at).with_count(count).with_advice(advice);
+        (self.fallback_share > MOST_FALLBACKS).then_some(finding)
     }
 
     /// Counts for the report.
@@ -172,5 +190,30 @@ impl Component for RowQuality {
             // Findings name them when the operators are made.
             first_voronoi: Vec::new(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RowQuality;
+
+    #[test]
+    fn many_fallbacks_are_doubtful_where_rows_are_kept() {
+        let quality = |positive: u64| RowQuality {
+            count: 1000,
+            grown: 0,
+            lower_order: 0,
+            positive,
+            voronoi: 0,
+            fallback_share: positive as f64 / 1000.0,
+            open_share: 0.0,
+            largest_ratio: 1.0,
+            growth: f64::NAN,
+            first_voronoi: Vec::new(),
+        };
+        let told = |positive: u64| quality(positive).finding_of_fallbacks((1, 0.0)).map(|finding| finding.count);
+        assert_eq!((told(10), told(11)), (None, Some(11)));
+        let holds = |positive: u64, are_kept: bool| quality(positive).check_of_fallbacks(are_kept).holds;
+        assert_eq!((holds(10, true), holds(11, true), holds(11, false)), (Some(true), Some(false), None));
     }
 }

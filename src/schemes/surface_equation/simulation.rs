@@ -155,20 +155,24 @@ impl<const D: usize, const M: usize> SurfaceEquation<D, M> {
         Ok(())
     }
 
+    /// Why the conservative form took the place of rows, if it did.
+    fn reason_to_switch(&self) -> Option<String> {
+        let may_switch = matches!(self.method.form, Form::Stars { may_switch: true, .. });
+        let quality = self.quality.as_ref().filter(|_| may_switch && self.problem.purpose() == Use::Equation);
+        quality.and_then(RowQuality::reason_to_switch)
+    }
+
     /// What the operators are, and why.
     fn operator_name(&self) -> String {
         let Support { degree, radius } = self.method.support;
         let rows = format!("degree {degree}, support {radius:.6}");
-        let is_switched = self.quality.as_ref().and_then(RowQuality::reason_to_switch);
         match self.method.form {
             Form::Intrinsic { .. } => format!("{rows}, tangent planes"),
             Form::Copies { layers, spacing } => {
                 format!("{rows}, {layers} copies to either side, {spacing:.6} apart")
             }
-            Form::Stars { cutoff, may_switch, .. } => match is_switched {
-                Some(reason) if may_switch && self.problem.purpose() == Use::Equation => {
-                    format!("conservative: {reason}")
-                }
+            Form::Stars { cutoff, .. } => match self.reason_to_switch() {
+                Some(reason) => format!("conservative: {reason}"),
                 _ if self.is_lowered => {
                     format!(
                         "rows: degree 3, since more than 0.2 % of the points have no bounded fit of degree {degree}"
@@ -199,6 +203,9 @@ fn findings_of(built: &Operators, purpose: Use, method: &Method, to: Clock) -> V
         );
         let advice = "the methods `auto` and `conservative` have none";
         findings.push(Finding::warning("operator.growing_modes", message, at).with_advice(advice));
+    }
+    if !built.is_conservative {
+        findings.extend(quality.finding_of_fallbacks(at));
     }
     let (count, first) = quality.voronoi();
     if purpose == Use::Pointwise && count > 0 {
@@ -324,7 +331,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         let unmet = (self.course.step > 0).then_some(self.fit_diagnostics.failed as f64);
         let mut checks = vec![Check::at_most("unmet_moment_conditions", unmet, 0.0, "points")];
         if let Some(quality) = &self.quality {
-            checks.push(Check::watched("fallback_rows", Some(quality.fallback_share()), ""));
+            checks.push(quality.check_of_fallbacks(self.reason_to_switch().is_none()));
             checks.push(Check::watched("growing_modes", Some(quality.growth()), ""));
         }
         checks.extend(self.problem.checks(self.course.step));
