@@ -9,6 +9,7 @@
 use super::rays::outward_share;
 use super::star_graph::StarGraph;
 use crate::geometry::Vector;
+use crate::parallel::Interrupt;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -103,17 +104,23 @@ const MOST: f64 = 0.9;
 ///
 /// The outer side of a piece is found by rays that leave it along its normals ([`outward_share`]), which does not ask for a closed
 /// piece: near a contact a coarse body has no trusted points. Where rays say nothing, a closed piece goes by its signed volume.
+/// When `interrupt` is raised it ends early, and sides do not count.
 pub fn orient_pieces<const D: usize>(
     points: &[Vector<D>],
     graph: &StarGraph,
     is_trusted: &[bool],
     normals: &mut [Vector<D>],
+    interrupt: &Interrupt,
 ) -> usize {
     let mut is_turned = vec![false; points.len()];
     let mut is_placed = vec![false; points.len()];
     let mut closed = 0;
-    let sizes = graph.part_sizes();
+    let mut members = vec![Vec::new(); graph.part_count];
+    (0..points.len()).for_each(|i| members[graph.parts[i] as usize].push(i));
     for piece in smooth_pieces(points, graph, is_trusted, normals) {
+        if interrupt.is_raised() {
+            return closed;
+        }
         if piece.len() < LEAST_PIECE {
             continue;
         }
@@ -122,9 +129,10 @@ pub fn orient_pieces<const D: usize>(
         let whole: f64 = piece.iter().map(|i| graph.areas[*i]).sum();
         let is_closed = sum.norm() <= CLOSED * whole;
         closed += usize::from(is_closed);
-        let part = graph.parts[piece[0]];
-        let is_most = piece.len() as f64 > MOST * sizes[part as usize] as f64;
-        let turns = match outward_share(points, normals, graph, &piece).filter(|_| !is_most) {
+        let part = &members[graph.parts[piece[0]] as usize];
+        let is_most = piece.len() as f64 > MOST * part.len() as f64;
+        let share = if is_most { None } else { outward_share(points, normals, graph, (part, &piece)) };
+        let turns = match share {
             Some(share) => share < 0.5,
             None => is_closed && points_inward(points, graph, normals, &piece),
         };
@@ -147,22 +155,28 @@ fn go_along<const D: usize>(
     mut is_placed: Vec<bool>,
     normals: &mut [Vector<D>],
 ) {
-    loop {
+    let open_beside = |places: &[usize], is_placed: &[bool]| {
+        let near = places.iter().flat_map(|i| graph.neighbors(*i)).map(|j| *j as usize);
+        let mut found: Vec<usize> = near.filter(|j| !is_placed[*j]).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    };
+    let placed: Vec<usize> = (0..points.len()).filter(|i| is_placed[*i]).collect();
+    let mut frontier = open_beside(&placed, &is_placed);
+    while !frontier.is_empty() {
         let agreed = |i: usize| {
             let near = graph.neighbors(i).iter().map(|j| *j as usize).filter(|j| is_placed[*j]);
-            near.map(|j| agreement(points, normals, i, j)).reduce(|sum, value| sum + value)
+            near.map(|j| agreement(points, normals, i, j)).sum::<f64>()
         };
-        let open = (0..points.len()).filter(|i| !is_placed[*i]);
-        let layer: Vec<(usize, f64)> = open.filter_map(|i| Some((i, agreed(i)?))).collect();
-        if layer.is_empty() {
-            return;
-        }
-        for (i, sum) in layer {
-            is_placed[i] = true;
+        let sums: Vec<f64> = frontier.iter().map(|i| agreed(*i)).collect();
+        for (i, sum) in frontier.iter().zip(sums) {
+            is_placed[*i] = true;
             if sum < 0.0 {
-                normals[i] = -normals[i];
+                normals[*i] = -normals[*i];
             }
         }
+        frontier = open_beside(&frontier, &is_placed);
     }
 }
 
@@ -219,7 +233,7 @@ fn points_inward<const D: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::{orient, points_inward};
+    use super::{go_along, orient, points_inward};
     use crate::geometry::{Vector, fibonacci};
     use crate::point_clouds::local_spacing::{Nearest, at_each_point, smoothed};
     use crate::point_clouds::star_graph::StarGraph;
@@ -258,6 +272,17 @@ mod tests {
         // Within half a radius of the contact the gap is below two spacings.
         let is_apart = |i: &usize| (found.points[*i] - Vector::<3>::x()).norm() > 0.5;
         assert!((0..1200).filter(is_apart).all(|i| found.normals[i].dot(&outward(i)) > 0.9));
+    }
+
+    /// Sides go along a row of points from its ends.
+    #[test]
+    fn points_without_a_side_take_that_of_their_neighbors() {
+        let points: Vec<_> = (0..400).map(|k| Vector::<3>::new(f64::from(k % 20), f64::from(k / 20), 0.0)).collect();
+        let graph = graph(&points, &vec![Vector::<3>::z(); 400]);
+        let sign = |i: usize| if i * i % 7 < 3 && i > 0 { -1.0 } else { 1.0 };
+        let mut normals: Vec<_> = (0..400).map(|i| Vector::<3>::z() * sign(i)).collect();
+        go_along(&points, &graph, (0..400).map(|i| i == 0).collect(), &mut normals);
+        assert!(normals.iter().all(|n| n[2] > 0.0));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::planes::planes;
 use super::star_graph::StarGraph;
 use super::stars::{CANDIDATES, Stars, refined_normals};
 use crate::geometry::Vector;
+use crate::parallel::Interrupt;
 
 /// A cloud that operators can be made on.
 #[derive(Debug, Clone)]
@@ -56,6 +57,19 @@ impl<const D: usize> PreparedCloud<D> {
     /// # Errors
     /// [`Unusable`] when nothing can be computed on the points.
     pub fn new(points: &[Vector<D>], given: Option<&[Vector<D>]>, cleaning: Cleaning) -> Result<Self, Unusable> {
+        Self::with_interrupt(points, given, cleaning, &Interrupt::default())
+    }
+
+    /// The same; what was prepared does not count once `interrupt` is raised.
+    ///
+    /// # Errors
+    /// [`Unusable`] when nothing can be computed on the points.
+    pub fn with_interrupt(
+        points: &[Vector<D>],
+        given: Option<&[Vector<D>]>,
+        cleaning: Cleaning,
+        interrupt: &Interrupt,
+    ) -> Result<Self, Unusable> {
         let least = local_spacing::neighbors_wanted(D) + 1;
         let too_few = |count: usize| if count < least { Err(Unusable::TooFew { count, least }) } else { Ok(()) };
         too_few(points.len())?;
@@ -95,7 +109,7 @@ impl<const D: usize> PreparedCloud<D> {
                 orient(&present, &graph, &mut normals);
                 let is_trusted: Vec<bool> =
                     (0..present.len()).map(|i| given_normals::is_trusted(&stars, &planes, i)).collect();
-                closed_pieces = orient_pieces(&present, &graph, &is_trusted, &mut normals);
+                closed_pieces = orient_pieces(&present, &graph, &is_trusted, &mut normals, interrupt);
             }
         }
         let joined_sheets = PointList::from_condition(present.len(), |i| joins_sheets(&present, &normals, &graph, i));

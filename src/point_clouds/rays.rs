@@ -24,14 +24,14 @@ fn crossings<const D: usize>(
     points: &[Vector<D>],
     normals: &[Vector<D>],
     graph: &StarGraph,
-    part: u32,
+    part: &[usize],
     (start, direction): (Vector<D>, Vector<D>),
 ) -> f64 {
     // Integrals of (1 − q²)² over an interval and a disc.
     let whole = if D == 2 { 16.0 / 15.0 } else { std::f64::consts::FRAC_PI_3 };
     let mut sum = 0.0;
-    for (j, x) in points.iter().enumerate().filter(|(j, _)| graph.parts[*j] == part) {
-        let d = x - start;
+    for j in part.iter().copied() {
+        let d = points[j] - start;
         let along = d.dot(&direction);
         if along <= 0.0 {
             continue;
@@ -51,20 +51,20 @@ fn side<const D: usize>(area: f64) -> f64 {
     if D == 2 { area } else { area.sqrt() }
 }
 
-/// Share of the points of a piece whose normals point outward, of those whose two rays say so or the contrary. None where too few
+/// Share of the points of a piece of a part whose normals point outward, of those whose two rays say so or the contrary. None where too few
 /// do, as on an open surface: both of its sides are outer ones.
 pub(super) fn outward_share<const D: usize>(
     points: &[Vector<D>],
     normals: &[Vector<D>],
     graph: &StarGraph,
-    piece: &[usize],
+    (part, piece): (&[usize], &[usize]),
 ) -> Option<f64> {
     let stride = piece.len().div_ceil(SENDERS).max(1);
     let (mut sent, mut outward, mut inward) = (0, 0, 0);
     for i in piece.iter().step_by(stride).copied() {
         let is_odd = |direction: Vector<D>| {
             let start = points[i] + direction * (START * side::<D>(graph.areas[i]));
-            let number = crossings(points, normals, graph, graph.parts[i], (start, direction));
+            let number = crossings(points, normals, graph, part, (start, direction));
             let nearest = number.round();
             ((number - nearest).abs() < SHARP).then_some(nearest % 2.0 == 1.0)
         };
@@ -90,10 +90,10 @@ mod tests {
         let points: Vec<Vector<3>> = fibonacci::sphere(400).into_iter().filter(|x| x[2] < 0.6).collect();
         let (_, graph) = spacings_and_graph(&points, &points);
         let all: Vec<usize> = (0..points.len()).collect();
-        let share = outward_share(&points, &points, &graph, &all).unwrap();
+        let share = outward_share(&points, &points, &graph, (&all, &all)).unwrap();
         assert!(share > 0.8, "{share}");
         let inward: Vec<_> = points.iter().map(|n| -n).collect();
-        assert!(outward_share(&points, &inward, &graph, &all).unwrap() < 0.2);
+        assert!(outward_share(&points, &inward, &graph, (&all, &all)).unwrap() < 0.2);
     }
 
     /// The wall of a cup: its inner side is a piece that looks like a ball with its normals inward.
@@ -103,11 +103,11 @@ mod tests {
         let wall =
             |radius: f64| ball.iter().filter(|x| x[2] < 0.5).map(move |x| (x * radius, *x * (radius - 0.9).signum()));
         let (points, normals): (Vec<Vector<3>>, Vec<Vector<3>>) = wall(1.0).chain(wall(0.8)).unzip();
-        let (_, mut graph) = spacings_and_graph(&points, &normals);
+        let (_, graph) = spacings_and_graph(&points, &normals);
         // The rim would join them.
-        graph.parts.fill(0);
+        let all: Vec<usize> = (0..points.len()).collect();
         let inner: Vec<usize> = (points.len() / 2..points.len()).collect();
-        let share = outward_share(&points, &normals, &graph, &inner).unwrap();
+        let share = outward_share(&points, &normals, &graph, (&all, &inner)).unwrap();
         assert!(share > 0.8, "{share}");
     }
 
@@ -117,6 +117,7 @@ mod tests {
             (0..400).map(|k| Vector::<3>::new(f64::from(k % 20), f64::from(k / 20), 0.0) * 0.1).collect();
         let normals = vec![Vector::<3>::z(); 400];
         let (_, graph) = spacings_and_graph(&points, &normals);
-        assert_eq!(outward_share(&points, &normals, &graph, &(0..400).collect::<Vec<_>>()), None);
+        let all: Vec<usize> = (0..400).collect();
+        assert_eq!(outward_share(&points, &normals, &graph, (&all, &all)), None);
     }
 }

@@ -9,6 +9,7 @@ use super::problems::ProblemChoice;
 use super::spec::{CleanWord, SurfaceChoice};
 use super::surfaces::{Extent, Sampling, Shape};
 use crate::geometry::Vector;
+use crate::parallel::Interrupt;
 use crate::point_clouds::cleaning::Cleaning;
 use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
 use crate::point_clouds::given_normals::Verdict;
@@ -39,7 +40,7 @@ pub(super) fn build<const D: usize, const M: usize>(
     let found = if is_ball {
         Found::within_radius(scene, points, given)?
     } else {
-        Found::with_stars(scene, &points, given.as_deref())?
+        Found::with_stars(scene, &points, given.as_deref(), &interrupt)?
     };
     let Found { cloud, measure, origin, findings, marks, counted } = found;
     let shape = Shape::Points(Extent::of(&cloud.points, measure));
@@ -113,13 +114,14 @@ impl<const D: usize> Found<D> {
         scene: &SurfaceScene,
         points: &[Vector<D>],
         given: Option<&[Vector<D>]>,
+        interrupt: &Interrupt,
     ) -> Result<Self, Vec<Violation>> {
         let cleaning = match scene.spec.surface {
             SurfaceChoice::Points { clean: CleanWord::Refuse, .. } => Cleaning::Refuse,
             SurfaceChoice::Points { clean: CleanWord::Off, .. } => Cleaning::Off,
             _ => Cleaning::Drop,
         };
-        let prepared = PreparedCloud::new(points, given, cleaning);
+        let prepared = PreparedCloud::with_interrupt(points, given, cleaning, interrupt);
         let prepared = prepared.map_err(|reason| refuse(reason.to_string()))?;
         let must_be_right = matches!(scene.normals, Normals::Given { must_be_there: true });
         if must_be_right && prepared.verdict.as_ref().is_some_and(|verdict| verdict.is_wrong_together) {
