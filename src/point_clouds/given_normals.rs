@@ -39,9 +39,9 @@ pub struct Verdict {
     is_wrong: Vec<bool>,
 }
 
-/// Whether a point can be trusted: its star is closed and its neighbors lie about in a plane.
-pub(super) fn is_trusted<const D: usize>(stars: &Stars, planes: &[Plane<D>], i: usize) -> bool {
-    stars.is_closed(i) && planes[i].flatness < FLAT
+/// Whether each point can be trusted: its star is closed and its neighbors lie about in a plane.
+pub(super) fn trusted<const D: usize>(stars: &Stars, planes: &[Plane<D>]) -> Vec<bool> {
+    planes.iter().enumerate().map(|(i, plane)| stars.is_closed(i) && plane.flatness < FLAT).collect()
 }
 
 /// Holds given unit normals against estimated ones.
@@ -52,7 +52,7 @@ pub(super) fn judge<const D: usize>(
     stars: &Stars,
 ) -> Verdict {
     let count = given.len();
-    let trusted_points: Vec<bool> = (0..count).map(|i| is_trusted(stars, planes, i)).collect();
+    let trusted_points = trusted(stars, planes);
     let is_off = |i: usize| given[i].dot(&estimated[i]).abs() < WRONG;
     let is_wrong: Vec<bool> = (0..count).map(|i| trusted_points[i] && is_off(i)).collect();
     let number = |list: &[bool]| list.iter().filter(|holds| **holds).count() as f64;

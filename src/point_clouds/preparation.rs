@@ -6,7 +6,7 @@ use super::examination::{EXTENTS, LEAST_SPACING, NormalSource, PointList, Unusab
 use super::given_normals::{self, Verdict};
 use super::local_spacing::{self, Nearest, median};
 use super::orientation::{orient, orient_pieces};
-use super::planes::planes;
+use super::planes::{Plane, planes};
 use super::star_graph::StarGraph;
 use super::stars::{CANDIDATES, Stars, refined_normals};
 use crate::geometry::Vector;
@@ -83,14 +83,10 @@ impl<const D: usize> PreparedCloud<D> {
         let spacing = median(&mut spacings.clone());
         check_scale(&present, spacing)?;
         let planes = planes(&present, &nearest);
-        let lines = planes.iter().filter(|plane| plane.width < LEAST_WIDTH).count();
-        if 2 * lines > present.len() {
-            return Err(Unusable::Line { count: present.len(), lines });
-        }
+        check_planes(&planes)?;
         let first = planes.iter().map(|plane| plane.normal).collect();
         let mut normals = refined_normals(&present, &nearest, first, &spacings, 2);
-        let mut source = NormalSource::Estimated;
-        let mut verdict = None;
+        let (mut source, mut verdict) = (NormalSource::Estimated, None);
         let mut stars = Stars::new(&present, &nearest, &normals, &spacings);
         if let Some(given) = given {
             let given: Vec<Vector<D>> = cleaned.kept.iter().map(|i| given[*i]).collect();
@@ -101,14 +97,12 @@ impl<const D: usize> PreparedCloud<D> {
             }
             verdict = Some(found);
         }
-        let graph = StarGraph::new(&stars);
-        let mut closed_pieces = 0;
+        let (graph, mut closed_pieces) = (StarGraph::new(&stars), 0);
         match (&mut verdict, source) {
             (Some(verdict), NormalSource::Given) => verdict.agree(&present, &graph, &mut normals),
             _ => {
                 orient(&present, &graph, &mut normals);
-                let is_trusted: Vec<bool> =
-                    (0..present.len()).map(|i| given_normals::is_trusted(&stars, &planes, i)).collect();
+                let is_trusted = given_normals::trusted(&stars, &planes);
                 closed_pieces = orient_pieces(&present, &graph, &is_trusted, &mut normals, interrupt);
             }
         }
@@ -139,6 +133,12 @@ pub fn spacings_and_graph<const D: usize>(points: &[Vector<D>], normals: &[Vecto
     let spacings = local_spacing::smoothed::<D>(&local_spacing::at_each_point(points, &nearest), &nearest);
     let graph = StarGraph::new(&Stars::new(points, &nearest, normals, &spacings));
     (spacings, graph)
+}
+
+/// Refuses points most of which lie on a line with their neighbors.
+fn check_planes<const D: usize>(planes: &[Plane<D>]) -> Result<(), Unusable> {
+    let lines = planes.iter().filter(|plane| plane.width < LEAST_WIDTH).count();
+    if 2 * lines > planes.len() { Err(Unusable::Line { count: planes.len(), lines }) } else { Ok(()) }
 }
 
 /// Refuses points without a spacing, by their numbers in the given cloud.

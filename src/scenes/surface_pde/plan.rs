@@ -184,7 +184,8 @@ fn check_form(
         let detail = "the rows of the conservative form are right in equations only, not point by point";
         errors.push(Violation::new("/method", "conflict", detail, "conservative", json!(["auto", "surface_dcpse"])));
     }
-    solvers::check_cg(given.solver.as_ref(), is_conservative, problem, errors);
+    let has_held_points = matches!(problem, Some(ProblemChoice::Poisson { is_dirichlet: true, .. }));
+    solvers::check_cg(given.solver.as_ref(), (is_conservative, has_held_points), errors);
     if matches!(given.surface, SurfaceChoice::Bump { .. })
         && !matches!(form, Form::Intrinsic { .. } | Form::Copies { .. })
     {

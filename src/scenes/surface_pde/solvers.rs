@@ -1,6 +1,5 @@
 //! Solvers and integrators of a scene, from their specs.
 
-use super::problems::ProblemChoice;
 use super::spec::{SolverChoice, StoppingSpec};
 use crate::linear_algebra::krylov::Stopping;
 use crate::schemes::surface_equation::{EvolutionIntegrator, Solver};
@@ -39,21 +38,18 @@ pub(super) fn solver(choice: &SolverChoice) -> Solver {
 /// Refuses conjugate gradients where the system is not symmetric.
 pub(super) fn check_cg(
     solver: Option<&SolverChoice>,
-    is_conservative: bool,
-    problem: Option<&ProblemChoice>,
+    (is_conservative, has_held_points): (bool, bool),
     errors: &mut Vec<Violation>,
 ) {
     if !matches!(solver, Some(SolverChoice::Cg { .. })) {
         return;
     }
-    let detail = match problem {
-        _ if !is_conservative => {
-            "conjugate gradients need a symmetric system, which only the method `conservative` always has"
-        }
-        Some(ProblemChoice::Poisson { is_dirichlet: true, .. }) => {
-            "conjugate gradients need a symmetric system, which held points do not leave"
-        }
-        _ => return,
+    let detail = if !is_conservative {
+        "conjugate gradients need a symmetric system, which only the method `conservative` always has"
+    } else if has_held_points {
+        "conjugate gradients need a symmetric system, which held points do not leave"
+    } else {
+        return;
     };
     let allowed = json!(["auto", "bicgstab", "gmres", "sparse_lu"]);
     errors.push(Violation::new("/solver", "conflict", detail, "cg", allowed));
