@@ -40,6 +40,7 @@ quantities! {
         SURFACE_AREA = "surface_area", "length^2", "Area of the interface, as the sum of V delta over the particles.";
         SURFACE_ENERGY = "surface_energy", "mass*length^2/time^2", "Surface tension times perimeter or surface area.";
         ELASTIC_ENERGY = "elastic_energy", "mass*length^2/time^2", "Energy of compression of both fluids.";
+        TOTAL_ENERGY = "total_energy", "mass*length^2/time^2", "Kinetic, elastic and surface energy less the work of the body force.";
         WORK = "work", "mass*length^2/time^2", "Work of the body force since the start.";
         ELONGATION = "elongation", "", "(a - b)/(a + b) of the largest and the least eigenvalue of the central second moments.";
         ELONGATION_ANGLE = "elongation_angle", "radians", "Angle of the longest axis with x, from -pi/2 to pi/2, in the plane.";
@@ -56,6 +57,7 @@ quantities! {
         MEAN_ERROR = "mean_error", "of the quantity", "Difference of the mean of the last fifth of the run from the reference.";
         STD = "std", "of the quantity", "Standard deviation over the band.";
         STD_LEAST = "std_least", "of the quantity", "Least standard deviation over the band in the run.";
+        RISE = "rise", "", "Largest rise above the largest value before, by the surface energy at the start.";
         OF_MEASURE = "of_measure", "", "Relative difference from the curvature of a ball of the present area or volume.";
         SCALED = "scaled", "", "By sqrt(tau/(rho D)), the capillary speed of the drop.";
         RATIO = "ratio", "", "Mean of the last third of the run by that of the middle third.";

@@ -34,7 +34,7 @@ impl TensionForce {
 /// Share of δ_{ε/2} in the δ of the balanced force, the rest is δ_ε. A force that is spread over the width ε acts on the
 /// interface like ∫ e^{−k|φ|} δ dφ at the wave number k, and generates vorticity as wide: both lower frequency and decay. With
 /// more of the narrow δ the decay of resolved drops comes out too high (measured; docs/results/droplet-notes.md).
-const NARROW_SHARE: f64 = 0.15;
+const NARROW_SHARE: f64 = 0.25;
 
 /// Surface tension: −(τ/ρ) (κ − κ₀) n δ.
 #[derive(Debug, Clone, Copy, PartialEq)]
