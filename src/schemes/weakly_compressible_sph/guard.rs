@@ -1,7 +1,7 @@
 //! The guard of a run: budgets of energy and momentum, watched invariants, and the warnings that it issues.
 
 use super::budget::{Budget, Contents};
-use super::checks::{LIMITS, Watch, Watched};
+use super::checks::{LIMITS, Watch, Watched, Watching};
 use super::config::{Discretization, Integrator};
 use super::droplets::ball_curvature;
 use super::energy_rise::EnergyRise;
@@ -115,7 +115,7 @@ impl<const D: usize> Guard<D> {
             sides: system.interface.level_set().map_or(f64::NAN, |set| set.sides.wrong_share()),
             strays: lost,
             creep,
-            crowded_measurements: if crowded > self.watched.most_crowded() {
+            crowded_measurements: if crowded > self.watched.most_crowded(system.config.is_shifted) {
                 self.watched.crowded_measurements + 1
             } else {
                 0
@@ -170,7 +170,9 @@ impl<const D: usize> Guard<D> {
     }
 
     fn watches(&self, system: &SphSystem<D>) -> Vec<Watch> {
-        self.watched.watches(self.closes(system), system.interface.level_set().is_some())
+        let has_level_set = system.interface.level_set().is_some();
+        let is_shifted = system.config.is_shifted;
+        self.watched.watches(Watching { closes: self.closes(system), has_level_set, is_shifted })
     }
 
     /// The checks of the report.
