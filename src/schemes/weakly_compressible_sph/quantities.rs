@@ -40,7 +40,6 @@ quantities! {
         SURFACE_AREA = "surface_area", "length^2", "Area of the interface, as the sum of V delta over the particles.";
         SURFACE_ENERGY = "surface_energy", "mass*length^2/time^2", "Surface tension times perimeter or surface area.";
         ELASTIC_ENERGY = "elastic_energy", "mass*length^2/time^2", "Energy of compression of both fluids.";
-        TOTAL_ENERGY = "total_energy", "mass*length^2/time^2", "Kinetic, elastic and surface energy less the work of the body force.";
         WORK = "work", "mass*length^2/time^2", "Work of the body force since the start.";
         ELONGATION = "elongation", "", "(a - b)/(a + b) of the largest and the least eigenvalue of the central second moments.";
         ELONGATION_ANGLE = "elongation_angle", "radians", "Angle of the longest axis with x, from -pi/2 to pi/2, in the plane.";
