@@ -5,6 +5,10 @@
 #[path = "support/mod.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
+#[path = "scenes/droplets.rs"]
+mod droplets;
+#[path = "scenes/fronts.rs"]
+mod fronts;
 #[path = "scenes/surfaces.rs"]
 mod surfaces;
 
@@ -42,43 +46,14 @@ fn bodies() -> Vec<Value> {
             "kind": "redistance", "spacing": 0.05, "repeat": 3, "method": {"type": "remesh", "kernel": kernel}
         }));
     }
-    let droplet = |more: Value| -> Value {
-        // Driven fast enough that neighbours are listed anew a few times.
-        let force = json!({"type": "constant", "acceleration": [300, 100]});
-        let mut body =
-            json!({"kind": "droplet", "spacing": 0.1, "end_time": 0.014, "body_force": force, "allow_soft": true});
-        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        body
-    };
-    bodies.push(droplet(json!({})));
-    bodies.push(droplet(json!({"integrator": "predictor_corrector", "tension_force": "csf", "end_time": 0.008})));
-    bodies.push(droplet(json!({"geometry": "colorfield", "discretization": {"type": "sph", "kernel": "quintic_spline", "smoothing_h": 1.5}})));
-    bodies.push(droplet(json!({
-        "surface_tension": 0, "fluids": {"inside": {"density": 2, "viscosity": 0.1}},
-        "body_force": {"type": "constant", "acceleration": [300, 100], "balance": "mean"}
-    })));
-    bodies.push(droplet(json!({"tension_force": "balanced_0_1"})));
-    bodies.push(droplet(json!({
-        "case": "dividing", "domain": {"low": [-1, -1], "high": [1, 1]}, "end_time": 0.02, "time_step": 1e-3,
-        "body_force": {"type": "pulse", "coefficient": 4000, "duration": 0.02},
-        "fluids": {"inside": {"density": 1.5}}, "shape": {"type": "circle", "radius": 0.4}
-    })));
-    bodies.push(json!({
-        "kind": "droplet", "dimension": 3, "case": "static", "spacing": 0.16, "steps": 4, "end_time": 4e-3,
-        "shape": {"type": "sphere", "radius": 0.7}, "integrator": "predictor_corrector", "shifting": "pst"
-    }));
+    bodies.extend(droplets::bodies());
     bodies.push(vortex(json!({"flow": {"type": "rotation", "center": [0.5, 0.5], "angular_velocity": 3}})));
     bodies.push(json!({
         "kind": "surface_pde", "surface": {"type": "ellipsoid", "semi_axes": [1, 0.6, 0.8]}, "count": 700, "repeat": 5,
         "problem": {"type": "laplace_beltrami", "field": "plane_wave"}, "method": {"type": "surface_dcpse", "order": 6, "cutoff_dn": 3.8}
     }));
-    bodies.push(json!({"kind": "droplet", "spacing": 0.08, "end_time": 0.01, "discretization": "dcpse"}));
-    bodies.push(json!({
-        "kind": "droplet", "dimension": 3, "case": "static", "spacing": 0.16, "steps": 3, "end_time": 2e-3,
-        "shape": {"type": "sphere", "radius": 0.7}, "discretization": {"type": "dcpse", "order": 4, "cutoff_h": 4}
-    }));
     bodies.extend(surfaces::bodies());
-    bodies.extend(front_bodies());
+    bodies.extend(fronts::bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
         "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,
@@ -86,52 +61,6 @@ fn bodies() -> Vec<Value> {
         "field": "overwrite", "method": {"type": "pcp", "degree": 2}
     }));
     bodies
-}
-
-/// Every law, topology, segment test, refinement and integrator of `front` in both dimensions, and grid-based particles in a vortex.
-fn front_bodies() -> Vec<Value> {
-    let front = |more: Value| {
-        let mut body = json!({"kind": "front", "spacing": 0.04, "end_time": 0.1, "time_step": 0.01});
-        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-        body
-    };
-    let square = json!({"type": "box", "center": [0.5, 0.5], "size": [0.5, 0.4]});
-    let sphere = |c: f64| json!({"type": "sphere", "center": [c, c, c], "radius": 0.12});
-    let spheres = json!({"type": "union", "of": [sphere(0.4), sphere(0.6)]});
-    let vortex = json!({"type": "flow", "flow": {"type": "vortex_3d", "period": 0.4}});
-    vec![
-        front(json!({"shape": square, "law": {"type": "normal", "speed": -1}, "preset": "paper"})),
-        front(json!({"law": "mean_curvature", "time_step": 8e-4, "end_time": 0.008, "shape": square})),
-        front(
-            json!({"law": "mean_curvature", "integrator": "tvd_rk2", "time_step": 6e-4, "end_time": 0.006, "shape": sphere(0.5)}),
-        ),
-        // It vanishes on the way.
-        front(json!({"shape": {"type": "circle", "radius": 0.06}, "law": {"type": "normal", "speed": -1}})),
-        front(json!({"shape": spheres, "topology": "cross"})),
-        front(json!({"shape": spheres, "segment_test": {"type": "parameter", "cosine": 0.4}})),
-        front(json!({"shape": sphere(0.35), "law": vortex, "end_time": 0.4, "degree": 4, "time_step": 0.04})),
-        // Several blocks of proposals.
-        front(json!({"shape": sphere(0.35), "law": vortex, "end_time": 0.4, "spacing": 0.015, "time_step": 0.08})),
-        json!({
-            "kind": "vortex", "spacing": 0.02, "end_time": 2, "steps": 20, "flow": {"type": "single_vortex", "period": 2},
-            "method": {"type": "gbpm", "degree": 3, "tube_radius_h": 1.4}, "integrator": "dopri5"
-        }),
-        json!({"kind": "vortex", "spacing": 0.03, "method": {"type": "gbpm", "cfl": 6}, "end_time": 3}),
-        json!({
-            "kind": "vortex", "spacing": 0.04, "end_time": 2,
-            "method": {"type": "gbpm", "cfl": 20, "adaptivity": {"levels": 3, "curvature_constant": 0.15}}
-        }),
-        json!({"kind": "vortex", "preset": "paper", "spacing": 0.03, "method": {"type": "gbpm", "degree": 3}, "end_time": 0.4}),
-        front(json!({"shape": spheres, "adaptivity": {"levels": 2}, "spacing": 0.05})),
-        front(json!({"shape": square, "adaptivity": {}, "end_time": 0.05})),
-        front(json!({
-            "law": "geometrical_optics", "shape": {"type": "ellipse", "center": [0.1, 0.2], "semi_axes": [1, 0.6]},
-            "spacing": 0.1, "end_time": 0.9, "time_step": 0.1
-        })),
-        front(
-            json!({"law": {"type": "geometrical_optics", "speed": -0.5}, "shape": {"type": "circle", "radius": 0.3}, "adaptivity": {"levels": 2}}),
-        ),
-    ]
 }
 
 fn states(body: &Value, threads: usize) -> Vec<Section> {

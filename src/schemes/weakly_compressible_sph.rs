@@ -23,6 +23,7 @@ pub mod config;
 mod dcpse;
 pub mod dimensionless;
 mod droplets;
+mod energy_rise;
 mod equations;
 mod flow_state;
 pub mod fluids;

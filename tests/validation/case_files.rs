@@ -106,6 +106,7 @@ fn norm_of(measure: &Measure) -> Option<&str> {
         | Measure::SecondsPerStep { .. }
         | Measure::Seconds { .. }
         | Measure::SecondsRatio { .. }
+        | Measure::SecondsPerStepRatio { .. }
         | Measure::Diagnostic { .. } => None,
     }
 }

@@ -60,6 +60,8 @@ pub enum Measure {
         time: Option<f64>,
         /// Errors below are round-off and left out.
         floor: f64,
+        /// The right value, where the report has the value itself and not its error.
+        reference: Option<f64>,
     },
     /// The error of the last run divided by that of the first.
     Ratio(Quantity),
@@ -82,6 +84,11 @@ pub enum Measure {
         /// Beginning of the spans' names; empty for all but the computation of errors.
         spans: String,
     },
+    /// CPU seconds a step of the last run in such spans divided by those of the first.
+    SecondsPerStepRatio {
+        /// Beginning of the spans' names; empty for all but the computation of errors.
+        spans: String,
+    },
     /// A count of the last run's diagnostics; zero when the report does not list it.
     Diagnostic {
         /// Name of the count, such as `fits.larger_radius`.
@@ -95,7 +102,7 @@ impl Measure {
     pub fn least_runs(&self) -> usize {
         match self {
             Self::Order { .. } => LEAST_POINTS,
-            Self::Ratio(_) | Self::Difference(_) | Self::SecondsRatio { .. } => 2,
+            Self::Ratio(_) | Self::Difference(_) | Self::SecondsRatio { .. } | Self::SecondsPerStepRatio { .. } => 2,
             Self::Error(_)
             | Self::LargestErrorInSpacings(_)
             | Self::Memory {}
@@ -120,6 +127,11 @@ pub fn seconds(report: &RunReport, prefix: &str) -> f64 {
     report.cost.phases.iter().filter(|(name, _)| is_meant(name)).map(|(_, seconds)| seconds).sum()
 }
 
+/// CPU seconds a step in such spans.
+fn seconds_a_step(report: &RunReport, prefix: &str) -> f64 {
+    seconds(report, prefix) / report.cost.steps as f64
+}
+
 /// The value of a measure over runs; NaN where their reports do not have it.
 #[must_use]
 pub fn evaluate(measure: &Measure, runs: &[FinishedRun]) -> f64 {
@@ -134,11 +146,12 @@ pub fn evaluate(measure: &Measure, runs: &[FinishedRun]) -> f64 {
             // A NaN must not be lost in the maximum.
             runs.iter().map(ratio).fold(0.0, |worst, r| if r <= worst { worst } else { r })
         }
-        Measure::Order { quantity, norm, time, floor } => {
+        Measure::Order { quantity, norm, time, floor, reference } => {
             let of = Quantity { quantity: quantity.clone(), norm: norm.clone(), time: *time };
             let points: Vec<(f64, f64)> = runs
                 .iter()
                 .filter_map(|run| Some((spacing(run).ln(), error(&run.report, &of)?)))
+                .map(|(x, value)| (x, reference.map_or(value, |right| (value - right).abs())))
                 .filter(|(_, error)| error > floor)
                 .map(|(x, error)| (x, error.ln()))
                 .collect();
@@ -148,7 +161,8 @@ pub fn evaluate(measure: &Measure, runs: &[FinishedRun]) -> f64 {
         Measure::Difference(of) => (error_of(last, of) - error_of(first, of)).abs(),
         Measure::Memory {} => last.cost.peak_memory_bytes as f64,
         Measure::Seconds { spans } => seconds(last, spans),
-        Measure::SecondsPerStep { spans } => seconds(last, spans) / last.cost.steps as f64,
+        Measure::SecondsPerStep { spans } => seconds_a_step(last, spans),
+        Measure::SecondsPerStepRatio { spans } => seconds_a_step(last, spans) / seconds_a_step(first, spans),
         Measure::SecondsRatio { spans } => seconds(last, spans) / seconds(first, spans),
         Measure::Diagnostic { name } => last.diagnostic(name).unwrap_or(f64::NAN),
     }
@@ -215,6 +229,11 @@ mod tests {
         let order = |floor: f64| of(json!({"type": "order", "quantity": "phi", "norm": "rms", "floor": floor}));
         assert!((order(0.0) - 3.0).abs() < 1e-12);
         assert!(order(1e-5).is_nan(), "three points are no line");
+        let values: Vec<FinishedRun> =
+            spacings.iter().map(|h| FinishedRun { spacing: Some(*h), report: report(2.0 - h.powi(2)) }).collect();
+        let about_two = json!({"type": "order", "quantity": "phi", "norm": "rms", "floor": 0, "reference": 2});
+        let about_two: Measure = serde_json::from_value(about_two).unwrap();
+        assert!((evaluate(&about_two, &values) - 2.0).abs() < 1e-9, "values that come close to 2 from below");
         assert!((of(rms("error")) - 0.0125_f64.powi(3)).abs() < 1e-18);
         assert!((of(json!({"type": "error", "quantity": "phi", "norm": "rms", "time": 0.5})) - 9.0).abs() < 1e-15);
         assert!((of(rms("ratio")) - 1.0 / 512.0).abs() < 1e-12);
@@ -223,6 +242,7 @@ mod tests {
         assert!((of(json!({"type": "seconds", "spans": "redistancing"})) - 3.0).abs() < 1e-12);
         assert!((of(json!({"type": "seconds_per_step", "spans": "redistancing"})) - 0.75).abs() < 1e-12);
         assert!((of(json!({"type": "seconds_ratio", "spans": "redistancing"})) - 1.0).abs() < 1e-12);
+        assert!((of(json!({"type": "seconds_per_step_ratio", "spans": "redistancing"})) - 1.0).abs() < 1e-12);
         assert!((of(json!({"type": "diagnostic", "name": "fits.larger_radius"})) - 3.0).abs() < 1e-12);
         assert!(of(json!({"type": "error", "quantity": "area", "norm": "relative"})).is_nan());
         assert!((of(json!({"type": "memory"})) - 1024.0).abs() < 1e-12);

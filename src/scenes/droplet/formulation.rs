@@ -18,11 +18,21 @@ struct Balanced {
     background_at_rest: f64,
     background: f64,
     bulk_damping: f64,
+    /// Share of a deviation of the level that is repaired in a repair time, of a drop at rest, and of others. Less keeps a drop
+    /// at rest quieter; merging drops need more, or some of them gain energy.
+    relaxation_at_rest: f64,
+    relaxation: f64,
     curvature_filter_h: f64,
 }
 
-const BALANCED: Balanced =
-    Balanced { background_at_rest: 0.2, background: 0.05, bulk_damping: 0.2, curvature_filter_h: 6.0 };
+const BALANCED: Balanced = Balanced {
+    background_at_rest: 0.2,
+    background: 0.05,
+    bulk_damping: 0.2,
+    relaxation_at_rest: 0.05,
+    relaxation: 0.1,
+    curvature_filter_h: 6.0,
+};
 
 /// Least radius of the filter of the curvature in h, that of the filter of the level.
 const LEAST_FILTER_H: f64 = 2.0;
@@ -160,9 +170,11 @@ pub(super) fn level_and_curvature(
     // Particles that are shifted or whose densities drift have not been tried with a level of their own.
     let is_balanced = spec.tension_force == TensionWord::Balanced && scope.is_summation;
     let default = if is_balanced { with_defaults("transparent") } else { RedistancingChoice::Overwrite };
-    let update = match *spec.redistancing.get_or_insert(default) {
+    let by_case = if spec.case == CaseName::Static { BALANCED.relaxation_at_rest } else { BALANCED.relaxation };
+    let update = match spec.redistancing.get_or_insert(default) {
         RedistancingChoice::Transparent { relaxation, radius_h } => {
-            LevelUpdate::Transparent { relaxation, radius: radius_h * spec.spacing }
+            let relaxation = *relaxation.get_or_insert(by_case);
+            LevelUpdate::Transparent { relaxation, radius: *radius_h * spec.spacing }
         }
         RedistancingChoice::Overwrite => LevelUpdate::Overwrite,
     };

@@ -94,8 +94,9 @@ crate::choice! {
     pub enum RedistancingChoice {
         /// long waves of the interface move with the particles alone; short waves and slopes are repaired
         Transparent = "transparent" {
-            /// share of a deviation that is repaired in the time ½ √(ρh³/(2πτ)), about a step
-            relaxation: f64 = 0.1, in POSITIVE.and_at_most(1.0);
+            /// share of a deviation that is repaired in the time ½ √(ρh³/(2πτ)), about a step; .05 for case static, else .1, when
+            /// not given
+            relaxation: Option<f64>, in POSITIVE.and_at_most(1.0);
             /// radius of the surface filter in h
             radius_h: f64 = 6.0, in Interval::at_least(2.0).and_at_most(20.0);
         }

@@ -169,7 +169,9 @@ impl<const D: usize> SphConfig<D> {
 
     /// The interaction of surface tension; its coefficient is 0 where there is no interface to compute.
     pub(super) fn surface_tension(&self) -> SurfaceTension {
-        SurfaceTension::new(self.tension, self.tension_force, self.smoothing_length)
+        let is_overwritten =
+            !matches!(self.geometry, Geometry::Pcp { level_update: LevelUpdate::Transparent { .. }, .. });
+        SurfaceTension::new(self.tension, self.tension_force, self.smoothing_length, is_overwritten)
     }
 
     /// Whether densities are integrated in time, not found anew at every evaluation.

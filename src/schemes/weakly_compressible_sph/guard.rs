@@ -1,15 +1,17 @@
 //! The guard of a run: budgets of energy and momentum, watched invariants, and the warnings that it issues.
 
 use super::budget::{Budget, Contents};
-use super::checks::{LIMITS, Watch, Watched};
+use super::checks::{LIMITS, Watch, Watched, Watching};
 use super::config::{Discretization, Integrator};
 use super::droplets::ball_curvature;
+use super::energy_rise::EnergyRise;
 use super::interactions::TensionForce;
 use super::species::Species;
 use super::system::SphSystem;
 use crate::geometry::Vector;
+use crate::schemes::measured_errors::entry;
 use crate::simulation::section::known;
-use crate::simulation::{Check, Finding, LoadError, Section, Severity, StepError};
+use crate::simulation::{Check, ErrorEntry, Finding, LoadError, Section, Severity, StepError};
 use crate::time::Clock;
 
 /// What comes in from outside, and the power of surface tension, at one moment.
@@ -35,6 +37,8 @@ const DOUBTS: [&str; 7] =
 #[derive(Debug)]
 pub(super) struct Guard<const D: usize> {
     pub budget: Budget<D>,
+    /// Of the energy gained, by the surface energy at the start.
+    pub rise: EnergyRise,
     watched: Watched,
     /// At the end of the last part of a step.
     supply: Supply<D>,
@@ -58,6 +62,7 @@ impl<const D: usize> Guard<D> {
         let is_single = system.droplets.number() == 1 && !system.droplets.has_layer();
         Self {
             budget: Budget::new(&system.contents()),
+            rise: EnergyRise::NONE,
             watched: Watched { is_single, ..Watched::UNKNOWN },
             supply: Supply::new(system, 0.0),
             start_particles: system.flow.species.iter().filter(|species| **species == Species::Inside).count(),
@@ -110,18 +115,25 @@ impl<const D: usize> Guard<D> {
             sides: system.interface.level_set().map_or(f64::NAN, |set| set.sides.wrong_share()),
             strays: lost,
             creep,
-            crowded_measurements: if crowded > self.watched.most_crowded() {
+            crowded_measurements: if crowded > self.watched.most_crowded(system.config.is_shifted) {
                 self.watched.crowded_measurements + 1
             } else {
                 0
             },
             ..self.watched
         };
+        self.rise.take(self.watched.energy);
         let broken = self.watches(system).into_iter().find(Watch::is_broken);
         broken.map_or(Ok(()), |Watch { name, value, limit, divergence, .. }| {
             let limit = limit.unwrap_or(f64::NAN);
             Err(StepError::CheckFailed { check: name, divergence, value, limit, step, time })
         })
+    }
+
+    /// The largest rise of the energy by the surface energy at the start, where the budget closes.
+    pub fn energy_rise(&self, system: &SphSystem<D>, time: f64) -> Option<ErrorEntry> {
+        let reference = "its largest value before, by the surface energy at the start";
+        self.closes(system).then(|| entry("total_energy", "rise", self.rise.largest, time, reference))
     }
 
     /// Work of surface tension since the drop came to rest, beyond that of the shrinking interface, in a capillary time
@@ -145,16 +157,22 @@ impl<const D: usize> Guard<D> {
         if elapsed > capillary { (balance - balance_then).abs() / scale * capillary / elapsed } else { f64::NAN }
     }
 
-    fn watches(&self, system: &SphSystem<D>) -> Vec<Watch> {
+    /// Whether the budgets of energy and momentum close but for the scheme's errors.
+    fn closes(&self, system: &SphSystem<D>) -> bool {
         let config = &system.config;
-        let has_level_set = system.interface.level_set().is_some();
-        let closes = config.tension_force == TensionForce::Balanced
-            && has_level_set
+        config.tension_force == TensionForce::Balanced
+            && system.interface.level_set().is_some()
             && !config.is_density_integrated()
             && config.discretization == Discretization::Kernels
             // The impulse of another integrator is not the trapezoidal rule.
-            && config.integrator == Integrator::KickDriftKick;
-        self.watched.watches(closes && !config.is_shifted, has_level_set)
+            && config.integrator == Integrator::KickDriftKick
+            && !config.is_shifted
+    }
+
+    fn watches(&self, system: &SphSystem<D>) -> Vec<Watch> {
+        let has_level_set = system.interface.level_set().is_some();
+        let is_shifted = system.config.is_shifted;
+        self.watched.watches(Watching { closes: self.closes(system), has_level_set, is_shifted })
     }
 
     /// The checks of the report.
@@ -241,6 +259,7 @@ impl<const D: usize> Guard<D> {
     /// Saves everything that later checks depend on.
     pub fn save(&self, section: &mut Section) {
         section.put_component("budget", &self.budget);
+        section.put_component("energy_rise", &self.rise);
         section.put_component("watched", &self.watched);
         section.put_counts("issued", self.issued.map(u64::from));
         section.put_optional("rest_since", known(self.rest[0]));
@@ -258,6 +277,8 @@ impl<const D: usize> Guard<D> {
         let issued = section.counts_of("issued", DOUBTS.len())?;
         Ok(Self {
             budget: section.component("budget")?,
+            // Version 0.2.0 did not measure it.
+            rise: if section.has("energy_rise") { section.component("energy_rise")? } else { EnergyRise::NONE },
             watched: section.component("watched")?,
             supply: Supply {
                 power: section.real("power")?,

@@ -56,6 +56,7 @@ quantities! {
         MEAN_ERROR = "mean_error", "of the quantity", "Difference of the mean of the last fifth of the run from the reference.";
         STD = "std", "of the quantity", "Standard deviation over the band.";
         STD_LEAST = "std_least", "of the quantity", "Least standard deviation over the band in the run.";
+        RISE = "rise", "", "Largest rise above the largest value before, by the surface energy at the start.";
         OF_MEASURE = "of_measure", "", "Relative difference from the curvature of a ball of the present area or volume.";
         SCALED = "scaled", "", "By sqrt(tau/(rho D)), the capillary speed of the drop.";
         RATIO = "ratio", "", "Mean of the last third of the run by that of the middle third.";

@@ -34,7 +34,10 @@ impl TensionForce {
 /// Share of δ_{ε/2} in the δ of the balanced force, the rest is δ_ε. A force that is spread over the width ε acts on the
 /// interface like ∫ e^{−k|φ|} δ dφ at the wave number k, and generates vorticity as wide: both lower frequency and decay. With
 /// more of the narrow δ the decay of resolved drops comes out too high (measured; docs/results/droplet-notes.md).
-const NARROW_SHARE: f64 = 0.15;
+const NARROW_SHARE: f64 = 0.25;
+
+/// The same where the level is overwritten: drops that divide lose or gain more area with more of it.
+const NARROW_SHARE_OVERWRITTEN: f64 = 0.15;
 
 /// Surface tension: −(τ/ρ) (κ − κ₀) n δ.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,22 +47,29 @@ pub struct SurfaceTension {
     force: TensionForce,
     /// The width ε of the smoothed δ.
     smoothing_length: f64,
+    /// Share of δ_{ε/2} in it.
+    narrow_share: f64,
 }
 
 impl SurfaceTension {
-    /// The force for a coefficient τ, with a δ of the width ε.
+    /// The force for a coefficient τ, with a δ of the width ε. `is_overwritten` says whether closest points replace the level.
     #[must_use]
-    pub fn new(coefficient: f64, force: TensionForce, smoothing_length: f64) -> Self {
-        Self { coefficient, force, smoothing_length }
+    pub fn new(coefficient: f64, force: TensionForce, smoothing_length: f64, is_overwritten: bool) -> Self {
+        let narrow_share = match force {
+            TensionForce::Balanced if is_overwritten => NARROW_SHARE_OVERWRITTEN,
+            TensionForce::Balanced => NARROW_SHARE,
+            TensionForce::BalancedUncorrected | TensionForce::Csf => 0.0,
+        };
+        Self { coefficient, force, smoothing_length, narrow_share }
     }
 
     /// The δ of the force at a signed distance.
     pub fn profile(&self, distance: f64) -> f64 {
         let wide = smoothed_delta(distance, self.smoothing_length);
-        if self.force != TensionForce::Balanced {
+        if self.narrow_share == 0.0 {
             return wide;
         }
-        NARROW_SHARE * smoothed_delta(distance, 0.5 * self.smoothing_length) + (1.0 - NARROW_SHARE) * wide
+        self.narrow_share * smoothed_delta(distance, 0.5 * self.smoothing_length) + (1.0 - self.narrow_share) * wide
     }
 
     /// The part τ κ₀ of the pressure that the balanced force has absorbed, at a particle: 0 outside the droplets.
