@@ -7,6 +7,7 @@ pub mod least_squares;
 pub mod mean_term;
 pub mod normal_equations;
 pub mod number;
+pub mod sparse_cholesky;
 pub mod sparse_lu;
 pub mod sparse_rows;
 

@@ -7,12 +7,14 @@ pub mod choice;
 pub mod group;
 mod macros;
 pub mod parameter;
+pub mod places;
 pub mod preset;
 pub mod violation;
 
 pub use choice::{AtLeast, Choice, Variant, Word};
 pub use group::{Declaration, Field, Group};
 pub use parameter::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Parameter, Raw, Sign, Whole, whole};
+pub use places::Places;
 pub use preset::{Given, Key, Preset};
 pub use violation::{Violation, escape, suggest};
 

@@ -68,6 +68,68 @@ fn refusal(body: &Value, cloud: &Cloud) -> String {
     found[0].detail.clone()
 }
 
+/// Two parts have two constants; the harmonics of each follow, three times each.
+#[test]
+fn eigenvalues_are_those_of_all_parts() {
+    let [mut cloud, other] = [sphere(1000, 1.0, [0.0; 3]), sphere(500, 0.5, [3.0, 0.0, 0.0])];
+    cloud.positions.extend(&other.positions);
+    let problem = json!({"type": "eigenvalues", "count": 14});
+    for method in ["auto", "conservative"] {
+        let simulation = finished(&body(&json!({"problem": problem, "method": method})), &bare(cloud.clone()));
+        let found = simulation.report().method["eigenvalues"].clone();
+        let values: Vec<f64> = found.split(", ").filter_map(|value| value.parse().ok()).collect();
+        // 0 and 0; 2 thrice; 6 five times; of the small one 2/R² = 8 thrice.
+        let exact = [0.0, 0.0, 2.0, 2.0, 2.0, 6.0, 6.0, 6.0, 6.0, 6.0, 8.0, 8.0];
+        assert_eq!(values.len(), exact.len(), "{found}");
+        for (value, exact) in values.iter().zip(exact) {
+            assert!((value - exact).abs() < 0.02 * exact + 1e-8, "{method}: {found}");
+        }
+        assert!(
+            simulation.health().checks.iter().any(|check| check.name == "mode_residual" && check.holds == Some(true))
+        );
+    }
+}
+
+/// A half sphere whose edge holds zero has the harmonics that are odd in z alone.
+#[test]
+fn modes_are_zero_where_an_edge_holds_zero() {
+    let whole = fibonacci::sphere(3000);
+    let ring = (0..97).map(|k| std::f64::consts::TAU * f64::from(k) / 97.0).map(|a| [a.cos(), a.sin(), 0.0]);
+    let above = whole.iter().filter(|x| x[2] > 0.03).map(|x| [x[0], x[1], x[2]]);
+    let cloud = Cloud { positions: above.chain(ring).collect(), level: None, normals: None };
+    let modes = |edges: Value| {
+        let problem = json!({"type": "eigenvalues", "count": 3});
+        let simulation = finished(&body(&json!({"problem": problem, "edges": edges})), &cloud);
+        let found = simulation.report().method["eigenvalues"].clone();
+        found.split(", ").filter_map(|value| value.parse().ok()).collect::<Vec<f64>>()
+    };
+    for (edges, exact) in [(json!("neumann"), [0.0, 2.0, 2.0]), (json!("dirichlet"), [2.0, 6.0, 6.0])] {
+        let found = modes(edges.clone());
+        let is_near = |(value, exact): (&f64, &f64)| (value - exact).abs() < 0.02 * exact + 1e-8;
+        assert!(found.iter().zip(&exact).all(is_near), "{edges}: {found:?}");
+    }
+}
+
+/// Points on parts without a source have no distance, and a person is told so.
+#[test]
+fn distances_end_where_a_part_ends() {
+    let [mut cloud, other] = [sphere(1000, 1.0, [0.0; 3]), sphere(500, 0.5, [3.0, 0.0, 0.0])];
+    cloud.positions.extend(&other.positions);
+    let problem = json!({"type": "geodesic_distance", "from": [[0, 0, 1.1]]});
+    let mut simulation = finished(&body(&json!({"problem": problem})), &bare(cloud.clone()));
+    let distance = column(&*simulation, "distance");
+    let source = simulation.report().method["sources"].clone();
+    let source: usize = source.strip_prefix("points ").unwrap().parse().unwrap();
+    let from = Vector::<3>::from(cloud.positions[source]);
+    for (x, found) in cloud.positions[..1000].iter().zip(&distance) {
+        let exact = from.dot(&Vector::<3>::from(*x)).clamp(-1.0, 1.0).acos();
+        assert!((exact - found).abs() < 0.05, "{exact} {found}");
+    }
+    assert!(distance[1000..].iter().all(|d| d.is_nan()));
+    let found = simulation.take_findings();
+    assert!(found.iter().any(|finding| finding.code == "unreached" && finding.count == 500), "{found:?}");
+}
+
 #[test]
 fn curvatures_of_a_sphere_are_those_of_its_radius() {
     let cloud = sphere(3000, 0.5, [10.0, 0.0, -3.0]);

@@ -22,6 +22,7 @@ pub mod bicgstab;
 pub mod conjugate_gradients;
 pub mod gmres;
 pub mod incomplete_factors;
+pub mod least_modes;
 pub mod ritz;
 
 pub use incomplete_factors::IncompleteFactors;

@@ -1,6 +1,8 @@
 //! `surface_pde`: operators and equations on surfaces (Surface DC-PSE paper).
 
 mod edges;
+mod field_choices;
+mod methods;
 mod points;
 mod preparation;
 mod problems;
@@ -27,7 +29,7 @@ pub static KIND: SceneKind = SceneKind {
     of_earlier_version: plan::of_earlier_version,
     quantities: || Quantities {
         fields: surface_equation::all_fields(),
-        observables: without_repetition(&[own::OBSERVABLES, embedding::OBSERVABLES]),
+        observables: without_repetition(&[&surface_equation::all_observables(), embedding::OBSERVABLES]),
         norms: without_repetition(&[&own::norms(), embedding::NORMS]),
     },
     calibration: include_str!("surface_pde/calibration.json"),

@@ -10,9 +10,11 @@ use crate::simulation::quantity::without_repetition;
 mod cloud;
 mod conservative;
 mod curvature;
+mod eigenmodes;
 mod evolution;
 mod field_bounds;
 pub mod fields;
+mod geodesic_distance;
 mod format_1;
 mod method;
 mod pointwise;
@@ -28,8 +30,10 @@ pub mod surface_gradient;
 
 pub use cloud::SurfaceCloud;
 pub use curvature::Curvature;
+pub use eigenmodes::Eigenmodes;
 pub use evolution::{Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse};
 pub use fields::ExactField;
+pub use geodesic_distance::GeodesicDistance;
 pub use method::{Form, Method};
 pub use pointwise::Pointwise;
 pub use poisson::{Condition, Poisson};
@@ -40,6 +44,12 @@ pub use simulation::SurfaceEquation;
 pub use solver::Solver;
 pub use surface_gradient::SurfaceGradient;
 
+/// Every scalar that series may have.
+#[must_use]
+pub fn all_observables() -> Vec<&'static Quantity> {
+    without_repetition(&[quantities::OBSERVABLES, eigenmodes::OBSERVABLES])
+}
+
 /// Every field that frames of this scheme may show.
 #[must_use]
 pub fn all_fields() -> Vec<&'static Quantity> {
@@ -49,6 +59,7 @@ pub fn all_fields() -> Vec<&'static Quantity> {
         &Poisson::shown_fields(true),
         &Curvature::shown_fields(3),
         &surface_gradient::shown_fields(),
+        &GeodesicDistance::shown_fields(),
         &[&quantities::NORMAL, &quantities::CURVATURE],
         COMMON_FIELDS,
     ])

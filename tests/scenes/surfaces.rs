@@ -46,6 +46,11 @@ pub fn bodies() -> Vec<Value> {
         scene(json!({"problem": evolving(json!({"integrator": "bdf2"})), "solver": "gmres"})),
         scene(json!({"problem": evolving(json!({"integrator": "bdf2"})), "solver": "sparse_lu"})),
         scene(json!({"problem": "curvature", "surface": "torus", "sampling": "random_raw", "normals": "estimated"})),
+        scene(json!({"problem": "gradient", "surface": "torus"})),
+        scene(json!({"problem": {"type": "eigenvalues", "count": 6}})),
+        scene(json!({"problem": {"type": "eigenvalues", "count": 4}, "surface": "torus", "method": "conservative"})),
+        scene(json!({"problem": {"type": "geodesic_distance", "from": [[0, 0, 1], [1, 0, 0]]}})),
+        scene(json!({"problem": "geodesic_distance", "surface": "circle"})),
     ]
 }
 

@@ -28,10 +28,18 @@ pub(super) fn check(
         let detail = "edges are found by the stars of points";
         errors.push(conflict("/edges", detail, json!("dirichlet"), json!(["neumann"])));
     }
-    let is_linear = matches!(given.problem, ProblemSpec::Poisson { .. } | ProblemSpec::Diffusion { .. });
+    let is_linear = matches!(
+        given.problem,
+        ProblemSpec::Poisson { .. } | ProblemSpec::Diffusion { .. } | ProblemSpec::Eigenvalues { .. }
+    );
     if problem.is_some() && !is_linear {
-        let detail = "edges hold a value in the problems `poisson` and `diffusion`";
-        errors.push(conflict("/edges", detail, json!(given.problem.name()), json!(["poisson", "diffusion"])));
+        let detail = "edges hold a value in the problems `poisson`, `diffusion` and `eigenvalues`";
+        errors.push(conflict(
+            "/edges",
+            detail,
+            json!(given.problem.name()),
+            json!(["poisson", "diffusion", "eigenvalues"]),
+        ));
     }
     if matches!(given.solver, Some(SolverChoice::Cg { .. })) {
         let detail = "conjugate gradients need a symmetric system, which held points do not leave";

@@ -2,25 +2,25 @@
 //! built (`points`).
 
 use super::edges;
+use super::field_choices::vector_in_space;
+use super::methods::{self, Points, Scheme};
 use super::problems::{self, ProblemChoice};
 use super::solvers;
 use super::spec::{
-    CleanWord, EvolutionChoice, FormWord, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice,
-    StoppingSpec, SupportsWord, SurfaceChoice, SurfacePde,
+    CleanWord, EvolutionChoice, MethodSpec, MetricWord, NormalsChoice, ProblemSpec, SolverChoice, StoppingSpec,
+    SupportsWord, SurfaceChoice, SurfacePde,
 };
 use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
 use crate::geometry::Vector;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
-use crate::operators::Support;
 use crate::operators::charts::tangent::Metric;
 use crate::point_clouds::Bump;
 use crate::scene::cloud::CloudReference;
 use crate::scene::{Planned, SceneSpec};
 use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method};
-use crate::spec::choice::with_defaults;
 use crate::spec::{Choice, Given, Parameter, Preset, Violation};
 use crate::time::FixedStep;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// Where normals come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,13 +34,6 @@ pub(super) enum Normals {
     Given {
         must_be_there: bool,
     },
-}
-
-/// The method of the scene.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Scheme {
-    Dcpse(Method),
-    Embedding { order: usize, spacing: f64 },
 }
 
 pub(super) struct SurfaceScene {
@@ -60,29 +53,6 @@ pub(super) struct SurfaceScene {
 
 /// Distances of points whose squares are numbers.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
-
-/// Degree and r_c/δn of an order: the smallest support that holds twice as many neighbors as there are functions, about; larger
-/// ones have larger errors (measured on plane waves). Points as drawn at random want more: with less, operators have growing modes.
-fn support(order: u64, is_curve: bool, is_copies: bool, sampling: Sampling) -> Option<(usize, f64)> {
-    let degree = match order {
-        2 | 4 | 6 => order as usize + 1,
-        _ => return None,
-    };
-    let is_raw = sampling == Sampling::Random { is_relaxed: false };
-    let cutoff = match (is_copies, is_curve, order) {
-        (true, true, _) => 4.1,
-        (true, false, _) => 2.9,
-        // On a curve neighbors lie in a row.
-        (false, true, 2) => 3.4,
-        (false, true, 4) => 5.4,
-        (false, true, _) => 7.4,
-        (false, false, _) if is_raw => 3.0 + 0.25 * order as f64,
-        (false, false, 2) => 2.4,
-        (false, false, 4) => 3.3,
-        (false, false, _) => 4.2,
-    };
-    Some((degree, cutoff))
-}
 
 impl SceneSpec for SurfacePde {
     fn plan(self) -> Planned {
@@ -130,6 +100,8 @@ fn plan(mut spec: SurfacePde) -> Planned {
         ProblemChoice::Poisson { .. } | ProblemChoice::Curvature { .. } | ProblemChoice::Gradient { .. } => {
             FixedStep { time_step: 1.0, steps: 1 }
         }
+        ProblemChoice::GeodesicDistance { .. } => FixedStep { time_step: 1.0, steps: 1 },
+        ProblemChoice::Eigenvalues { count } => FixedStep { time_step: 1.0, steps: *count as u64 },
         ProblemChoice::Evolution { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
     };
     fill_in_steps(&mut spec.problem, &problem, fixed);
@@ -183,6 +155,10 @@ fn check_form(
     if is_conservative && is_pointwise {
         let detail = "the rows of the conservative form are right in equations only, not point by point";
         errors.push(Violation::new("/method", "conflict", detail, "conservative", json!(["auto", "surface_dcpse"])));
+    }
+    if matches!(problem, Some(ProblemChoice::GeodesicDistance { .. })) && !matches!(form, Form::Stars { .. }) {
+        let detail = "distances take the exchange between the stars of points, and gradients by fits along them";
+        errors.push(Violation::new("/method", "conflict", detail, given.method.to_json(), json!(["auto"])));
     }
     let has_held_points = matches!(problem, Some(ProblemChoice::Poisson { is_dirichlet: true, .. }));
     solvers::check_cg(given.solver.as_ref(), (is_conservative, has_held_points), errors);
@@ -249,6 +225,8 @@ fn fill_in_steps(spec: &mut ProblemSpec, planned: &ProblemChoice, fixed: FixedSt
         ProblemSpec::LaplaceBeltrami { .. }
         | ProblemSpec::Gradient { .. }
         | ProblemSpec::Poisson { .. }
+        | ProblemSpec::Eigenvalues { .. }
+        | ProblemSpec::GeodesicDistance { .. }
         | ProblemSpec::Curvature => {}
     }
 }
@@ -270,7 +248,7 @@ pub(super) fn choices(
         _ => Metric::FromHeights,
     };
     let solver = solvers::solver(spec.solver.get_or_insert_with(|| default_solver(shape)));
-    let scheme = scheme(spec, Points { shape, sampling, count, metric }, errors);
+    let scheme = methods::scheme(spec, Points { shape, sampling, count, metric }, errors);
     (scheme, problems::plan(spec, shape, (metric, solver), errors))
 }
 
@@ -309,7 +287,7 @@ fn shape(spec: &SurfacePde, errors: &mut Vec<Violation>) -> Shape {
             Shape::Ellipsoid(Ellipsoid { center, semi_axes: Vector::<3>::repeat(*radius) })
         }
         SurfaceChoice::Ellipsoid { semi_axes } => {
-            let semi_axes = problems::vector_in_space(semi_axes, "/surface/semi_axes", errors);
+            let semi_axes = vector_in_space(semi_axes, "/surface/semi_axes", errors);
             Shape::Ellipsoid(Ellipsoid { center, semi_axes })
         }
         SurfaceChoice::Torus { major_radius, minor_radius } => {
@@ -322,163 +300,5 @@ fn shape(spec: &SurfacePde, errors: &mut Vec<Violation>) -> Shape {
         }
         SurfaceChoice::Bump { height } => Shape::Bump(Bump { height: *height }),
         SurfaceChoice::Points { .. } => Shape::Points(Extent::unknown(spec.dimension.unwrap_or(3))),
-    }
-}
-
-/// The points that operators are made on.
-/// Points of a surface with fewer of them do not support fits of order 4.
-const FEW_FOR_ORDER_4: u64 = 160;
-
-#[derive(Clone, Copy)]
-struct Points<'a> {
-    shape: &'a Shape,
-    sampling: Sampling,
-    count: u64,
-    metric: Metric,
-}
-
-fn wrong_order(order: u64, allowed: Value) -> Violation {
-    Violation::new("/method/order", "range", "there is no method of this order", order, allowed)
-}
-
-fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) -> Option<Scheme> {
-    let default = || with_defaults(if points.is_given() { "auto" } else { "surface_dcpse" });
-    match spec.method.get_or_insert_with(default) {
-        MethodSpec::ClosestPoint { order, spacing } => {
-            if *order != 2 && *order != 4 {
-                errors.push(wrong_order(*order, json!([2, 4])));
-            }
-            // The default of points from outside is not a wish for normals.
-            let default = NormalsChoice::Given { metric: MetricWord::Heights };
-            let is_wish = |normals: &&NormalsChoice| **normals != NormalsChoice::Exact && **normals != default;
-            if let Some(given) = spec.normals.as_ref().filter(is_wish) {
-                let detail = "the embedding method has exact closest points and asks for no normals";
-                errors.push(Violation::new("/normals", "conflict", detail, given.name(), json!(["exact"])));
-            }
-            let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
-            Some(Scheme::Embedding { order: *order as usize, spacing: grid })
-        }
-        MethodSpec::Auto { order, cutoff_dn } => points.auto(order, cutoff_dn, &spec.problem, errors),
-        MethodSpec::Conservative => {
-            // The support of the lowest order stands for lengths and counts.
-            let support = points.by_stars(2, &mut None, (false, false), errors)?;
-            let Scheme::Dcpse(Method { support, .. }) = support else { return None };
-            Some(Scheme::Dcpse(Method { support, form: Form::Conservative }))
-        }
-        MethodSpec::SurfaceDcpse { order, form: FormWord::Copies, cutoff_dn, layers, normal_spacing, supports } => {
-            let (degree, default_cutoff) = points.support(*order, true, errors)?;
-            let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
-            let (default_layers, default_spacing) = points.copies();
-            let layers = *layers.get_or_insert(default_layers);
-            let apart = *normal_spacing.get_or_insert(default_spacing);
-            if points.metric == Metric::FromHeights || matches!(points.shape, Shape::Bump(_) | Shape::Points(_)) {
-                let detail = "copies along normals want exact normals and a closed surface";
-                errors.push(Violation::new("/method/form", "conflict", detail, "copies", json!(["intrinsic"])));
-            }
-            if let Some(given) = supports {
-                let detail = "the neighbors of copies lie within one radius";
-                errors.push(Violation::new("/method/supports", "conflict", detail, given.to_json(), Value::Null));
-            }
-            let support = Support { degree, radius: cutoff_dn * apart };
-            Some(Scheme::Dcpse(Method { support, form: Form::Copies { layers, spacing: apart } }))
-        }
-        MethodSpec::SurfaceDcpse { order, form: FormWord::Intrinsic, cutoff_dn, layers, normal_spacing, supports } => {
-            for (name, given) in [("layers", layers.to_json()), ("normal_spacing", normal_spacing.to_json())] {
-                if !given.is_null() {
-                    let (at, detail) = (format!("/method/{name}"), "there are no copies in the intrinsic form");
-                    errors.push(Violation::new(at, "conflict", detail, given, Value::Null));
-                }
-            }
-            let default = if points.is_given() { SupportsWord::Stars } else { SupportsWord::Ball };
-            if *supports.get_or_insert(default) == SupportsWord::Stars {
-                return points.by_stars(*order, cutoff_dn, (false, false), errors);
-            }
-            let (degree, default_cutoff) = points.support(*order, false, errors)?;
-            let cutoff_dn = *cutoff_dn.get_or_insert(default_cutoff);
-            points.check_fit(degree, cutoff_dn, errors);
-            let support = Support { degree, radius: cutoff_dn * points.shape.spacing(points.count) };
-            Some(Scheme::Dcpse(Method { support, form: Form::Intrinsic { metric: points.metric } }))
-        }
-    }
-}
-
-impl Points<'_> {
-    /// Whether they come from outside.
-    fn is_given(self) -> bool {
-        matches!(self.shape, Shape::Points(_))
-    }
-
-    /// Order of curvatures where none is asked for. Second derivatives of heights have the errors of order 2 on 300 points of a sphere:
-    /// 2.5 %, and 0.1 % with order 4. Noise counts as much with either.
-    fn order_of_curvature(self) -> u64 {
-        let is_known = !matches!(self.shape, Shape::Points(extent) if !extent.is_known);
-        if is_known && self.count < FEW_FOR_ORDER_4 { 2 } else { 4 }
-    }
-
-    fn support(self, order: u64, is_copies: bool, errors: &mut Vec<Violation>) -> Option<(usize, f64)> {
-        let found = support(order, self.shape.is_curve(), is_copies, self.sampling);
-        if found.is_none() {
-            errors.push(wrong_order(order, json!([2, 4, 6])));
-        }
-        found
-    }
-
-    /// The automatic choice: order 2, of curvatures 4 where nothing is asked for and the points resolve the surface for it.
-    fn auto(
-        self,
-        order: &mut Option<u64>,
-        cutoff_dn: &mut Option<f64>,
-        problem: &ProblemSpec,
-        errors: &mut Vec<Violation>,
-    ) -> Option<Scheme> {
-        if matches!(problem, ProblemSpec::Curvature) && order.is_none() {
-            // It is known when the points are read, so that it stays open in the resolved body, and the cutoff with it.
-            return self.by_stars(self.order_of_curvature(), &mut { *cutoff_dn }, (true, true), errors);
-        }
-        self.by_stars(*order.get_or_insert(2), cutoff_dn, (true, false), errors)
-    }
-
-    /// Fits by stars; the spec gets the cutoff. Supports grow by themselves, so random points take the cutoff of others.
-    fn by_stars(
-        self,
-        order: u64,
-        cutoff_dn: &mut Option<f64>,
-        (may_switch, may_lower): (bool, bool),
-        errors: &mut Vec<Violation>,
-    ) -> Option<Scheme> {
-        let (degree, default_cutoff) = Self { sampling: Sampling::Given, ..self }.support(order, false, errors)?;
-        let cutoff = *cutoff_dn.get_or_insert(default_cutoff);
-        self.check_fit(degree, cutoff, errors);
-        let support = Support { degree, radius: cutoff * self.shape.spacing(self.count) };
-        let form = Form::Stars { metric: self.metric, cutoff, may_switch, may_lower };
-        Some(Scheme::Dcpse(Method { support, form }))
-    }
-
-    /// Layers of copies and their distance, where they are not given.
-    fn copies(self) -> (u32, f64) {
-        let layers = if self.shape.is_curve() { 4 } else { 2 };
-        match self.shape {
-            Shape::Circle { radius } => (layers, 3.0 * radius / (self.count as f64 - 1.0)),
-            shape => (layers, shape.spacing(self.count)),
-        }
-    }
-
-    /// Whether there are points and neighbors enough for fits of a degree.
-    fn check_fit(self, degree: usize, cutoff_dn: f64, errors: &mut Vec<Violation>) {
-        let is_curve = self.shape.is_curve();
-        let terms = if is_curve { degree as f64 } else { ((degree + 1) * (degree + 2) / 2 - 1) as f64 };
-        // Only points whose normals differ by less than 60° count: a quarter of a sphere, less where it is flat.
-        let least_count = (8.0 * terms).ceil();
-        if (self.count as f64) < least_count {
-            let detail = format!("a fit of {terms} functions wants {least_count} points at least on a closed surface");
-            let at = if let Shape::Points(_) = self.shape { "/surface" } else { "/count" };
-            errors.push(Violation::new(at, "range", detail, self.count, json!({"least": least_count})));
-        }
-        let least_cutoff = if is_curve { 0.6 * terms } else { (1.2 * terms / std::f64::consts::PI).sqrt() };
-        if cutoff_dn < least_cutoff {
-            let detail = format!("a support must hold the neighbors that a fit of {terms} functions needs");
-            let allowed = json!({"least": least_cutoff});
-            errors.push(Violation::new("/method/cutoff_dn", "range", detail, cutoff_dn, allowed));
-        }
     }
 }

@@ -3,7 +3,8 @@
 //! exact answer.
 
 use super::edges::Edges;
-use super::plan::{Normals, Scheme, SurfaceScene, choices};
+use super::methods::Scheme;
+use super::plan::{Normals, SurfaceScene, choices};
 use super::preparation::Preparation;
 use super::problems::ProblemChoice;
 use super::spec::{CleanWord, SurfaceChoice};

@@ -1,18 +1,22 @@
 //! The problem of a scene: what it is made of, what it costs.
 
+use super::field_choices::{Site, default_field, vector_in_space};
 use super::solvers::explicit;
-use super::spec::{ConditionWord, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SurfacePde};
+use super::spec::{
+    ConditionWord, EdgesChoice, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SurfacePde,
+};
 use super::surfaces::{DEFAULT_COUNT, Shape};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::operators::charts::tangent::Metric;
 use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{
-    Condition, Curvature, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, ExactField, Model, Pointwise,
-    Poisson, Problem, Reaction, Solver, SurfaceCloud, SurfaceGradient, surface_gradient,
+    Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, ExactField,
+    GeodesicDistance, Model, Pointwise, Poisson, Problem, Reaction, Solver, SurfaceCloud, SurfaceGradient,
+    surface_gradient,
 };
 use crate::simulation::Quantity;
-use crate::spec::{Choice, Coordinates, Parameter, Violation};
+use crate::spec::{Choice, Coordinates, Parameter, Places, Violation};
 use serde_json::{Value, json};
 
 /// The planned problem.
@@ -22,6 +26,8 @@ pub(super) enum ProblemChoice {
     Gradient { field: ExactField },
     Poisson { field: ExactField, is_dirichlet: bool, solver: Solver },
     Curvature { of_heights: bool },
+    Eigenvalues { count: usize },
+    GeodesicDistance { from: Option<Vec<Vector<3>>> },
     Evolution { start: Start, end_time: f64, time_step: f64, integrator: EvolutionIntegrator },
 }
 
@@ -34,120 +40,21 @@ pub(super) enum Start {
 
 /// Steps of a run whose Δt is not given.
 const DEFAULT_STEPS: f64 = 100.0;
-/// Wave vector that is not given, by the extent of the surface.
-const DEFAULT_WAVE: [f64; 3] = [2.0, -1.0, 3.0];
-/// Wave numbers, by the extent of the surface, for which a wave has a length that numbers can tell.
-const WAVE_SIZES: std::ops::Range<f64> = 1e-6..1e6;
 
-/// A vector of three numbers; NaN where there are fewer, with an error.
-pub(super) fn vector_in_space(numbers: &Coordinates, pointer: &str, errors: &mut Vec<Violation>) -> Vector<3> {
-    if numbers.len() != 3 {
-        let detail = "a vector in space has three numbers";
-        errors.push(Violation::new(pointer, "range", detail, numbers.to_json(), 3));
-    }
-    Vector::<3>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(f64::NAN))
-}
-
-fn is_sphere(shape: &Shape) -> bool {
-    matches!(shape, Shape::Ellipsoid(e) if e.semi_axes.max() == e.semi_axes.min())
-}
-
-/// The field that is taken where none is given: an eigenfunction where the surface has known ones.
-fn default_field(shape: &Shape) -> FieldChoice {
-    use super::spec::AxisWord;
-    match shape {
-        Shape::Circle { .. } => FieldChoice::SinPlusCos { m: 1 },
-        shape if is_sphere(shape) => FieldChoice::SphericalHarmonic { l: 4, m: 0.0, axis: AxisWord::Z },
-        _ => FieldChoice::PlaneWave { k: None },
-    }
-}
-
-/// Where a field stands, and on what.
-#[derive(Clone, Copy)]
-struct Site<'a> {
-    pointer: &'a str,
-    shape: &'a Shape,
-    /// Number of points.
-    count: u64,
-}
-
-impl Site<'_> {
-    /// The exact field of a choice, which gets what was left open.
-    fn field(self, chosen: &mut FieldChoice, errors: &mut Vec<Violation>) -> ExactField {
-        let written = chosen.to_json();
-        let belongs = |is_there: bool, detail: &str, errors: &mut Vec<Violation>| {
-            if !is_there {
-                errors.push(Violation::new(self.pointer, "conflict", detail, written, json!(["plane_wave"])));
-            }
-        };
-        match chosen {
-            FieldChoice::SphericalHarmonic { l, m, axis } => {
-                belongs(is_sphere(self.shape), "spherical harmonics belong to a sphere", errors);
-                if m.abs() > f64::from(*l) || m.fract() != 0.0 {
-                    let detail = format!("the order is a whole number from −{l} to {l}");
-                    let (at, allowed) = (format!("{}/m", self.pointer), json!([-f64::from(*l), l]));
-                    errors.push(Violation::new(at, "range", detail, *m, allowed));
-                }
-                ExactField::SphericalHarmonic { l: *l, m: *m as i32, axis: *axis as usize }
-            }
-            FieldChoice::SinPlusCos { m } => {
-                let is_circle = matches!(self.shape, Shape::Circle { .. });
-                belongs(is_circle, "sin mθ + cos mθ belongs to a circle", errors);
-                if *m > self.count / 2 {
-                    let detail = format!("a wave needs two points at least, and there are {}", self.count);
-                    let (at, allowed) = (format!("{}/m", self.pointer), json!({"most": self.count / 2}));
-                    errors.push(Violation::new(at, "range", detail, *m, allowed));
-                }
-                ExactField::SinPlusCos { m: *m as u32 }
-            }
-            FieldChoice::PlaneWave { k } => ExactField::PlaneWave { k: self.wave_vector(k, errors) },
+/// Places on a surface as vectors in space.
+fn places(from: &Places, shape: &Shape, errors: &mut Vec<Violation>) -> Vec<Vector<3>> {
+    let place = |(k, place): (usize, &Coordinates)| {
+        let at = format!("/problem/from/{k}");
+        if !shape.is_curve() {
+            return vector_in_space(place, &at, errors);
         }
-    }
-
-    /// The wave vector; one that is not given is set by the extent of the surface, where it is known.
-    fn wave_vector(self, given: &mut Option<Coordinates>, errors: &mut Vec<Violation>) -> Vector<3> {
-        let shape = self.shape;
-        // Before points are read their extent is not known.
-        let is_sized = !matches!(shape, Shape::Points(extent) if !extent.is_known);
-        if given.is_none() && is_sized {
-            let wave = DEFAULT_WAVE.iter().take(shape.dimension()).map(|k| k / shape.reach());
-            *given = Some(Coordinates(wave.collect()));
+        if place.len() != 2 {
+            let detail = "a place in the plane has two numbers";
+            errors.push(Violation::new(at, "range", detail, place.to_json(), 2));
         }
-        let Some(numbers) = given else { return Vector::<3>::from(DEFAULT_WAVE) };
-        let at = format!("{}/k", self.pointer);
-        let k = if shape.is_curve() {
-            if numbers.len() != 2 {
-                let detail = "a vector in the plane has two numbers";
-                errors.push(Violation::new(at.clone(), "range", detail, numbers.to_json(), 2));
-            }
-            Vector::<3>::from_fn(|d, _| if d < 2 { numbers.get(d).copied().unwrap_or(f64::NAN) } else { 0.0 })
-        } else {
-            vector_in_space(numbers, &at, errors)
-        };
-        let size = k.norm() * shape.reach();
-        if is_sized && !size.is_nan() && !WAVE_SIZES.contains(&size) {
-            let detail = "the wave length is too small or too large beside the surface";
-            errors.push(Violation::new(at, "range", detail, numbers.to_json(), Value::Null));
-        }
-        k
-    }
-
-    /// The exact field of a choice of fields at the start.
-    fn initial(self, chosen: &mut InitialChoice, errors: &mut Vec<Violation>) -> ExactField {
-        match chosen {
-            InitialChoice::Field(field) => self.field(field, errors),
-            InitialChoice::TruncatedGaussian { center, sigma } => {
-                let center = vector_in_space(center, &format!("{}/center", self.pointer), errors);
-                ExactField::TruncatedGaussian { center, sigma: *sigma }
-            }
-        }
-    }
-}
-
-/// The gradient of a field, which gets what was left open.
-fn gradient(site: Site, field: &mut Option<FieldChoice>, errors: &mut Vec<Violation>) -> ProblemChoice {
-    let field = field.get_or_insert(FieldChoice::PlaneWave { k: None });
-    ProblemChoice::Gradient { field: site.field(field, errors) }
+        Vector::<3>::from_fn(|d, _| if d < 2 { place.get(d).copied().unwrap_or(f64::NAN) } else { 0.0 })
+    };
+    from.0.iter().enumerate().map(place).collect()
 }
 
 /// Plans the problem on a shape; the spec gets what was left open.
@@ -160,55 +67,87 @@ pub(super) fn plan(
     let count = spec.count.unwrap_or(DEFAULT_COUNT);
     let site = |pointer| Site { pointer, shape, count };
     let name = spec.problem.name();
-    match &mut spec.problem {
+    Some(match &mut spec.problem {
         ProblemSpec::LaplaceBeltrami { field } => {
             let field = field.get_or_insert_with(|| default_field(shape));
-            Some(ProblemChoice::LaplaceBeltrami { field: site("/problem/field").field(field, errors) })
+            ProblemChoice::LaplaceBeltrami { field: site("/problem/field").field(field, errors) }
         }
-        ProblemSpec::Gradient { field } => Some(gradient(site("/problem/field"), field, errors)),
+        ProblemSpec::Gradient { field } => {
+            let field = field.get_or_insert(FieldChoice::PlaneWave { k: None });
+            ProblemChoice::Gradient { field: site("/problem/field").field(field, errors) }
+        }
         ProblemSpec::Poisson { field, condition } => {
             let field = field.get_or_insert_with(|| default_field(shape));
             let field = site("/problem/field").field(field, errors);
             check_poisson(shape, *condition, name, errors);
-            Some(ProblemChoice::Poisson { field, is_dirichlet: *condition == ConditionWord::Dirichlet, solver })
+            ProblemChoice::Poisson { field, is_dirichlet: *condition == ConditionWord::Dirichlet, solver }
         }
         ProblemSpec::Diffusion { initial, end_time, time_step, integrator, .. } => {
-            let initial = initial.get_or_insert_with(|| match shape {
-                Shape::Bump(_) => InitialChoice::TruncatedGaussian { center: [0.0, 0.0, 0.0].into(), sigma: 0.2 },
-                shape => InitialChoice::Field(default_field(shape)),
-            });
-            let start = Start::Field(site("/problem/initial").initial(initial, errors));
+            let start = Start::Field(start(site("/problem/initial"), initial, errors));
             let integrator = match integrator.get_or_insert_with(|| default_integrator(shape)) {
                 EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
                 EvolutionChoice::Bdf2 => EvolutionIntegrator::Bdf2(solver),
             };
             let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
-            Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
+            ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator }
         }
-        ProblemSpec::Curvature => Some(ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights }),
-        ProblemSpec::ReactionDiffusion {
-            model,
-            diffusivity,
-            second_diffusivity,
-            noise,
-            manufactured,
-            end_time,
-            time_step,
-            tolerance,
-        } => {
-            let exact = manufactured.as_mut().map(|field| site("/problem/manufactured").field(field, errors));
-            if let (Shape::Points(_), Some(_)) = (shape, exact) {
-                let detail = "forcing takes the exact operator, which is not known on points from outside";
-                let at = "/problem/manufactured";
-                errors.push(Violation::new(at, "conflict", detail, manufactured.to_json(), Value::Null));
-            }
-            let model = reaction(model);
-            let diffusivity = [*diffusivity, *second_diffusivity];
-            let start = Start::Reaction { model, diffusivity, noise: *noise, manufactured: exact };
-            let integrator = explicit(*tolerance, *time_step);
-            let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
-            Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
+        ProblemSpec::Eigenvalues { count } => {
+            check_eigenvalues(&spec.edges, errors);
+            ProblemChoice::Eigenvalues { count: *count as usize }
         }
+        ProblemSpec::GeodesicDistance { from } => {
+            ProblemChoice::GeodesicDistance { from: from.as_ref().map(|from| places(from, shape, errors)) }
+        }
+        ProblemSpec::Curvature => ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights },
+        ProblemSpec::ReactionDiffusion { .. } => {
+            reaction_diffusion(site("/problem/manufactured"), &mut spec.problem, errors)?
+        }
+    })
+}
+
+/// The field at the start, which gets what was left open.
+fn start(site: Site, initial: &mut Option<InitialChoice>, errors: &mut Vec<Violation>) -> ExactField {
+    let initial = initial.get_or_insert_with(|| match site.shape {
+        Shape::Bump(_) => InitialChoice::TruncatedGaussian { center: [0.0, 0.0, 0.0].into(), sigma: 0.2 },
+        shape => InitialChoice::Field(default_field(shape)),
+    });
+    site.initial(initial, errors)
+}
+
+/// Plans a reaction.
+fn reaction_diffusion(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<Violation>) -> Option<ProblemChoice> {
+    let ProblemSpec::ReactionDiffusion {
+        model,
+        diffusivity,
+        second_diffusivity,
+        noise,
+        manufactured,
+        end_time,
+        time_step,
+        tolerance,
+    } = problem
+    else {
+        return None;
+    };
+    let exact = manufactured.as_mut().map(|field| site.field(field, errors));
+    if let (Shape::Points(_), Some(_)) = (site.shape, exact) {
+        let detail = "forcing takes the exact operator, which is not known on points from outside";
+        errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
+    }
+    let diffusivity = [*diffusivity, *second_diffusivity];
+    let start = Start::Reaction { model: reaction(model), diffusivity, noise: *noise, manufactured: exact };
+    let integrator = explicit(*tolerance, *time_step);
+    let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
+    Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
+}
+
+/// What eigenvalues do not go together with.
+fn check_eigenvalues(edges: &EdgesChoice, errors: &mut Vec<Violation>) {
+    if let EdgesChoice::Dirichlet { value, .. } = edges
+        && *value != 0.0
+    {
+        let detail = "the modes of an operator are zero at edges that hold a value";
+        errors.push(Violation::new("/edges/value", "conflict", detail, *value, 0));
     }
 }
 
@@ -285,6 +224,8 @@ impl ProblemChoice {
             Self::Poisson { solver: Solver::SparseLu, .. } => "poisson_lu",
             Self::Poisson { .. } => "poisson",
             Self::Curvature { .. } => "curvature",
+            Self::Eigenvalues { .. } => "eigenvalues",
+            Self::GeodesicDistance { .. } => "geodesic_distance",
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(Solver::SparseLu), .. } => "implicit_lu",
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => "implicit",
             Self::Evolution { .. } => "explicit",
@@ -296,6 +237,8 @@ impl ProblemChoice {
         match self {
             Self::Curvature { .. }
             | Self::Gradient { .. }
+            | Self::Eigenvalues { .. }
+            | Self::GeodesicDistance { .. }
             | Self::Poisson { .. }
             | Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => 3.0,
             _ => 1.0,
@@ -310,6 +253,8 @@ impl ProblemChoice {
             Self::Gradient { .. } => surface_gradient::shown_fields(),
             Self::Poisson { .. } => Poisson::shown_fields(is_exact),
             Self::Curvature { .. } => Curvature::shown_fields(shape.dimension()),
+            Self::Eigenvalues { .. } => Eigenmodes::shown_fields(),
+            Self::GeodesicDistance { .. } => GeodesicDistance::shown_fields(),
             Self::Evolution { start: Start::Field(field), .. } => Evolution::shown_fields(
                 false,
                 matches!(field, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. }),
@@ -328,6 +273,16 @@ impl ProblemChoice {
             Self::Curvature { of_heights: true } => Vec::new(),
             Self::Curvature { .. } | Self::Gradient { .. } => {
                 vec![PhaseWork::every_step("operators/application", 9.0 * application)]
+            }
+            Self::Eigenvalues { count } => {
+                // Factors, and so many solutions that are made orthogonal to those before.
+                let solutions = 3.0 * *count as f64 + 50.0;
+                let work = points.powf(1.5) + solutions * points * (wide + solutions);
+                vec![PhaseWork::at_milestones("solver/eigenmodes", work)]
+            }
+            Self::GeodesicDistance { .. } => {
+                let work = 2.0 * points.powf(1.5) + 20.0 * (points * wide + 3.0 * application);
+                vec![PhaseWork::every_step("solver/distances", work)]
             }
             Self::Poisson { solver: Solver::SparseLu, .. } => vec![
                 PhaseWork::every_step("solver/assembly", application),
@@ -368,7 +323,12 @@ impl ProblemChoice {
     /// Bytes a point that a solver fills beside its system, for rows of so many entries: the basis of GMRES, or a direct decomposition,
     /// n ln n entries of it on a surface (measured: 23 kB at 35 entries and 16,000 points).
     pub fn fill(&self, entries: f64, points: f64) -> f64 {
+        if let Self::Eigenvalues { count } = self {
+            // Factors, the basis, and the modes.
+            return 70.0 * entries * points.ln() + 8.0 * (5.0 * *count as f64 + 100.0);
+        }
         match self.solver() {
+            _ if matches!(self, Self::GeodesicDistance { .. }) => 2.0 * 70.0 * 7.0 * points.ln(),
             Some(Solver::SparseLu) => 70.0 * entries * points.ln(),
             Some(Solver::Gmres { restart, stopping }) => 8.0 * (stopping.max_iterations.min(restart as u64) + 1) as f64,
             _ => 0.0,
@@ -399,6 +359,11 @@ impl ProblemChoice {
                 let exact = exact.map(|exact| exact.iter().map(flat).collect());
                 Box::new(SurfaceGradient::new(values(field, cloud), exact))
             }
+            Self::Eigenvalues { count } => {
+                let shift = -shape.least_eigenvalue();
+                Box::new(Eigenmodes::new(cloud.rows, *count, shift, shape.eigenvalues(*count)))
+            }
+            Self::GeodesicDistance { from } => Box::new(distance(from.as_deref(), shape, cloud)),
             Self::Curvature { of_heights } => Box::new(Curvature::new(cloud.rows, *of_heights)),
             Self::Poisson { field, is_dirichlet, solver } => {
                 let values = values(field, cloud);
@@ -426,6 +391,25 @@ impl ProblemChoice {
             }
         })
     }
+}
+
+/// Distances from the points of a cloud nearest to given places, or from the topmost one.
+fn distance<const D: usize>(from: Option<&[Vector<3>]>, shape: &Shape, cloud: &SurfaceCloud<D>) -> GeodesicDistance {
+    let flat = |x: &Vector<3>| Vector::<D>::from_fn(|d, _| x[d]);
+    let places: Vec<Vector<D>> = match from {
+        Some(places) => places.iter().map(flat).collect(),
+        None => cloud.points[..cloud.rows]
+            .iter()
+            .max_by(|a, b| a[D - 1].total_cmp(&b[D - 1]))
+            .copied()
+            .into_iter()
+            .collect(),
+    };
+    let radius = shape.radius();
+    let exact = radius.map(|radius| {
+        move |a: &Vector<D>, b: &Vector<D>| 2.0 * radius * (0.5 * (a - b).norm() / radius).min(1.0).asin()
+    });
+    GeodesicDistance::new(&places, cloud, exact)
 }
 
 /// Points next to the plane x = 0; on a circle the one nearest to (R, 0).

@@ -2,7 +2,7 @@
 
 use crate::scene::cloud::PointsSource;
 use crate::spec::choice::with_defaults;
-use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Sign, whole};
+use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Places, Sign, whole};
 
 crate::words! {
     /// What happens to points that coincide with others, and to points far from all others.
@@ -237,6 +237,17 @@ crate::choice! {
         }
         /// mean and Gauss curvature, from normals or from points alone
         Curvature = "curvature",
+        /// −Δₛ u = λ u: the least eigenvalues, one a step, with their modes
+        Eigenvalues = "eigenvalues" {
+            /// number of eigenvalues
+            count: u64 = 16, in whole(1, 500);
+        }
+        /// distance along the surface from points of it
+        GeodesicDistance = "geodesic_distance" {
+            /// places; distances are measured from the points that are nearest to them. The point with the largest last coordinate
+            /// when not given
+            from: Option<Places>;
+        }
         /// two substances that react and diffuse
         ReactionDiffusion = "reaction_diffusion" {
             /// the reaction
@@ -285,8 +296,8 @@ crate::choice! {
     pub enum MethodSpec {
         /// fits with supports along stars; where an equation is solved and too many points have no bounded fit, the conservative form
         Auto = "auto" {
-            /// 2, 4 or 6: polynomials of degree 3, 5 or 7; the conservative form has order 2. For `curvature` 4 when not given, where
-            /// the points resolve the surface for it; else 2
+            /// 2, 4 or 6: polynomials of degree 3, 5 or 7; the conservative form has order 2. 4 when not given for `eigenvalues` and
+            /// `curvature`, where the points resolve the surface for it; else 2
             order: Option<u64>, in whole(2, 6);
             /// cutoff radius r_c in local spacings; 2.4, 3.3, 4.2 (on curves 3.4, 5.4, 7.4) when not given
             cutoff_dn: Option<f64>, in Interval::above(1.0).and_at_most(20.0);

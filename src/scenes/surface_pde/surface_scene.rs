@@ -1,6 +1,7 @@
 //! A planned `surface_pde` scene: its estimates, and the simulation that it builds.
 
-use super::plan::{Normals, Scheme, SurfaceScene};
+use super::methods::Scheme;
+use super::plan::{Normals, SurfaceScene};
 use super::points;
 use super::surfaces::{self, Shape};
 use crate::geometry::random::CounterRandom;

@@ -137,6 +137,26 @@ impl Shape {
         }
     }
 
+    /// The radius of a circle or sphere.
+    pub fn radius(&self) -> Option<f64> {
+        match self {
+            Self::Circle { radius } => Some(*radius),
+            Self::Ellipsoid(Ellipsoid { semi_axes, .. }) if semi_axes.max() == semi_axes.min() => Some(semi_axes[0]),
+            _ => None,
+        }
+    }
+
+    /// The least eigenvalues of −Δ_S, so many of them, where they are known: l(l + 1)/R² on a sphere, 2 l + 1 times each;
+    /// m²/R² on a circle, twice each but for the first.
+    pub fn eigenvalues(&self, count: usize) -> Vec<f64> {
+        let Some(radius) = self.radius() else { return Vec::new() };
+        let repeated = |l: usize| {
+            let (value, times) = if self.is_curve() { (l * l, 2.min(l + 1)) } else { (l * (l + 1), 2 * l + 1) };
+            std::iter::repeat_n(value as f64 / (radius * radius), times)
+        };
+        (0..).flat_map(repeated).take(count).collect()
+    }
+
     /// A length that all of the surface is within, about the origin or the middle of points.
     pub fn reach(&self) -> f64 {
         match self {

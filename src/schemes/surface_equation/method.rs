@@ -94,8 +94,9 @@ pub struct Operators {
 
 /// Degree and radius in local spacings of the fits that take the place of others, in order.
 const LOWER: [StarSupport; 2] = [StarSupport { degree: 5, cutoff: 3.3 }, StarSupport { degree: 3, cutoff: 2.4 }];
-/// Share of points without a bounded fit of a higher order beyond which order 2 is better for curvatures. Measured: 0 on random points of
-/// spheres, 2.7 % on the bunny of 1,839 points. There order 2 ranks mean curvatures like a fine mesh with a correlation of 0.94, order 4 with 0.91.
+/// Share of points without a bounded fit of a higher order beyond which order 2 is better for curvatures and eigenvalues. Measured: 0 on random points of
+/// spheres, 2.7 % on the bunny of 1,839 points. There order 2 ranks mean curvatures like a fine mesh with a correlation of 0.94, order 4 with 0.91, and
+/// eigenvalues of order 4 are off by up to 10 %, those of the conservative form by 3 %.
 const MOST_UNRESOLVED: f64 = 2e-3;
 /// Degree of fits with the order of the conservative form.
 const LOWEST_DEGREE: usize = 3;
@@ -191,7 +192,7 @@ impl Method {
         }
         let laplacian = wanted.iter().position(|wanted| *wanted == Wanted::LaplaceBeltrami);
         let judged = laplacian.filter(|_| purpose == Use::Equation).map(|place| &built.operators[place]);
-        let open = if degree == LOWEST_DEGREE { cloud.graph.open_count() } else { 0 };
+        let open = if degree == LOWEST_DEGREE || is_lowered { cloud.graph.open_count() } else { 0 };
         let quality = RowQuality::new(&built, judged, interrupt).with_open_points(open);
         interrupt.check()?;
         if may_switch && purpose == Use::Equation && quality.reason_to_switch().is_some() {
