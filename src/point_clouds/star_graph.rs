@@ -1,6 +1,6 @@
 //! The graph of stars: two points are neighbors where the cell of either has a facet of the other.
 
-use super::stars::Stars;
+use super::stars::{Facet, Stars};
 
 /// The symmetric graph of a cloud, with the conductance ℓ_ij = (V_ij + V_ji)/2 of each edge, where V_ij is the length of the
 /// facet of j in the cell of i by their distance.
@@ -10,6 +10,8 @@ pub struct StarGraph {
     starts: Vec<usize>,
     neighbors: Vec<u32>,
     conductances: Vec<f64>,
+    /// Middle of the facet between two points from the middle of the way, along n × (x_j − x_i); antisymmetric.
+    offsets: Vec<f64>,
     /// Area of the cell of each point, or its length on a curve.
     pub areas: Vec<f64>,
     /// Part of each point: the connected components are numbered by their smallest index.
@@ -25,21 +27,26 @@ impl StarGraph {
     #[must_use]
     pub fn new(stars: &Stars) -> Self {
         let count = stars.len();
-        let mut lists: Vec<Vec<(u32, f64)>> = (0..count)
-            .map(|i| stars.facets(i).iter().map(|facet| (facet.neighbor, 0.5 * facet.conductance)).collect())
+        let half = |facet: &Facet| 0.5 * facet.conductance;
+        let mut lists: Vec<Vec<(u32, f64, f64)>> = (0..count)
+            .map(|i| stars.facets(i).iter().map(|facet| (facet.neighbor, half(facet), facet.offset)).collect())
             .collect();
         for i in 0..count {
             for facet in stars.facets(i) {
-                lists[facet.neighbor as usize].push((i as u32, 0.5 * facet.conductance));
+                // Seen from the other side it lies clockwise.
+                lists[facet.neighbor as usize].push((i as u32, half(facet), -facet.offset));
             }
         }
         let mut graph = Self { starts: vec![0], areas: stars.areas.clone(), ..Self::default() };
         for list in &mut lists {
             // A pair has two halves at most, so the order of their sum has no effect.
-            list.sort_by_key(|(j, _)| *j);
+            list.sort_by_key(|(j, ..)| *j);
             for pair in list.chunk_by(|a, b| a.0 == b.0) {
+                let conductance: f64 = pair.iter().map(|(_, half, _)| half).sum();
+                let moment: f64 = pair.iter().map(|(_, half, offset)| half * offset).sum();
                 graph.neighbors.push(pair[0].0);
-                graph.conductances.push(pair.iter().map(|(_, half)| half).sum());
+                graph.conductances.push(conductance);
+                graph.offsets.push(if conductance > 0.0 { moment / conductance } else { 0.0 });
             }
             graph.starts.push(graph.neighbors.len());
         }
@@ -107,6 +114,12 @@ impl StarGraph {
     #[must_use]
     pub fn conductances(&self, i: usize) -> &[f64] {
         &self.conductances[self.starts[i]..self.starts[i + 1]]
+    }
+
+    /// The middle of each facet of point i from the middle of the way to the neighbor, along n × (x_j − x_i), a length.
+    #[must_use]
+    pub fn offsets(&self, i: usize) -> &[f64] {
+        &self.offsets[self.starts[i]..self.starts[i + 1]]
     }
 
     /// Numbers of points by part.

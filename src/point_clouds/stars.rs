@@ -29,6 +29,8 @@ pub struct Facet {
     pub neighbor: u32,
     /// Length of the facet by the distance of the neighbor; on a curve, one by the distance.
     pub conductance: f64,
+    /// Distance of the middle of the facet from the middle of the way to the neighbor, counter-clockwise; 0 on a curve.
+    pub offset: f64,
     /// Whether the facet that follows counter-clockwise is one of a neighbor, too: the point and both are a triangle.
     pub is_joined: bool,
 }
@@ -93,6 +95,7 @@ impl Cell {
         let facet = |(neighbor, distance): &(u32, f64)| Facet {
             neighbor: *neighbor,
             conductance: 1.0 / distance,
+            offset: 0.0,
             is_joined: false,
         };
         self.facets.extend(sides.iter().flatten().map(facet));
@@ -183,7 +186,8 @@ impl Cell {
             let to = if next == OUTER { 0.0 } else { q[0] * along[0] + q[1] * along[1] };
             self.area += 0.25 * distance * (from + to);
             let conductance = (from + to).max(0.0) / distance;
-            self.facets.push(Facet { neighbor: *neighbor, conductance, is_joined: next != OUTER });
+            let offset = 0.5 * (to - from);
+            self.facets.push(Facet { neighbor: *neighbor, conductance, offset, is_joined: next != OUTER });
         }
         self.area = self.area.max(LEAST_AREA * spacing * spacing);
     }

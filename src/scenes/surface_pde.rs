@@ -11,6 +11,7 @@ mod solvers;
 pub mod spec;
 mod surface_scene;
 mod surfaces;
+mod velocities;
 
 use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::embedding_closest_point::quantities as embedding;

@@ -7,6 +7,7 @@ use crate::simulation::Quantity;
 use crate::simulation::fields::COMMON_FIELDS;
 use crate::simulation::quantity::without_repetition;
 
+mod advection;
 mod cloud;
 mod conservative;
 mod curvature;
@@ -28,6 +29,7 @@ mod simulation;
 mod solver;
 pub mod surface_gradient;
 
+pub use advection::{Advection, Course};
 pub use cloud::SurfaceCloud;
 pub use curvature::Curvature;
 pub use eigenmodes::Eigenmodes;
@@ -55,6 +57,7 @@ pub fn all_observables() -> Vec<&'static Quantity> {
 pub fn all_fields() -> Vec<&'static Quantity> {
     without_repetition(&[
         &Evolution::shown_fields(true, true),
+        &Advection::<3>::shown_fields(true),
         &Pointwise::shown_fields(true),
         &Poisson::shown_fields(true),
         &Curvature::shown_fields(3),

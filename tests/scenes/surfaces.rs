@@ -51,6 +51,13 @@ pub fn bodies() -> Vec<Value> {
         scene(json!({"problem": {"type": "eigenvalues", "count": 4}, "surface": "torus", "method": "conservative"})),
         scene(json!({"problem": {"type": "geodesic_distance", "from": [[0, 0, 1], [1, 0, 0]]}})),
         scene(json!({"problem": "geodesic_distance", "surface": "circle"})),
+        scene(json!({"problem": {"type": "advection", "end_time": 0.2, "time_step": 0.05}})),
+        scene(
+            json!({"problem": {"type": "advection", "end_time": 0.2, "time_step": 0.05, "diffusivity": 0.1}, "surface": "circle"}),
+        ),
+        scene(
+            json!({"problem": {"type": "advection", "end_time": 0.2, "time_step": 0.05, "velocity": "stream"}, "surface": "torus"}),
+        ),
     ]
 }
 
@@ -149,6 +156,34 @@ fn memory_is_estimated_as_measured() {
         memory(&json!({"kind": "surface_pde", "problem": "poisson", "solver": solver}))
     };
     assert!((poisson(160) - poisson(60) - 100.0 * 4000.0 * 8.0).abs() < 10.0);
+}
+
+/// What is carried along a surface is neither lost nor made, and turns with the surface.
+#[test]
+fn a_field_is_carried_and_kept() {
+    for (surface, velocity) in [
+        (json!("sphere"), json!({"type": "rotation", "axis": [1, 0, 0.5]})),
+        (json!({"type": "torus", "minor_radius": 0.4}), json!("rotation")),
+        (json!("circle"), json!({"type": "rotation", "rate": -2})),
+    ] {
+        let errors: Vec<f64> = [1000, 4000]
+            .map(|count| {
+                let problem = json!({"type": "advection", "velocity": velocity, "end_time": 1});
+                let report =
+                    run(&json!({"kind": "surface_pde", "surface": surface, "count": count, "problem": problem}));
+                let mass = error(&report, "mass", "relative", None);
+                assert!(mass < 1e-13, "{surface}: {mass:e}");
+                error(&report, "value", "relative", None)
+            })
+            .to_vec();
+        assert!(errors[1] < 0.02 && errors[0] > 3.0 * errors[1], "{surface}: {errors:?}");
+    }
+    let start = json!({"type": "spherical_harmonic", "l": 2});
+    for velocity in [json!({"type": "stream", "k": [1, 2, -1]}), json!({"type": "uniform", "velocity": [0, 0, 1]})] {
+        let problem = json!({"type": "advection", "velocity": velocity, "initial": start, "end_time": 0.5});
+        let report = run(&json!({"kind": "surface_pde", "count": 2000, "problem": problem}));
+        assert!(error(&report, "mass", "relative", None) < 1e-13, "{velocity}");
+    }
 }
 
 #[test]

@@ -1,5 +1,4 @@
-//! The eigenvalues of an operator that are nearest to zero, by block Krylov spaces of its shifted inverse (Grimes, Lewis and
-//! Simon 1994).
+//! The eigenvalues of an operator that are nearest to zero, by block Krylov spaces of its shifted inverse (Grimes 1994).
 //!
 //! A Krylov space of a few vectors finds only so many copies of a repeated eigenvalue. So what was found is locked, and a new
 //! space begins with other vectors orthogonal to it, until that finds nothing that is missing.

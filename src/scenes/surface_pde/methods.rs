@@ -59,7 +59,14 @@ fn wrong_order(order: u64, allowed: Value) -> Violation {
 pub(super) fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) -> Option<Scheme> {
     let by_stars = points.is_given()
         || matches!(spec.problem, ProblemSpec::GeodesicDistance { .. } | ProblemSpec::Eigenvalues { .. });
-    let default = || with_defaults(if by_stars { "auto" } else { "surface_dcpse" });
+    let is_advection = matches!(spec.problem, ProblemSpec::Advection { .. });
+    let default = || {
+        with_defaults(match by_stars {
+            _ if is_advection => "conservative",
+            true => "auto",
+            false => "surface_dcpse",
+        })
+    };
     match spec.method.get_or_insert_with(default) {
         MethodSpec::ClosestPoint { order, spacing } => {
             if *order != 2 && *order != 4 {
@@ -75,13 +82,9 @@ pub(super) fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Vio
             let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
             Some(Scheme::Embedding { order: *order as usize, spacing: grid })
         }
+        MethodSpec::Auto { .. } if is_advection => points.conservative(errors),
         MethodSpec::Auto { order, cutoff_dn } => points.auto(order, cutoff_dn, &spec.problem, errors),
-        MethodSpec::Conservative => {
-            // The support of the lowest order stands for lengths and counts.
-            let support = points.by_stars(2, &mut None, (false, false), errors)?;
-            let Scheme::Dcpse(Method { support, .. }) = support else { return None };
-            Some(Scheme::Dcpse(Method { support, form: Form::Conservative }))
-        }
+        MethodSpec::Conservative => points.conservative(errors),
         MethodSpec::SurfaceDcpse { order, form: FormWord::Copies, cutoff_dn, layers, normal_spacing, supports } => {
             if let Some(given) = supports {
                 let detail = "the neighbors of copies lie within one radius";
@@ -155,6 +158,14 @@ impl Points<'_> {
         let support = Support { degree, radius: cutoff * self.shape.spacing(self.count) };
         let form = Form::Stars { metric: self.metric, cutoff, may_switch, may_lower };
         Some(Scheme::Dcpse(Method { support, form }))
+    }
+
+    /// Exchange between cells.
+    fn conservative(self, errors: &mut Vec<Violation>) -> Option<Scheme> {
+        // The support of the lowest order stands for lengths and counts.
+        let support = self.by_stars(2, &mut None, (false, false), errors)?;
+        let Scheme::Dcpse(Method { support, .. }) = support else { return None };
+        Some(Scheme::Dcpse(Method { support, form: Form::Conservative }))
     }
 
     /// Fits within one radius on tangent planes.

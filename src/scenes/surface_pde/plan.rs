@@ -102,7 +102,9 @@ fn plan(mut spec: SurfacePde) -> Planned {
         }
         ProblemChoice::GeodesicDistance { .. } => FixedStep { time_step: 1.0, steps: 1 },
         ProblemChoice::Eigenvalues { count } => FixedStep { time_step: 1.0, steps: *count as u64 },
-        ProblemChoice::Evolution { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
+        ProblemChoice::Evolution { end_time, time_step, .. } | ProblemChoice::Advection { end_time, time_step, .. } => {
+            FixedStep::from_limit(*end_time, *time_step)
+        }
     };
     fill_in_steps(&mut spec.problem, &problem, fixed);
     Ok(Box::new(SurfaceScene { given, spec, shape, count, sampling, normals, scheme, problem, fixed, points }))
@@ -160,6 +162,10 @@ fn check_form(
         let detail = "distances take the exchange between the stars of points, and gradients by fits along them";
         errors.push(Violation::new("/method", "conflict", detail, given.method.to_json(), json!(["auto"])));
     }
+    if matches!(problem, Some(ProblemChoice::Advection { .. })) && !is_conservative {
+        let detail = "a field is carried from cell to cell of the stars of points";
+        errors.push(Violation::new("/method", "conflict", detail, given.method.to_json(), json!(["conservative"])));
+    }
     let has_held_points = matches!(problem, Some(ProblemChoice::Poisson { is_dirichlet: true, .. }));
     solvers::check_cg(given.solver.as_ref(), (is_conservative, has_held_points), errors);
     if matches!(given.surface, SurfaceChoice::Bump { .. })
@@ -206,9 +212,8 @@ pub(super) fn of_earlier_version(given: Given) -> Preset {
 /// Writes the planned steps into the spec of an evolution. A time step alone asks for steps of that length, so a tolerance that
 /// controls steps must be written out.
 fn fill_in_steps(spec: &mut ProblemSpec, planned: &ProblemChoice, fixed: FixedStep) {
-    let ProblemChoice::Evolution { integrator, .. } = planned else { return };
-    let controlled = match integrator {
-        EvolutionIntegrator::Controlled { tolerance } => Some(*tolerance),
+    let controlled = match planned {
+        ProblemChoice::Evolution { integrator: EvolutionIntegrator::Controlled { tolerance }, .. } => Some(*tolerance),
         _ => None,
     };
     match spec {
@@ -222,6 +227,7 @@ fn fill_in_steps(spec: &mut ProblemSpec, planned: &ProblemChoice, fixed: FixedSt
             *time_step = Some(fixed.time_step);
             *tolerance = controlled;
         }
+        ProblemSpec::Advection { time_step, .. } => *time_step = Some(fixed.time_step),
         ProblemSpec::LaplaceBeltrami { .. }
         | ProblemSpec::Gradient { .. }
         | ProblemSpec::Poisson { .. }

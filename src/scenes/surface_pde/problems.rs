@@ -6,13 +6,14 @@ use super::spec::{
     ConditionWord, EdgesChoice, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SurfacePde,
 };
 use super::surfaces::{DEFAULT_COUNT, Shape};
+use super::velocities::{self, Velocity};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::operators::charts::tangent::Metric;
 use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{
-    Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, ExactField,
-    GeodesicDistance, Model, Pointwise, Poisson, Problem, Reaction, Solver, SurfaceCloud, SurfaceGradient,
+    Advection, Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse,
+    ExactField, GeodesicDistance, Model, Pointwise, Poisson, Problem, Reaction, Solver, SurfaceCloud, SurfaceGradient,
     surface_gradient,
 };
 use crate::simulation::Quantity;
@@ -28,6 +29,7 @@ pub(super) enum ProblemChoice {
     Curvature { of_heights: bool },
     Eigenvalues { count: usize },
     GeodesicDistance { from: Option<Vec<Vector<3>>> },
+    Advection { initial: ExactField, velocity: Velocity, diffusivity: f64, end_time: f64, time_step: f64 },
     Evolution { start: Start, end_time: f64, time_step: f64, integrator: EvolutionIntegrator },
 }
 
@@ -98,6 +100,13 @@ pub(super) fn plan(
         ProblemSpec::GeodesicDistance { from } => {
             ProblemChoice::GeodesicDistance { from: from.as_ref().map(|from| places(from, shape, errors)) }
         }
+        ProblemSpec::Advection { initial, velocity, diffusivity, end_time, time_step } => ProblemChoice::Advection {
+            initial: start(site("/problem/initial"), initial, errors),
+            velocity: velocities::plan(velocity, site("/problem/velocity"), errors),
+            diffusivity: *diffusivity,
+            end_time: *end_time,
+            time_step: time_step.unwrap_or(*end_time / DEFAULT_STEPS),
+        },
         ProblemSpec::Curvature => ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights },
         ProblemSpec::ReactionDiffusion { .. } => {
             reaction_diffusion(site("/problem/manufactured"), &mut spec.problem, errors)?
@@ -226,6 +235,7 @@ impl ProblemChoice {
             Self::Curvature { .. } => "curvature",
             Self::Eigenvalues { .. } => "eigenvalues",
             Self::GeodesicDistance { .. } => "geodesic_distance",
+            Self::Advection { .. } => "advection",
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(Solver::SparseLu), .. } => "implicit_lu",
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => "implicit",
             Self::Evolution { .. } => "explicit",
@@ -255,6 +265,9 @@ impl ProblemChoice {
             Self::Curvature { .. } => Curvature::shown_fields(shape.dimension()),
             Self::Eigenvalues { .. } => Eigenmodes::shown_fields(),
             Self::GeodesicDistance { .. } => GeodesicDistance::shown_fields(),
+            Self::Advection { velocity, initial, diffusivity, .. } => {
+                Advection::<3>::shown_fields(velocity.has_course(*initial, *diffusivity, shape))
+            }
             Self::Evolution { start: Start::Field(field), .. } => Evolution::shown_fields(
                 false,
                 matches!(field, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. }),
@@ -280,6 +293,8 @@ impl ProblemChoice {
                 let work = points.powf(1.5) + solutions * points * (wide + solutions);
                 vec![PhaseWork::at_milestones("solver/eigenmodes", work)]
             }
+            // Three stages of gradients and fluxes, in as many steps as stability asks for: about one a spacing.
+            Self::Advection { .. } => vec![PhaseWork::every_step("evolution", 60.0 * points * steps * inner_steps)],
             Self::GeodesicDistance { .. } => {
                 let work = 2.0 * points.powf(1.5) + 20.0 * (points * wide + 3.0 * application);
                 vec![PhaseWork::every_step("solver/distances", work)]
@@ -328,6 +343,7 @@ impl ProblemChoice {
             return 70.0 * entries * points.ln() + 8.0 * (5.0 * *count as f64 + 100.0);
         }
         match self.solver() {
+            _ if matches!(self, Self::Advection { .. }) => 400.0,
             _ if matches!(self, Self::GeodesicDistance { .. }) => 2.0 * 70.0 * 7.0 * points.ln(),
             Some(Solver::SparseLu) => 70.0 * entries * points.ln(),
             Some(Solver::Gmres { restart, stopping }) => 8.0 * (stopping.max_iterations.min(restart as u64) + 1) as f64,
@@ -362,6 +378,15 @@ impl ProblemChoice {
             Self::Eigenvalues { count } => {
                 let shift = -shape.least_eigenvalue();
                 Box::new(Eigenmodes::new(cloud.rows, *count, shift, shape.eigenvalues(*count)))
+            }
+            Self::Advection { initial, velocity, diffusivity, .. } => {
+                let (values, at) = (values(initial, cloud), |x: &Vector<D>, n: &Vector<D>| velocity.at(x, n));
+                let course = velocity.course(*initial, *diffusivity, shape, cloud);
+                if D == 2 {
+                    Box::new(Advection::new::<1>(values, &at, *diffusivity, course, cloud))
+                } else {
+                    Box::new(Advection::new::<2>(values, &at, *diffusivity, course, cloud))
+                }
             }
             Self::GeodesicDistance { from } => Box::new(distance(from.as_deref(), shape, cloud)),
             Self::Curvature { of_heights } => Box::new(Curvature::new(cloud.rows, *of_heights)),

@@ -199,6 +199,33 @@ crate::choice! {
     }
 }
 
+crate::choice! {
+    /// A tangential velocity: the tangential part of what is given.
+    pub enum VelocityChoice {
+        /// ω e × (x − c)
+        Rotation = "rotation" {
+            /// direction e of the axis; z when not given
+            axis: Option<Coordinates>;
+            /// a place c on the axis; the origin when not given
+            center: Option<Coordinates>;
+            /// angular speed ω
+            rate: f64 = 1.0;
+        }
+        /// a constant velocity
+        Uniform = "uniform" {
+            /// the velocity; 1 along x when not given
+            velocity: Option<Coordinates>;
+        }
+        /// n × ∇ₛψ with ψ = a sin(k·x): without divergence on any surface
+        Stream = "stream" {
+            /// wave vector k; when not given, (2, −1, 3) by the extent of the surface
+            k: Option<Coordinates>;
+            /// amplitude a
+            amplitude: f64 = 1.0;
+        }
+    }
+}
+
 /// Tolerances of a step.
 const STEP_TOLERANCE: Interval = Interval::at_least(1e-14).and_at_most(1.0);
 
@@ -234,6 +261,19 @@ crate::choice! {
             integrator: Option<EvolutionChoice>;
             /// condition at the edges of a bump
             edges: EdgesWord = EdgesWord::Neumann;
+        }
+        /// ∂u/∂t + ∇ₛ·(u v) = d Δₛ u with a tangential velocity v
+        Advection = "advection" {
+            /// u at the start; an eigenfunction where the surface has known ones, else `plane_wave`, when not given
+            initial: Option<InitialChoice>;
+            /// the velocity v
+            velocity: VelocityChoice = with_defaults("rotation");
+            /// diffusivity d
+            diffusivity: f64 = 0.0, in NOT_NEGATIVE;
+            /// end time T
+            end_time: f64 = 1.0, in POSITIVE;
+            /// time step Δt, which is divided as stability asks; when not given, a hundredth of T
+            time_step: Option<f64>, in POSITIVE;
         }
         /// mean and Gauss curvature, from normals or from points alone
         Curvature = "curvature",

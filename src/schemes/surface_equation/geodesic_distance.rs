@@ -1,4 +1,4 @@
-//! Distances along a surface from points of it, by the heat method (Crane, Weischedel and Wardetzky 2013).
+//! Distances along a surface from points of it, by the heat method (Crane 2013).
 //!
 //! 1. (1 − t Δ_S) u = δ with t = h²: by Varadhan's formula φ = −√t ln u is about the distance.
 //! 2. A distance has |∇_S φ| = 1. So Δ_S φ⁺ = ∇_S·(∇_S φ/|∇_S φ|) is solved, and again with φ⁺ for φ.
