@@ -161,6 +161,11 @@ pub trait Scene: Send + Sync {
     /// What pictures of its frames show.
     fn view(&self) -> View;
 
+    /// Entries of all operators together that a run can write, about; zero where a scene makes none.
+    fn operator_entries(&self, _estimate: &Estimate) -> f64 {
+        0.0
+    }
+
     /// Points from outside that the scene needs to be built.
     fn clouds(&self) -> Vec<CloudReference> {
         Vec::new()

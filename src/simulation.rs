@@ -23,6 +23,7 @@ pub use report::{Diagnostic, ErrorEntry, Report};
 pub use run::{Observer, Request, RunError, run};
 pub use section::{Component, Entry, LoadError, Section};
 
+use crate::linear_algebra::SparseRows;
 use crate::time::Clock;
 
 /// A running scene. Its future depends on the scene and [`Simulation::save`] alone.
@@ -91,10 +92,28 @@ pub trait Simulation: Send {
     /// Number of particles.
     fn particle_count(&self) -> usize;
 
+    /// Operators that a client may ask for as files, made where they are not there yet.
+    ///
+    /// # Errors
+    /// [`StepError`] when they cannot be made.
+    fn operators(&mut self) -> Result<Vec<NamedOperator<'_>>, StepError> {
+        Ok(Vec::new())
+    }
+
     /// What was noticed since the last call.
     fn take_findings(&mut self) -> Vec<Finding> {
         std::mem::take(&mut self.course_mut().findings)
     }
+}
+
+/// A linear operator on the fields of frames: row i gives its value at point i.
+pub struct NamedOperator<'a> {
+    /// Its name, as in file names.
+    pub name: &'static str,
+    /// The matrix.
+    pub rows: &'a SparseRows,
+    /// Areas of the points, where they are known.
+    pub areas: Option<&'a [f64]>,
 }
 
 /// The state of a simulation.

@@ -8,6 +8,7 @@ pub mod frame_index;
 pub mod frame_view;
 pub mod hdf5_file;
 pub mod mesh;
+pub mod operator_files;
 pub mod picture;
 pub mod speed_error;
 pub mod structure;

@@ -1,19 +1,58 @@
 //! Frames in the hands of others: h5py and VTK's own reader.
 
 use crate::service;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::process::Command;
+
+/// The Python of `make test`, which says where it is.
+fn python() -> Option<String> {
+    let found = std::env::var("MENISCUS_PYTHON").ok();
+    assert!(
+        found.is_some() || (std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none()),
+        "MENISCUS_PYTHON is not set"
+    );
+    found
+}
+
+/// Archives and texts of an operator have the same matrix for SciPy: symmetric in areas, and constants have no Laplacian.
+#[test]
+fn operators_open_in_scipy() {
+    let Some(python) = python() else { return };
+    let (directory, service) = service(&[]);
+    let mut seen = Vec::new();
+    for (format, names) in [
+        ("npz", ["laplace_beltrami.npz"].as_slice()),
+        ("matrix_market", ["laplace_beltrami.mtx", "laplace_beltrami_areas.mtx"].as_slice()),
+    ] {
+        let scene = json!({"kind": "surface_pde", "count": 500, "problem": "poisson", "method": "conservative"});
+        let id = service.submit(&json!({"scene": scene, "output": {"operators": format}}));
+        let job = service.wait_for(&id, &["succeeded"]);
+        assert_eq!(job["resolved"]["output"]["operators"], format);
+        let mut paths = Vec::new();
+        for name in names {
+            let path = directory.path().join(name);
+            std::fs::write(&path, service.get(&format!("/v1/jobs/{id}/files/{name}")).bytes).unwrap();
+            paths.push(path);
+        }
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/operators.py");
+        let output = Command::new(&python).arg(script).args(&paths).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        seen.push(serde_json::from_slice::<Value>(&output.stdout).unwrap());
+    }
+    assert_eq!(seen[0], seen[1]);
+    let number = |name: &str| seen[0][name].as_f64().unwrap();
+    assert_eq!(number("rows"), 500.0);
+    assert!((number("area") / (4.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3);
+    assert!(number("asymmetry") < 1e-14 && number("constants") < 1e-12, "{seen:?}");
+    // Scenes without operators say so.
+    let body = json!({"scene": {"kind": "vortex"}, "output": {"operators": "npz"}});
+    let refused = service.post("/v1/jobs", &body);
+    assert_eq!(refused.json()["errors"][0]["pointer"], "/output/operators");
+}
 
 #[test]
 fn frames_open_in_h5py_and_vtk_with_the_right_counts_times_and_fields() {
-    // `make test` makes the environment and says where.
-    let Ok(python) = std::env::var("MENISCUS_PYTHON") else {
-        assert!(
-            std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none(),
-            "MENISCUS_PYTHON is not set"
-        );
-        return;
-    };
+    let Some(python) = python() else { return };
     let (directory, service) = service(&[]);
     for kind in meniscus::scenes::SCENES {
         let body: Value = serde_json::from_str(kind.example).unwrap();

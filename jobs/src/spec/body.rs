@@ -134,6 +134,7 @@ pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Res
     let limits = limits(given, allowance, &mut errors);
     let estimate = scene.as_ref().map(|scene| scene.estimate(&sizes));
     if let (Some(scene), Some(estimate), Some(limits)) = (&scene, estimate, &limits) {
+        errors.extend(check_operators(given, scene.as_ref(), &estimate));
         errors.extend(check_memory(start.prefix, scene.as_ref(), &estimate, limits.memory_bytes));
     }
     if let (Some(source), Some(estimate)) = (&start.source, estimate) {
@@ -243,6 +244,14 @@ fn field_names(given: Given, scene: Option<&dyn Scene>, errors: &mut Vec<Violati
     names
 }
 
+/// An error where operators are asked for and the scene makes none.
+fn check_operators(given: Given, scene: &dyn Scene, estimate: &Estimate) -> Option<Violation> {
+    let format = given.read_inside(JobSpec::output(), OutputSpec::operators()).flatten()?;
+    let detail = "this scene makes no operators that could be written";
+    (scene.operator_entries(estimate) == 0.0)
+        .then(|| Violation::new("/output/operators", "conflict", detail, format.to_json(), Value::Null))
+}
+
 /// The limits, with what the service gives where nothing is asked for.
 fn limits(given: Given, allowance: Allowance, errors: &mut Vec<Violation>) -> Option<Limits> {
     let mut granted = |asked: Option<u64>, name: &str, most: u64| {
@@ -282,8 +291,8 @@ fn check_end(source: &RestartSource, estimate: &Estimate) -> Option<Violation> {
 fn run_options(spec: &JobSpec, fields: Vec<String>, limits: Limits) -> RunOptions {
     let output = spec.output.clone().unwrap_or_default();
     let checkpoint = Checkpoints::from(spec.checkpoint.clone().unwrap_or_default());
-    let (every_time, series_every_steps) = (output.every_time, output.series_every_steps);
-    RunOptions { output: Output { every_time, fields, series_every_steps }, checkpoint, limits }
+    let OutputSpec { every_time, series_every_steps, operators, .. } = output;
+    RunOptions { output: Output { every_time, fields, series_every_steps, operators }, checkpoint, limits }
 }
 
 fn forecast(scene: &dyn Scene, estimate: Estimate, options: &RunOptions) -> Forecast {
@@ -293,7 +302,7 @@ fn forecast(scene: &dyn Scene, estimate: Estimate, options: &RunOptions) -> Fore
         family: scene.family(),
         threads: options.limits.threads,
         memory_bytes: WORKER_BASE_BYTES.saturating_add(estimate.memory_bytes),
-        disk_bytes: forecast::disk_bytes(scene.dimension(), &estimate, options),
+        disk_bytes: forecast::disk_bytes(scene, &estimate, options),
         time: None,
     }
 }

@@ -4,7 +4,7 @@ use crate::spec::calibration::{Calibration, Measured, PhaseMeasured, TimeForecas
 use crate::spec::json_numbers::{null_is_zero, nulls_are_zero};
 use crate::spec::report::Cost;
 use crate::spec::run_options::RunOptions;
-use meniscus::scene::{Estimate, PhaseWork};
+use meniscus::scene::{Estimate, PhaseWork, Scene};
 use meniscus::scenes::work_estimate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -120,7 +120,7 @@ pub fn measured(forecast: &ForecastRecord, cost: &Cost, threads: u64) -> Vec<Pha
 
 /// Bytes of all files of a run: its frames, its series, its picture, and its checkpoints: the last one, and where they come by
 /// steps as many as are kept.
-pub(crate) fn disk_bytes(dimension: usize, estimate: &Estimate, options: &RunOptions) -> u64 {
+pub(crate) fn disk_bytes(scene: &dyn Scene, estimate: &Estimate, options: &RunOptions) -> u64 {
     const FILE: u64 = 24 << 10;
     const CHUNK: u64 = CHUNK_ROWS as u64;
     let plan = options.plan();
@@ -137,12 +137,14 @@ pub(crate) fn disk_bytes(dimension: usize, estimate: &Estimate, options: &RunOpt
     let rows = estimate.steps / plan.series_every_steps.max(1) + 2;
     let checkpoints_bytes = state.saturating_add(FILE).saturating_mul(written);
     // A picture shows every particle of the plane three times over, and a slice through those of space.
-    let picture = estimate.particles.saturating_mul(if dimension == 2 { 225 } else { 6 });
+    let operators = if options.output.operators.is_some() { 28 * scene.operator_entries(estimate) as u64 } else { 0 };
+    let picture = estimate.particles.saturating_mul(if scene.dimension() == 2 { 225 } else { 6 });
     // SQLite's whole numbers end at 2⁶³.
     frames_bytes
         .saturating_add(checkpoints_bytes)
         .saturating_add(rows.saturating_mul(160))
         .saturating_add(picture)
+        .saturating_add(operators)
         .saturating_add(40 << 10)
         .min(1 << 62)
 }

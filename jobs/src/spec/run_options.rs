@@ -1,10 +1,34 @@
 //! Output, checkpoints and limits of a run: how they are declared, and what they are once everything is filled in.
 
-use meniscus::group;
 use meniscus::simulation::OutputPlan;
-use meniscus::spec::{Json, NOT_NEGATIVE, Object, POSITIVE, Parameter, Violation, whole};
-use serde::{Deserialize, Serialize};
+use meniscus::spec::{Json, NOT_NEGATIVE, Object, POSITIVE, Parameter, Violation, Word, whole};
+use meniscus::{group, words};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::json;
+
+words! {
+    /// Formats of operators.
+    pub enum OperatorFormat {
+        /// Matrix Market, with a second file for the areas of the points
+        MatrixMarket = "matrix_market",
+        /// an archive of NumPy arrays, as `scipy.sparse.load_npz` reads it, with the areas of the points as `areas`
+        Npz = "npz",
+    }
+}
+
+impl Serialize for OperatorFormat {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
+impl<'de> Deserialize<'de> for OperatorFormat {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        Self::from_word(&word).ok_or_else(|| D::Error::custom(format!("no format of operators: {word}")))
+    }
+}
 
 group! {
     /// What to write.
@@ -13,6 +37,8 @@ group! {
         every_time: Option<f64>, in POSITIVE => restart_safe;
         /// fields of frames; all fields of the scene when not given
         fields: Option<FieldNames> => restart_safe;
+        /// the operators that a scene makes, as files of this format
+        operators: Option<OperatorFormat> => restart_safe;
         /// a series row every so many steps
         series_every_steps: u64 = 10, in whole(1, u64::MAX) => restart_safe;
     }
@@ -98,6 +124,9 @@ pub struct Output {
     pub fields: Vec<String>,
     /// Steps between rows of the series.
     pub series_every_steps: u64,
+    /// Format of the files of operators; none are written where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub operators: Option<OperatorFormat>,
 }
 
 /// When to write checkpoints.

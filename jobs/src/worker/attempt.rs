@@ -1,7 +1,7 @@
 //! One attempt at a job: build, restore, run under observers, finish, say how it ended.
 
 use crate::formats::checkpoint::{self, CheckpointError, Counters, Meta};
-use crate::formats::{frame_view, picture};
+use crate::formats::{frame_view, operator_files, picture};
 use crate::spec::attempt_files;
 use crate::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
 use crate::spec::body::ResolvedBody;
@@ -143,7 +143,9 @@ fn attempt(
             Ending::Stopped if control.interrupt().is_raised() => Ok(Verdict::Canceled),
             Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),
             Ending::Finished => {
-                let ended = Ended { simulation: simulation.as_ref(), scene: scene.as_ref(), scene_sha256, threads };
+                let operators = write_operators(directory, &options, simulation.as_mut(), &mut observers)?;
+                let ended =
+                    Ended { simulation: simulation.as_ref(), scene: scene.as_ref(), scene_sha256, threads, operators };
                 finish(spec, directory, &ended, &mut observers, log)?;
                 Ok(Verdict::Succeeded)
             }
@@ -316,6 +318,27 @@ struct Ended<'a> {
     scene: &'a dyn Scene,
     scene_sha256: String,
     threads: usize,
+    /// Files of operators.
+    operators: Vec<FileRecord>,
+}
+
+/// The files of operators that were asked for.
+fn write_operators(
+    directory: &Path,
+    options: &RunOptions,
+    simulation: &mut dyn Simulation,
+    observers: &mut Observers,
+) -> Result<Vec<FileRecord>, Failure> {
+    let Some(format) = options.output.operators else { return Ok(Vec::new()) };
+    let mut files = Vec::new();
+    for operator in simulation.operators().map_err(|error| Failure::Run(error.into()))? {
+        for (name, media_type) in operator_files::write(directory, &operator, format)? {
+            let file = FileRecord::from_file(directory, &name, media_type)?;
+            observers.sink.put(&Record::File(file.clone()), false)?;
+            files.push(file);
+        }
+    }
+    Ok(files)
 }
 
 /// Report, picture and digests of a finished run.
@@ -328,6 +351,7 @@ fn finish(
 ) -> Result<(), Failure> {
     let simulation = ended.simulation;
     let mut files: Vec<_> = observers.frames.written().iter().map(|(_, file)| file.clone()).collect();
+    files.extend_from_slice(&ended.operators);
     // The frames may be an earlier attempt's; the index of all is this one's in any case.
     files.push(observers.frames.write_index()?);
     observers.sink.put(&Record::File(files[files.len() - 1].clone()), false)?;

@@ -242,7 +242,16 @@ impl ProblemChoice {
         }
     }
 
-    /// Operators that it needs.
+    /// Operators that it makes.
+    pub fn operators(&self, dimension: usize) -> f64 {
+        match self {
+            Self::Curvature { of_heights: true } | Self::Advection { .. } => 0.0,
+            Self::Curvature { .. } | Self::Gradient { .. } | Self::GeodesicDistance { .. } => dimension as f64,
+            _ => 1.0,
+        }
+    }
+
+    /// Operators in memory at once, about.
     pub fn copies(&self) -> f64 {
         match self {
             Self::Curvature { .. }

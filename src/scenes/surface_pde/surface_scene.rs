@@ -128,6 +128,15 @@ impl Scene for SurfaceScene {
         fields
     }
 
+    fn operator_entries(&self, estimate: &Estimate) -> f64 {
+        match &self.scheme {
+            Scheme::Dcpse(method) => {
+                estimate.particles as f64 * self.entries(method) * self.problem.operators(self.shape.dimension())
+            }
+            Scheme::Embedding { .. } => 0.0,
+        }
+    }
+
     fn clouds(&self) -> Vec<CloudReference> {
         self.points.iter().cloned().collect()
     }

@@ -62,6 +62,19 @@ pub enum Wanted {
     Gradient(usize),
 }
 
+impl Wanted {
+    /// Its name, as in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LaplaceBeltrami => "laplace_beltrami",
+            Self::Gradient(0) => "gradient_x",
+            Self::Gradient(1) => "gradient_y",
+            Self::Gradient(_) => "gradient_z",
+        }
+    }
+}
+
 /// What a problem does with Δ_S.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Use {

@@ -2,7 +2,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::format_1;
-use super::method::{Form, Method, Operators, Use};
+use super::method::{Form, Method, Operators, Use, Wanted};
 use super::problem::{Problem, Tools};
 use super::quantities::{CURVATURE, NORMAL, TIME};
 use super::row_quality::RowQuality;
@@ -14,8 +14,8 @@ use crate::parallel::Interrupt;
 use crate::schemes::measured_errors::{SUPPORTS, support_diagnostics};
 use crate::simulation::course::check_finite;
 use crate::simulation::{
-    Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Mark, Observables, Phases, Report,
-    Section, Selection, Simulation, StepError,
+    Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Mark, NamedOperator, Observables, Phases,
+    Report, Section, Selection, Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
@@ -324,6 +324,17 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         diagnostics.push(Diagnostic::count("supports.coarse", self.coarse, doc));
         diagnostics.extend(self.problem.diagnostics());
         Report { errors: self.problem.errors(&self.cloud, self.clock()), health: self.health(), diagnostics, method }
+    }
+
+    fn operators(&mut self) -> Result<Vec<NamedOperator<'_>>, StepError> {
+        if self.operators.is_none() {
+            self.construct_operators()?;
+        }
+        let Some(operators) = &self.operators else { return Ok(Vec::new()) };
+        let areas =
+            if self.cloud.graph.is_empty() { self.cloud.areas.as_deref() } else { Some(&self.cloud.graph.areas[..]) };
+        let named = |(wanted, rows): (Wanted, _)| NamedOperator { name: wanted.name(), rows, areas };
+        Ok(self.problem.wanted().into_iter().zip(&operators.rows).map(named).collect())
     }
 
     fn health(&self) -> Health {
