@@ -130,6 +130,29 @@ fn distances_end_where_a_part_ends() {
     assert!(found.iter().any(|finding| finding.code == "unreached" && finding.count == 500), "{found:?}");
 }
 
+/// A deforming flow brings a body back: without diffusion the concentration is back, too. Nothing is lost on the way.
+#[test]
+fn a_concentration_comes_back_with_its_body() {
+    let cloud = bare(sphere(2000, 0.15, [0.35; 3]));
+    let motion = json!({"type": "vortex_3d", "period": 1});
+    let run = |diffusivity: f64, end: f64| {
+        let problem = json!({
+            "type": "moving_diffusion", "motion": motion, "diffusivity": diffusivity, "end_time": end, "time_step": 0.01,
+            "initial": {"type": "plane_wave", "k": [4, 8, -6]}
+        });
+        finished(&body(&json!({"problem": problem})), &cloud)
+    };
+    let start = |x: &[f64; 3]| (4.0 * x[0] + 8.0 * x[1] - 6.0 * x[2]).sin();
+    let found = column(&*run(0.0, 1.0), "value");
+    for (x, value) in cloud.positions.iter().zip(&found) {
+        assert!((start(x) - value).abs() < 1e-4, "{} {value}", start(x));
+    }
+    // Half-way the surface has another area, and diffusion has levelled the concentration; what there is is still there.
+    let report = run(1e-3, 0.5).report();
+    let mass = report.errors.iter().find(|error| error.quantity == "mass").unwrap();
+    assert!(mass.value < 1e-13, "{}", mass.value);
+}
+
 #[test]
 fn curvatures_of_a_sphere_are_those_of_its_radius() {
     let cloud = sphere(3000, 0.5, [10.0, 0.0, -3.0]);

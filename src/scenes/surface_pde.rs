@@ -3,9 +3,12 @@
 mod edges;
 mod field_choices;
 mod methods;
+mod motions;
 mod points;
 mod preparation;
+mod problem_costs;
 mod problems;
+mod simulations;
 mod plan;
 mod solvers;
 pub mod spec;

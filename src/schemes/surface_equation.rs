@@ -17,7 +17,10 @@ mod field_bounds;
 pub mod fields;
 mod geodesic_distance;
 mod format_1;
+mod material_cells;
 mod method;
+mod motion;
+mod moving_surface;
 mod pointwise;
 mod poisson;
 mod problem;
@@ -37,6 +40,8 @@ pub use evolution::{Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse}
 pub use fields::ExactField;
 pub use geodesic_distance::GeodesicDistance;
 pub use method::{Form, Method};
+pub use motion::Motion;
+pub use moving_surface::{MovingParts, MovingSurface};
 pub use pointwise::Pointwise;
 pub use poisson::{Condition, Poisson};
 pub use problem::Problem;
@@ -49,7 +54,7 @@ pub use surface_gradient::SurfaceGradient;
 /// Every scalar that series may have.
 #[must_use]
 pub fn all_observables() -> Vec<&'static Quantity> {
-    without_repetition(&[quantities::OBSERVABLES, eigenmodes::OBSERVABLES])
+    without_repetition(&[quantities::OBSERVABLES, eigenmodes::OBSERVABLES, moving_surface::OBSERVABLES])
 }
 
 /// Every field that frames of this scheme may show.

@@ -58,6 +58,10 @@ pub fn bodies() -> Vec<Value> {
         scene(
             json!({"problem": {"type": "advection", "end_time": 0.2, "time_step": 0.05, "velocity": "stream"}, "surface": "torus"}),
         ),
+        scene(json!({"problem": {"type": "moving_diffusion", "end_time": 0.2, "time_step": 0.05}})),
+        scene(json!({
+            "problem": {"type": "moving_diffusion", "motion": "normal", "end_time": 0.2, "time_step": 0.05}, "surface": "circle"
+        })),
     ]
 }
 
@@ -184,6 +188,30 @@ fn a_field_is_carried_and_kept() {
         let report = run(&json!({"kind": "surface_pde", "count": 2000, "problem": problem}));
         assert!(error(&report, "mass", "relative", None) < 1e-13, "{velocity}");
     }
+}
+
+/// A concentration on a sphere or a circle that grows or shrinks falls or rises with its size, and diffuses; nothing is lost.
+#[test]
+fn a_concentration_follows_a_surface_in_motion() {
+    for (surface, motion, most) in [
+        ("sphere", json!({"type": "expansion", "rate": 0.7}), 2e-3),
+        ("sphere", json!({"type": "normal", "speed": 0.5}), 1e-2),
+        ("sphere", json!({"type": "normal", "speed": -0.3}), 1e-2),
+        ("circle", json!({"type": "normal", "speed": -0.3}), 2e-3),
+    ] {
+        let problem = json!({"type": "moving_diffusion", "motion": motion, "diffusivity": 0.05, "end_time": 1, "time_step": 0.02});
+        let report = run(&json!({"kind": "surface_pde", "surface": surface, "count": 2000, "problem": problem}));
+        let (value, mass) = (error(&report, "value", "relative", None), error(&report, "mass", "relative", None));
+        assert!(value < most && mass < 1e-13, "{surface} {motion}: {value:e}, {mass:e}");
+    }
+    let refused = |motion: Value| {
+        let problem = json!({"type": "moving_diffusion", "motion": motion});
+        let body = json!({"kind": "surface_pde", "problem": problem});
+        let errors = meniscus::scene::parse(&body, meniscus::scenes::SCENES).err().unwrap_or_default();
+        errors.first().map(|error| error.pointer.clone()).unwrap_or_default()
+    };
+    assert_eq!(refused(json!("single_vortex")), "/problem/motion/type");
+    assert_eq!(refused(json!({"type": "translation", "velocity": [1, 0]})), "/problem/motion/velocity");
 }
 
 #[test]

@@ -59,10 +59,10 @@ fn wrong_order(order: u64, allowed: Value) -> Violation {
 pub(super) fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Violation>) -> Option<Scheme> {
     let by_stars = points.is_given()
         || matches!(spec.problem, ProblemSpec::GeodesicDistance { .. } | ProblemSpec::Eigenvalues { .. });
-    let is_advection = matches!(spec.problem, ProblemSpec::Advection { .. });
+    let is_by_cells = matches!(spec.problem, ProblemSpec::Advection { .. } | ProblemSpec::MovingDiffusion { .. });
     let default = || {
         with_defaults(match by_stars {
-            _ if is_advection => "conservative",
+            _ if is_by_cells => "conservative",
             true => "auto",
             false => "surface_dcpse",
         })
@@ -82,7 +82,7 @@ pub(super) fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Vio
             let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
             Some(Scheme::Embedding { order: *order as usize, spacing: grid })
         }
-        MethodSpec::Auto { .. } if is_advection => points.conservative(errors),
+        MethodSpec::Auto { .. } if is_by_cells => points.conservative(errors),
         MethodSpec::Auto { order, cutoff_dn } => points.auto(order, cutoff_dn, &spec.problem, errors),
         MethodSpec::Conservative => points.conservative(errors),
         MethodSpec::SurfaceDcpse { order, form: FormWord::Copies, cutoff_dn, layers, normal_spacing, supports } => {

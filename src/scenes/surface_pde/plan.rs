@@ -102,9 +102,9 @@ fn plan(mut spec: SurfacePde) -> Planned {
         }
         ProblemChoice::GeodesicDistance { .. } => FixedStep { time_step: 1.0, steps: 1 },
         ProblemChoice::Eigenvalues { count } => FixedStep { time_step: 1.0, steps: *count as u64 },
-        ProblemChoice::Evolution { end_time, time_step, .. } | ProblemChoice::Advection { end_time, time_step, .. } => {
-            FixedStep::from_limit(*end_time, *time_step)
-        }
+        ProblemChoice::Evolution { end_time, time_step, .. }
+        | ProblemChoice::Advection { end_time, time_step, .. }
+        | ProblemChoice::Moving { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
     };
     fill_in_steps(&mut spec.problem, &problem, fixed);
     Ok(Box::new(SurfaceScene { given, spec, shape, count, sampling, normals, scheme, problem, fixed, points }))
@@ -162,8 +162,9 @@ fn check_form(
         let detail = "distances take the exchange between the stars of points, and gradients by fits along them";
         errors.push(Violation::new("/method", "conflict", detail, given.method.to_json(), json!(["auto"])));
     }
-    if matches!(problem, Some(ProblemChoice::Advection { .. })) && !is_conservative {
-        let detail = "a field is carried from cell to cell of the stars of points";
+    let is_by_cells = matches!(problem, Some(ProblemChoice::Advection { .. } | ProblemChoice::Moving { .. }));
+    if is_by_cells && !is_conservative {
+        let detail = "this problem takes the cells of the stars of points";
         errors.push(Violation::new("/method", "conflict", detail, given.method.to_json(), json!(["conservative"])));
     }
     let has_held_points = matches!(problem, Some(ProblemChoice::Poisson { is_dirichlet: true, .. }));
@@ -227,7 +228,9 @@ fn fill_in_steps(spec: &mut ProblemSpec, planned: &ProblemChoice, fixed: FixedSt
             *time_step = Some(fixed.time_step);
             *tolerance = controlled;
         }
-        ProblemSpec::Advection { time_step, .. } => *time_step = Some(fixed.time_step),
+        ProblemSpec::Advection { time_step, .. } | ProblemSpec::MovingDiffusion { time_step, .. } => {
+            *time_step = Some(fixed.time_step);
+        }
         ProblemSpec::LaplaceBeltrami { .. }
         | ProblemSpec::Gradient { .. }
         | ProblemSpec::Poisson { .. }

@@ -7,6 +7,7 @@ use super::methods::Scheme;
 use super::plan::{Normals, SurfaceScene, choices};
 use super::preparation::Preparation;
 use super::problems::ProblemChoice;
+use super::simulations::{self, Outside, Run};
 use super::spec::{CleanWord, SurfaceChoice};
 use super::surfaces::{Extent, Sampling, Shape};
 use crate::geometry::Vector;
@@ -19,8 +20,8 @@ use crate::point_clouds::triangulation::triangles;
 use crate::point_clouds::{Examined, PreparedCloud};
 use crate::scene::BuildContext;
 use crate::scene::cloud::{self, Clouds};
-use crate::schemes::surface_equation::{Form, Method, SurfaceCloud, SurfaceEquation};
-use crate::simulation::{Diagnostic, Finding, Mark, Simulation};
+use crate::schemes::surface_equation::{Form, Method, SurfaceCloud};
+use crate::simulation::{Finding, Mark, Simulation};
 use crate::spec::Violation;
 use serde_json::Value;
 
@@ -43,12 +44,11 @@ pub(super) fn build<const D: usize, const M: usize>(
     } else {
         Found::with_stars(scene, &points, given.as_deref(), &interrupt)?
     };
-    let Found { cloud, measure, origin, findings, marks, counted } = found;
+    let Found { cloud, measure, outside } = found;
     let shape = Shape::Points(Extent::of(&cloud.points, measure));
     let (method, problem) = planned(scene, &shape, cloud.rows)?;
-    let problem = problem.build(&shape, &cloud, scene.given.seed, scene.fixed.time_step)?;
-    let equation = SurfaceEquation::<D, M>::new(cloud, method, problem, scene.fixed, interrupt, cpu_clock);
-    Ok(Box::new(equation.on_points(origin, findings, marks).with_preparation(counted)))
+    let run = Run { seed: scene.given.seed, fixed: scene.fixed, interrupt, cpu_clock };
+    simulations::build::<D, M>(&problem, (&shape, cloud, method), run, Some(outside))
 }
 
 /// Method and problem for points whose extent is known.
@@ -67,11 +67,7 @@ struct Found<const D: usize> {
     cloud: SurfaceCloud<D>,
     /// Its length or area.
     measure: f64,
-    /// A sentence about the points for the report.
-    origin: String,
-    findings: Vec<Finding>,
-    marks: Vec<Mark>,
-    counted: Vec<Diagnostic>,
+    outside: Outside,
 }
 
 impl<const D: usize> Found<D> {
@@ -107,7 +103,7 @@ impl<const D: usize> Found<D> {
         let findings = flaws.iter().map(finding).collect();
         let marks = flaws.iter().map(|flaw| Mark { code: flaw.name(), points: flaw.points().all.clone() }).collect();
         let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
-        Ok(Self { cloud, measure, origin, findings, marks, counted: Vec::new() })
+        Ok(Self { cloud, measure, outside: Outside { origin, findings, marks, counted: Vec::new() } })
     }
 
     /// Prepares points for supports along stars, and for the conservative form.
@@ -157,7 +153,7 @@ impl<const D: usize> Found<D> {
         let mut cloud = SurfaceCloud { rows, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
         cloud.triangles = triangles;
         edges.put_into(&mut cloud);
-        Ok(Self { cloud, measure, origin, findings, marks, counted })
+        Ok(Self { cloud, measure, outside: Outside { origin, findings, marks, counted } })
     }
 }
 

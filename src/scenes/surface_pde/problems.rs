@@ -1,6 +1,7 @@
 //! The problem of a scene: what it is made of, what it costs.
 
-use super::field_choices::{Site, default_field, vector_in_space};
+use super::field_choices::{Site, default_field};
+use super::motions::{self, MotionPlan, place};
 use super::solvers::explicit;
 use super::spec::{
     ConditionWord, EdgesChoice, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SurfacePde,
@@ -10,14 +11,13 @@ use super::velocities::{self, Velocity};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::operators::charts::tangent::Metric;
-use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{
     Advection, Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse,
     ExactField, GeodesicDistance, Model, Pointwise, Poisson, Problem, Reaction, Solver, SurfaceCloud, SurfaceGradient,
     surface_gradient,
 };
 use crate::simulation::Quantity;
-use crate::spec::{Choice, Coordinates, Parameter, Places, Violation};
+use crate::spec::{Choice, Parameter, Places, Violation};
 use serde_json::{Value, json};
 
 /// The planned problem.
@@ -29,6 +29,7 @@ pub(super) enum ProblemChoice {
     Curvature { of_heights: bool },
     Eigenvalues { count: usize },
     GeodesicDistance { from: Option<Vec<Vector<3>>> },
+    Moving { initial: ExactField, motion: MotionPlan, diffusivity: f64, end_time: f64, time_step: f64 },
     Advection { initial: ExactField, velocity: Velocity, diffusivity: f64, end_time: f64, time_step: f64 },
     Evolution { start: Start, end_time: f64, time_step: f64, integrator: EvolutionIntegrator },
 }
@@ -45,18 +46,8 @@ const DEFAULT_STEPS: f64 = 100.0;
 
 /// Places on a surface as vectors in space.
 fn places(from: &Places, shape: &Shape, errors: &mut Vec<Violation>) -> Vec<Vector<3>> {
-    let place = |(k, place): (usize, &Coordinates)| {
-        let at = format!("/problem/from/{k}");
-        if !shape.is_curve() {
-            return vector_in_space(place, &at, errors);
-        }
-        if place.len() != 2 {
-            let detail = "a place in the plane has two numbers";
-            errors.push(Violation::new(at, "range", detail, place.to_json(), 2));
-        }
-        Vector::<3>::from_fn(|d, _| if d < 2 { place.get(d).copied().unwrap_or(f64::NAN) } else { 0.0 })
-    };
-    from.0.iter().enumerate().map(place).collect()
+    let places = from.0.iter().enumerate();
+    places.map(|(k, from)| place(from, shape, &format!("/problem/from/{k}"), errors)).collect()
 }
 
 /// Plans the problem on a shape; the spec gets what was left open.
@@ -100,6 +91,13 @@ pub(super) fn plan(
         ProblemSpec::GeodesicDistance { from } => {
             ProblemChoice::GeodesicDistance { from: from.as_ref().map(|from| places(from, shape, errors)) }
         }
+        ProblemSpec::MovingDiffusion { initial, motion, diffusivity, end_time, time_step } => ProblemChoice::Moving {
+            initial: start(site("/problem/initial"), initial, errors),
+            motion: motions::plan(motion, shape, errors),
+            diffusivity: *diffusivity,
+            end_time: *end_time,
+            time_step: time_step.unwrap_or(*end_time / DEFAULT_STEPS),
+        },
         ProblemSpec::Advection { initial, velocity, diffusivity, end_time, time_step } => ProblemChoice::Advection {
             initial: start(site("/problem/initial"), initial, errors),
             velocity: velocities::plan(velocity, site("/problem/velocity"), errors),
@@ -196,7 +194,7 @@ fn raised<const D: usize>(x: &Vector<D>) -> Vector<3> {
 }
 
 /// A field at the points of a cloud.
-fn values<const D: usize>(field: &ExactField, cloud: &SurfaceCloud<D>) -> Vec<f64> {
+pub(super) fn values<const D: usize>(field: &ExactField, cloud: &SurfaceCloud<D>) -> Vec<f64> {
     cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect()
 }
 
@@ -236,31 +234,10 @@ impl ProblemChoice {
             Self::Eigenvalues { .. } => "eigenvalues",
             Self::GeodesicDistance { .. } => "geodesic_distance",
             Self::Advection { .. } => "advection",
+            Self::Moving { .. } => "moving_diffusion",
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(Solver::SparseLu), .. } => "implicit_lu",
             Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => "implicit",
             Self::Evolution { .. } => "explicit",
-        }
-    }
-
-    /// Operators that it makes.
-    pub fn operators(&self, dimension: usize) -> f64 {
-        match self {
-            Self::Curvature { of_heights: true } | Self::Advection { .. } => 0.0,
-            Self::Curvature { .. } | Self::Gradient { .. } | Self::GeodesicDistance { .. } => dimension as f64,
-            _ => 1.0,
-        }
-    }
-
-    /// Operators in memory at once, about.
-    pub fn copies(&self) -> f64 {
-        match self {
-            Self::Curvature { .. }
-            | Self::Gradient { .. }
-            | Self::Eigenvalues { .. }
-            | Self::GeodesicDistance { .. }
-            | Self::Poisson { .. }
-            | Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => 3.0,
-            _ => 1.0,
         }
     }
 
@@ -274,6 +251,13 @@ impl ProblemChoice {
             Self::Curvature { .. } => Curvature::shown_fields(shape.dimension()),
             Self::Eigenvalues { .. } => Eigenmodes::shown_fields(),
             Self::GeodesicDistance { .. } => GeodesicDistance::shown_fields(),
+            Self::Moving { motion, initial, diffusivity, .. } => {
+                crate::schemes::surface_equation::MovingSurface::<3>::shown_fields(motion.has_course(
+                    *initial,
+                    *diffusivity,
+                    shape,
+                ))
+            }
             Self::Advection { velocity, initial, diffusivity, .. } => {
                 Advection::<3>::shown_fields(velocity.has_course(*initial, *diffusivity, shape))
             }
@@ -287,85 +271,16 @@ impl ProblemChoice {
         }
     }
 
-    /// Work beside the construction, in products of a row; a controlled integrator makes so many steps of one.
-    pub fn work(&self, application: f64, points: f64, steps: f64, inner_steps: f64) -> Vec<PhaseWork> {
-        let wide = points.ln().max(1.0);
-        match self {
-            Self::LaplaceBeltrami { .. } => vec![PhaseWork::every_step("operators/application", application * steps)],
-            Self::Curvature { of_heights: true } => Vec::new(),
-            Self::Curvature { .. } | Self::Gradient { .. } => {
-                vec![PhaseWork::every_step("operators/application", 9.0 * application)]
-            }
-            Self::Eigenvalues { count } => {
-                // Factors, and so many solutions that are made orthogonal to those before.
-                let solutions = 3.0 * *count as f64 + 50.0;
-                let work = points.powf(1.5) + solutions * points * (wide + solutions);
-                vec![PhaseWork::at_milestones("solver/eigenmodes", work)]
-            }
-            // Three stages of gradients and fluxes, in as many steps as stability asks for: about one a spacing.
-            Self::Advection { .. } => vec![PhaseWork::every_step("evolution", 60.0 * points * steps * inner_steps)],
-            Self::GeodesicDistance { .. } => {
-                let work = 2.0 * points.powf(1.5) + 20.0 * (points * wide + 3.0 * application);
-                vec![PhaseWork::every_step("solver/distances", work)]
-            }
-            Self::Poisson { solver: Solver::SparseLu, .. } => vec![
-                PhaseWork::every_step("solver/assembly", application),
-                // Nested dissection of a plane fills n ln n entries and takes n^1.5 operations.
-                PhaseWork::every_step("solver/factors", points.powf(1.5)),
-                PhaseWork::every_step("solver/solution", points * wide),
-            ],
-            Self::Poisson { .. } => vec![
-                PhaseWork::every_step("solver/assembly", application),
-                PhaseWork::every_step("solver/factors", 10.0 * application),
-                // Iterations grow with the number of points along a line.
-                PhaseWork::every_step("solver/solution", application * points.sqrt()),
-            ],
-            Self::Evolution { integrator: EvolutionIntegrator::Bdf2(Solver::SparseLu), .. } => {
-                // Factors of the first step and of all others.
-                let factors = 2.0 * points.powf(1.5);
-                vec![PhaseWork::every_step("solver/solution", factors + points * wide * steps)]
-            }
-            Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => {
-                vec![PhaseWork::every_step("solver/solution", 20.0 * application * steps)]
-            }
-            Self::Evolution { start, integrator, .. } => {
-                let fields = if let Start::Reaction { .. } = start { 2.0 } else { 1.0 };
-                let inner = if let EvolutionIntegrator::Controlled { .. } = integrator { inner_steps } else { 1.0 };
-                vec![PhaseWork::every_step("evolution", 6.0 * fields * application * steps * inner)]
-            }
-        }
-    }
-
-    /// The larger of the diffusivities.
-    pub fn diffusivity(&self) -> f64 {
-        match self {
-            Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => diffusivity[0].max(diffusivity[1]),
-            _ => 1.0,
-        }
-    }
-
-    /// Bytes a point that a solver fills beside its system, for rows of so many entries: the basis of GMRES, or a direct decomposition,
-    /// n ln n entries of it on a surface (measured: 23 kB at 35 entries and 16,000 points).
-    pub fn fill(&self, entries: f64, points: f64) -> f64 {
-        if let Self::Eigenvalues { count } = self {
-            // Factors, the basis, and the modes.
-            return 70.0 * entries * points.ln() + 8.0 * (5.0 * *count as f64 + 100.0);
-        }
-        match self.solver() {
-            _ if matches!(self, Self::Advection { .. }) => 400.0,
-            _ if matches!(self, Self::GeodesicDistance { .. }) => 2.0 * 70.0 * 7.0 * points.ln(),
-            Some(Solver::SparseLu) => 70.0 * entries * points.ln(),
-            Some(Solver::Gmres { restart, stopping }) => 8.0 * (stopping.max_iterations.min(restart as u64) + 1) as f64,
-            _ => 0.0,
-        }
-    }
-
     /// The field that is operated on, its values and its exact operator.
     pub fn known(&self, shape: &Shape, cloud: &SurfaceCloud<3>) -> Option<(ExactField, Vec<f64>, Vec<f64>)> {
         let Self::LaplaceBeltrami { field } = self else { return None };
         Some((*field, values(field, cloud), operated(field, shape, cloud)?))
     }
 
+    /// The problem on a surface that stays.
+    ///
+    /// # Errors
+    /// What is wrong with the values at the start; nothing where the surface moves, which has a simulation of its own.
     pub fn build<const D: usize>(
         &self,
         shape: &Shape,
@@ -374,6 +289,7 @@ impl ProblemChoice {
         time_step: f64,
     ) -> Result<Box<dyn Problem<D>>, Vec<Violation>> {
         Ok(match self {
+            Self::Moving { .. } => return Err(Vec::new()),
             Self::LaplaceBeltrami { field } => {
                 Box::new(Pointwise::new(values(field, cloud), operated(field, shape, cloud)))
             }

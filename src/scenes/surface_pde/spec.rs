@@ -1,5 +1,6 @@
 //! The parameters of a `surface_pde` scene.
 
+use crate::geometry::flows::FlowChoice;
 use crate::scene::cloud::PointsSource;
 use crate::spec::choice::with_defaults;
 use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Places, Sign, whole};
@@ -226,6 +227,25 @@ crate::choice! {
     }
 }
 
+crate::choice! {
+    /// The motion of a surface, whose points go along.
+    pub enum MotionChoice {
+        ..Flow(FlowChoice)
+        /// v = a (x − c)
+        Expansion = "expansion" {
+            /// rate a
+            rate: f64 = 0.5;
+            /// place c that stays; the origin when not given
+            center: Option<Coordinates>;
+        }
+        /// along the normals of the surface
+        Normal = "normal" {
+            /// speed, outward
+            speed: f64 = 0.1;
+        }
+    }
+}
+
 /// Tolerances of a step.
 const STEP_TOLERANCE: Interval = Interval::at_least(1e-14).and_at_most(1.0);
 
@@ -273,6 +293,19 @@ crate::choice! {
             /// end time T
             end_time: f64 = 1.0, in POSITIVE;
             /// time step Δt, which is divided as stability asks; when not given, a hundredth of T
+            time_step: Option<f64>, in POSITIVE;
+        }
+        /// ∂u/∂t + u ∇ₛ·v = d Δₛ u at points that go along with a surface that moves with v
+        MovingDiffusion = "moving_diffusion" {
+            /// u at the start; an eigenfunction where the surface has known ones, else `plane_wave`, when not given
+            initial: Option<InitialChoice>;
+            /// the motion
+            motion: MotionChoice = with_defaults("expansion");
+            /// diffusivity d
+            diffusivity: f64 = 0.1, in NOT_NEGATIVE;
+            /// end time T
+            end_time: f64 = 1.0, in POSITIVE;
+            /// time step Δt; when not given, a hundredth of T
             time_step: Option<f64>, in POSITIVE;
         }
         /// mean and Gauss curvature, from normals or from points alone

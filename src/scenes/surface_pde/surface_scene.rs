@@ -3,9 +3,11 @@
 use super::methods::Scheme;
 use super::plan::{Normals, SurfaceScene};
 use super::points;
+use super::simulations::{self, Run};
 use super::surfaces::{self, Shape};
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Surface, Vector};
+use crate::parallel::Interrupt;
 use crate::point_clouds::normals;
 use crate::point_clouds::preparation::spacings_and_graph;
 use crate::scene::cloud::{CloudReference, CloudSizes};
@@ -14,9 +16,9 @@ use crate::scene::{self, BuildContext, Estimate, Scene, View};
 use crate::scenes::work_estimate;
 use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingParts, SurfaceData};
 use crate::schemes::surface_equation::quantities::{CURVATURE, NORMAL, VALUE};
-use crate::schemes::surface_equation::{Form, Method, SurfaceCloud, SurfaceEquation};
+use crate::schemes::surface_equation::{Form, Method, SurfaceCloud};
 use crate::simulation::fields::COMMON_FIELDS;
-use crate::simulation::{OutputPlan, Quantity, Simulation};
+use crate::simulation::{CpuClock, OutputPlan, Quantity, Simulation};
 use crate::spec::Violation;
 use serde_json::Value;
 
@@ -56,6 +58,10 @@ impl SurfaceScene {
             2 => (n + 1.0) * (n + 2.0) / 2.0 - 1.0,
             _ => (n + 1.0) * (n + 2.0) * (n + 3.0) / 6.0 - 1.0,
         }
+    }
+
+    fn run(&self, interrupt: Interrupt, cpu_clock: CpuClock) -> Run {
+        Run { seed: self.spec.seed, fixed: self.fixed, interrupt, cpu_clock }
     }
 
     /// The cloud with the normals that operators are made with.
@@ -229,15 +235,18 @@ impl Scene for SurfaceScene {
             (Scheme::Dcpse(method), Shape::Circle { radius }) => {
                 let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.spec.seed);
                 let cloud = self.cloud(cloud, method.support.radius)?;
-                let problem = self.problem.build(&self.shape, &cloud, self.spec.seed, self.fixed.time_step)?;
-                Ok(Box::new(SurfaceEquation::<2, 1>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
+                simulations::build::<2, 1>(
+                    &self.problem,
+                    (&self.shape, cloud, *method),
+                    self.run(interrupt, cpu_clock),
+                    None,
+                )
             }
             (Scheme::Dcpse(method), shape) => {
                 let reach = method.support.radius;
                 let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, reach, &interrupt);
                 let cloud = self.cloud(cloud, reach)?;
-                let problem = self.problem.build(shape, &cloud, self.spec.seed, self.fixed.time_step)?;
-                Ok(Box::new(SurfaceEquation::<3, 2>::new(cloud, *method, problem, self.fixed, interrupt, cpu_clock)))
+                simulations::build::<3, 2>(&self.problem, (shape, cloud, *method), self.run(interrupt, cpu_clock), None)
             }
             (Scheme::Embedding { order, spacing }, shape) => {
                 let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, 0.0, &interrupt);

