@@ -395,7 +395,7 @@ fn estimates_of_particles_are_within_five_per_cent() {
 fn points_from_outside_are_redistanced_asked_about_and_carried_along() {
     // Particles of a circle with a level that is no distance, as somebody else's program might write them.
     let circle = |x: f64, y: f64| (x - 0.5).hypot(y - 0.5) - 0.25;
-    let mut cloud = Cloud { positions: Vec::new(), level: Some(Vec::new()), normals: None };
+    let mut cloud = Cloud { level: Some(Vec::new()), ..Cloud::default() };
     for k in 0..1600 {
         let (x, y) = (f64::from(k % 40) * 0.025, f64::from(k / 40) * 0.025 + 0.001 * f64::from(k % 7));
         cloud.positions.push([x, y, 0.0]);

@@ -29,7 +29,7 @@ fn sphere(count: usize, radius: f64, center: [f64; 3]) -> Cloud {
     let directions = fibonacci::sphere(count);
     let at = |n: &Vector<3>| std::array::from_fn(|d| center[d] + radius * n[d]);
     let normals = directions.iter().map(|n| [n[0], n[1], n[2]]).collect();
-    Cloud { positions: directions.iter().map(at).collect(), level: None, normals: Some(normals) }
+    Cloud { positions: directions.iter().map(at).collect(), normals: Some(normals), ..Cloud::default() }
 }
 
 fn bare(cloud: Cloud) -> Cloud {
@@ -96,7 +96,7 @@ fn modes_are_zero_where_an_edge_holds_zero() {
     let whole = fibonacci::sphere(3000);
     let ring = (0..97).map(|k| std::f64::consts::TAU * f64::from(k) / 97.0).map(|a| [a.cos(), a.sin(), 0.0]);
     let above = whole.iter().filter(|x| x[2] > 0.03).map(|x| [x[0], x[1], x[2]]);
-    let cloud = Cloud { positions: above.chain(ring).collect(), level: None, normals: None };
+    let cloud = Cloud { positions: above.chain(ring).collect(), ..Cloud::default() };
     let modes = |edges: Value| {
         let problem = json!({"type": "eigenvalues", "count": 3});
         let simulation = finished(&body(&json!({"problem": problem, "edges": edges})), &cloud);
@@ -151,6 +151,29 @@ fn a_concentration_comes_back_with_its_body() {
     let report = run(1e-3, 0.5).report();
     let mass = report.errors.iter().find(|error| error.quantity == "mass").unwrap();
     assert!(mass.value < 1e-13, "{}", mass.value);
+}
+
+/// Triangles that came with points are those of the frames; a corner that was merged is the point that stands for it.
+#[test]
+fn triangles_of_a_file_stay_those_of_the_surface() {
+    let mut cloud = bare(sphere(400, 1.0, [0.0; 3]));
+    let first = finished(&body(&json!({})), &cloud).fields(Selection::All).triangles;
+    assert_eq!(first.len(), 796);
+    // The same triangles as a soup: each has corners of its own.
+    let corners = first.as_flattened().iter().map(|corner| cloud.positions[*corner as usize]);
+    let soup = Cloud {
+        positions: corners.collect(),
+        triangles: (0..first.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
+        ..Cloud::default()
+    };
+    let simulation = finished(&body(&json!({})), &soup);
+    assert_eq!(simulation.particle_count(), 400);
+    assert_eq!(simulation.fields(Selection::All).triangles.len(), 796);
+    // Half of them: nothing is added.
+    cloud.triangles = first[..398].to_vec();
+    assert_eq!(finished(&body(&json!({})), &cloud).fields(Selection::All).triangles.len(), 398);
+    cloud.triangles = vec![[0, 1, 400]];
+    assert!(refusal(&body(&json!({})), &cloud).contains("triangle 0 names a point"));
 }
 
 #[test]

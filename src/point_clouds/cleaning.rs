@@ -36,6 +36,8 @@ pub struct Cleaned {
     pub merged: Option<PointList>,
     /// Strays left out.
     pub dropped: Option<PointList>,
+    /// Each point that was merged, after the one that stands for it.
+    pub twins: Vec<[usize; 2]>,
 }
 
 /// Finds points that coincide with one of a smaller index, then strays.
@@ -45,7 +47,7 @@ pub struct Cleaned {
 pub fn clean<const D: usize>(points: &[Vector<D>], cleaning: Cleaning) -> Result<Cleaned, Unusable> {
     let mut kept: Vec<usize> = (0..points.len()).collect();
     if cleaning == Cleaning::Off {
-        return Ok(Cleaned { kept, merged: None, dropped: None });
+        return Ok(Cleaned { kept, merged: None, dropped: None, twins: Vec::new() });
     }
     let mut twins = equal_points(points);
     remove(&mut kept, &twins.iter().map(|pair| pair[1]).collect::<Vec<_>>());
@@ -86,9 +88,30 @@ pub fn clean<const D: usize>(points: &[Vector<D>], cleaning: Cleaning) -> Result
         if let Some(strays) = dropped {
             return Err(Unusable::Strays(strays));
         }
-        return Ok(Cleaned { kept, merged: None, dropped: None });
+        return Ok(Cleaned { kept, merged: None, dropped: None, twins: Vec::new() });
     }
-    Ok(Cleaned { kept, merged, dropped })
+    Ok(Cleaned { kept, merged, dropped, twins })
+}
+
+impl Cleaned {
+    /// For each of `count` given points its place among those that stay: that of the point that stands for it where it was
+    /// merged, and none where it was dropped.
+    #[must_use]
+    pub fn places(&self, count: usize) -> Vec<Option<u32>> {
+        let mut places = vec![None; count];
+        self.kept.iter().enumerate().for_each(|(place, i)| places[*i] = Some(place as u32));
+        let mut stands_for: Vec<usize> = (0..count).collect();
+        self.twins.iter().for_each(|[stays, merged]| stands_for[*merged] = *stays);
+        for [_, merged] in &self.twins {
+            // The point that stands for it may have been merged later.
+            let mut last = *merged;
+            while stands_for[last] != last {
+                last = stands_for[last];
+            }
+            places[*merged] = places[last];
+        }
+        places
+    }
 }
 
 /// Removes indices from an ascending list.

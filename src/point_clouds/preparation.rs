@@ -19,6 +19,8 @@ pub struct PreparedCloud<const D: usize> {
     pub points: Vec<Vector<D>>,
     /// Index of each of them in the given cloud.
     pub kept: Vec<usize>,
+    /// Index of each given point, or of the one that it was merged with; None for strays.
+    pub places: Vec<Option<u32>>,
     /// Unit normals.
     pub normals: Vec<Vector<D>>,
     /// Whether normals were given, and not replaced as a whole.
@@ -107,10 +109,12 @@ impl<const D: usize> PreparedCloud<D> {
             }
         }
         let joined_sheets = PointList::from_condition(present.len(), |i| joins_sheets(&present, &normals, &graph, i));
+        let places = cleaned.places(points.len());
         let (kept, merged, dropped) = (cleaned.kept, cleaned.merged, cleaned.dropped);
         Ok(Self {
             points: present,
             kept,
+            places,
             normals,
             source,
             spacings,

@@ -53,6 +53,29 @@ pub fn triangles<const D: usize>(points: &[Vector<D>], normals: &[Vector<D>], st
     found
 }
 
+/// Triangles that came with a cloud, on the points that stay. `places` has the index there of each given point. Those that have lost
+/// a corner are left out, and so are repeated ones.
+#[must_use]
+pub fn given_triangles<const D: usize>(
+    given: &[[u32; 3]],
+    places: &[Option<u32>],
+    (points, normals): (&[Vector<D>], &[Vector<D>]),
+) -> Vec<[u32; 3]> {
+    if D != 3 {
+        return Vec::new();
+    }
+    let mut taken = HashSet::new();
+    let on_kept = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| places[corner as usize]);
+        let corners = [a?, b?, c?];
+        let mut sorted = corners;
+        sorted.sort_unstable();
+        let is_new = sorted[0] != sorted[1] && sorted[1] != sorted[2] && taken.insert(sorted);
+        is_new.then(|| turned(points, normals, corners))
+    };
+    given.iter().filter_map(on_kept).collect()
+}
+
 /// The corners, counter-clockwise about the sum of their normals.
 fn turned<const D: usize>(points: &[Vector<D>], normals: &[Vector<D>], [i, j, k]: [u32; 3]) -> [u32; 3] {
     let [a, b, c] = [i, j, k].map(|corner| corner as usize);

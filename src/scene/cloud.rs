@@ -8,7 +8,7 @@ use crate::spec::Violation;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Points, with a level or normals where they have some.
+/// Points, with a level, normals or triangles where they have some.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Cloud {
     /// x, y, z; z is 0 for points of the plane.
@@ -17,6 +17,8 @@ pub struct Cloud {
     pub level: Option<Vec<f64>>,
     /// Normals of a surface, of any length, one a point.
     pub normals: Option<Vec<[f64; 3]>>,
+    /// Corners of the triangles of a surface, as indices of points; empty where it has none.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// What stands at a pointer of a scene.
@@ -118,6 +120,22 @@ pub fn points_with_levels<const D: usize>(
     let known = points.into_iter().zip(level).filter(|(_, level)| !level.is_nan());
     let (points, level): (Vec<_>, Vec<_>) = known.map(|(x, level)| (x, *level)).unzip();
     if points.is_empty() { Err(refuse("no point has a phi that is a number".to_owned())) } else { Ok((points, level)) }
+}
+
+/// The triangles of a cloud, if it has some.
+///
+/// # Errors
+/// A corner that is no point.
+pub fn triangles(clouds: &Clouds, pointer: &'static str) -> Result<Vec<[u32; 3]>, Violation> {
+    let Some(cloud) = clouds.get(pointer) else { return Ok(Vec::new()) };
+    let count = cloud.positions.len();
+    match cloud.triangles.iter().position(|corners| corners.iter().any(|corner| *corner as usize >= count)) {
+        Some(place) => {
+            let detail = format!("triangle {place} names a point that is not there");
+            Err(Violation::new(pointer, "data", detail, Value::Null, json!(format!("indices below {count}"))))
+        }
+        None => Ok(cloud.triangles.clone()),
+    }
 }
 
 /// The normals of the points of a cloud, if it has some.

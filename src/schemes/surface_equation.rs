@@ -31,6 +31,7 @@ mod shape_tensor;
 mod simulation;
 mod solver;
 pub mod surface_gradient;
+mod triangle_curvature;
 
 pub use advection::{Advection, Course};
 pub use cloud::SurfaceCloud;

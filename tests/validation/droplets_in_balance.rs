@@ -192,7 +192,7 @@ fn what_cannot_be_computed_rightly_is_refused() {
 #[test]
 fn a_layer_across_the_box_stays_flat() {
     let h = 1.0 / 16.0;
-    let mut cloud = Cloud { positions: Vec::new(), level: Some(Vec::new()), normals: None };
+    let mut cloud = Cloud { level: Some(Vec::new()), ..Cloud::default() };
     for k in 0..16 * 32 {
         let (x, y) = ((f64::from(k % 16) + 0.5) * h, (f64::from(k / 16) + 0.5) * h - 1.0);
         cloud.positions.push([x, y, 0.0]);

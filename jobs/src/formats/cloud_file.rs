@@ -1,7 +1,7 @@
 //! Points in a plain format of our own: what a checked upload becomes. Numbers are little-endian doubles.
 //!
 //! `MNSCLOUD` · count (u64) · columns (u64: 3 for the positions, + 1 with a level, + 3 with normals) · positions, levels,
-//! normals, one after another.
+//! normals, one after another · corners of triangles (u32), if there are some.
 
 use meniscus::scene::Cloud;
 use std::io::{self, Read, Write};
@@ -12,15 +12,20 @@ const MAGIC: &[u8; 8] = b"MNSCLOUD";
 const HEAD: usize = 24;
 /// Columns at most.
 const MOST_COLUMNS: u64 = 7;
+/// Bytes of a triangle.
+const TRIANGLE: usize = 12;
+/// Triangles at most: a closed surface has about twice as many as points.
+const MOST_TRIANGLES: u64 = 4 * crate::spec::uploads::MOST_POINTS;
 /// Bytes of a file at most.
-pub const MOST_BYTES: u64 = HEAD as u64 + crate::spec::uploads::MOST_POINTS * MOST_COLUMNS * 8;
+pub const MOST_BYTES: u64 =
+    HEAD as u64 + crate::spec::uploads::MOST_POINTS * MOST_COLUMNS * 8 + MOST_TRIANGLES * TRIANGLE as u64;
 
 /// Writes points.
 ///
 /// # Errors
 /// When they cannot be written.
 pub fn write(out: &mut impl Write, cloud: &Cloud) -> io::Result<()> {
-    let Cloud { positions, level, normals } = cloud;
+    let Cloud { positions, level, normals, triangles } = cloud;
     let columns = 3 + u64::from(level.is_some()) + 3 * u64::from(normals.is_some());
     out.write_all(MAGIC)?;
     out.write_all(&(positions.len() as u64).to_le_bytes())?;
@@ -29,7 +34,7 @@ pub fn write(out: &mut impl Write, cloud: &Cloud) -> io::Result<()> {
     for number in positions.as_flattened().iter().chain(level.iter().flatten()).chain(normals) {
         out.write_all(&number.to_le_bytes())?;
     }
-    Ok(())
+    triangles.as_flattened().iter().try_for_each(|corner| out.write_all(&corner.to_le_bytes()))
 }
 
 /// Reads points.
@@ -45,9 +50,14 @@ pub fn read(input: &mut impl Read) -> io::Result<Cloud> {
     if head[..8] != *MAGIC || ![3, 4, 6, MOST_COLUMNS].contains(&columns) || count > crate::spec::uploads::MOST_POINTS {
         return Err(wrong());
     }
-    let mut numbers = Vec::new();
-    input.read_to_end(&mut numbers)?;
-    if numbers.len() as u64 != count * columns * 8 {
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes)?;
+    let (numbers, corners) = bytes.split_at_checked((count * columns * 8) as usize).ok_or_else(wrong)?;
+    if corners.len() % TRIANGLE != 0 {
+        return Err(wrong());
+    }
+    let corners: Vec<u32> = corners.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect();
+    if corners.iter().any(|corner| u64::from(*corner) >= count) {
         return Err(wrong());
     }
     let numbers: Vec<f64> = numbers.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
@@ -58,6 +68,7 @@ pub fn read(input: &mut impl Read) -> io::Result<Cloud> {
         positions: positions.as_chunks::<3>().0.to_vec(),
         level: has_level.then(|| level.to_vec()),
         normals: (columns >= 6).then(|| normals.as_chunks::<3>().0.to_vec()),
+        triangles: corners.as_chunks::<3>().0.to_vec(),
     })
 }
 
@@ -66,15 +77,26 @@ mod tests {
     use super::{Cloud, read, write};
 
     #[test]
+    fn triangles_name_points_that_are_there() {
+        let cloud = Cloud { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 3]], ..Cloud::default() };
+        let mut bytes = Vec::new();
+        write(&mut bytes, &cloud).unwrap();
+        assert!(read(&mut bytes.as_slice()).is_err());
+    }
+
+    #[test]
     fn points_come_back_and_half_a_file_is_refused() {
         let positions = vec![[0.5, -1.0, 0.0], [f64::MIN_POSITIVE, 2.0, 3.0]];
         for level in [None, Some(vec![0.25, -7.0])] {
             for normals in [None, Some(vec![[0.0, 0.0, 1.0], [0.5, 0.0, -2.0]])] {
-                let cloud = Cloud { positions: positions.clone(), level: level.clone(), normals };
-                let mut bytes = Vec::new();
-                write(&mut bytes, &cloud).unwrap();
-                assert_eq!(read(&mut bytes.as_slice()).unwrap(), cloud);
-                assert!(read(&mut &bytes[..bytes.len() - 1]).is_err());
+                for triangles in [Vec::new(), vec![[0, 1, 1], [1, 0, 1]]] {
+                    let (positions, level, normals) = (positions.clone(), level.clone(), normals.clone());
+                    let cloud = Cloud { positions, level, normals, triangles };
+                    let mut bytes = Vec::new();
+                    write(&mut bytes, &cloud).unwrap();
+                    assert_eq!(read(&mut bytes.as_slice()).unwrap(), cloud);
+                    assert!(read(&mut &bytes[..bytes.len() - 1]).is_err());
+                }
             }
         }
     }

@@ -49,6 +49,16 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
 }
 
 impl Mesh {
+    /// Its faces as triangles that share their first corners.
+    #[must_use]
+    pub fn triangles(&self) -> Vec<[u32; 3]> {
+        let of = |face: &Vec<u32>| {
+            let first = face[0];
+            face[1..].windows(2).map(move |pair| [first, pair[0], pair[1]]).collect::<Vec<_>>()
+        };
+        self.faces.iter().flat_map(of).collect()
+    }
+
     /// Whether every edge belongs to exactly two faces that run along it in opposite directions.
     #[must_use]
     pub fn is_closed(&self) -> bool {

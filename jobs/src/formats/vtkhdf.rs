@@ -140,7 +140,7 @@ pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
         Ok(phi) => Some(phi.read_raw()?),
         Err(_) => None,
     };
-    Ok(Cloud { positions: positions.to_vec(), level, normals: None })
+    Ok(Cloud { positions: positions.to_vec(), level, ..Cloud::default() })
 }
 
 /// Reads `normal` of the points, if they have it, from a frame or any file that is laid out like one.

@@ -62,8 +62,9 @@ fn of_mesh(purpose: Purpose, path: &Path) -> Result<(Contents, Option<Cloud>), S
     // Places have no normals.
     let is_surface = purpose == Purpose::Surface;
     let has_normals = !mesh.normals.is_empty();
+    let triangles = if is_surface { mesh.triangles() } else { Vec::new() };
     let normals = (is_surface && has_normals).then_some(mesh.normals);
-    let cloud = Cloud { positions: mesh.points, level: None, normals };
+    let cloud = Cloud { positions: mesh.points, level: None, normals, triangles };
     let contents = PointContents {
         normals: is_surface.then_some(has_normals),
         faces: is_surface.then_some(faces),

@@ -39,6 +39,7 @@ fn read_local(path: &Path, pointer: &str) -> Result<Cloud, String> {
         return Ok(cloud);
     }
     let mesh = mesh::read(&bytes)?;
+    let triangles = mesh.triangles();
     let normals = (!mesh.normals.is_empty()).then_some(mesh.normals);
-    Ok(Cloud { positions: mesh.points, level: None, normals })
+    Ok(Cloud { positions: mesh.points, level: None, normals, triangles })
 }

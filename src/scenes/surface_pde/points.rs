@@ -16,7 +16,7 @@ use crate::point_clouds::cleaning::Cleaning;
 use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
 use crate::point_clouds::given_normals::Verdict;
 use crate::point_clouds::normals;
-use crate::point_clouds::triangulation::triangles;
+use crate::point_clouds::triangulation::{given_triangles, triangles};
 use crate::point_clouds::{Examined, PreparedCloud};
 use crate::scene::BuildContext;
 use crate::scene::cloud::{self, Clouds};
@@ -37,12 +37,11 @@ pub(super) fn build<const D: usize, const M: usize>(
     let BuildContext { clouds, interrupt, cpu_clock, .. } = context;
     let points = cloud::points::<D>(&clouds, PLACE).map_err(|refused| vec![refused])?;
     let given = given_normals::<D>(&clouds, scene.normals)?;
-    drop(clouds);
     let is_ball = matches!(scene.scheme, Scheme::Dcpse(Method { form: Form::Intrinsic { .. }, .. }));
     let found = if is_ball {
         Found::within_radius(scene, points, given)?
     } else {
-        Found::with_stars(scene, &points, given.as_deref(), &interrupt)?
+        Found::with_stars(scene, (&clouds, &points), given.as_deref(), &interrupt)?
     };
     let Found { cloud, measure, outside } = found;
     let shape = Shape::Points(Extent::of(&cloud.points, measure));
@@ -109,7 +108,7 @@ impl<const D: usize> Found<D> {
     /// Prepares points for supports along stars, and for the conservative form.
     fn with_stars(
         scene: &SurfaceScene,
-        points: &[Vector<D>],
+        (clouds, points): (&Clouds, &[Vector<D>]),
         given: Option<&[Vector<D>]>,
         interrupt: &Interrupt,
     ) -> Result<Self, Vec<Violation>> {
@@ -146,7 +145,12 @@ impl<const D: usize> Found<D> {
             if prepared.graph.part_count == 1 { "part" } else { "parts" },
             if D == 2 { "a length" } else { "an area" },
         );
-        let triangles = triangles(&prepared.points, &prepared.normals, &prepared.stars);
+        let own = (prepared.points.as_slice(), prepared.normals.as_slice());
+        let given = cloud::triangles(clouds, PLACE).map_err(|refused| vec![refused])?;
+        let triangles = match given_triangles(&given, &prepared.places, own) {
+            given if given.is_empty() => triangles(own.0, own.1, &prepared.stars),
+            given => given,
+        };
         let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
         let areas = Some(graph.areas.clone());
         let rows = points.len();
@@ -198,7 +202,7 @@ mod tests {
         let positions: Vec<_> = ball.iter().enumerate().map(rough).collect();
         let build = |metric: &str| {
             let normals = Some(ball.iter().map(array).collect());
-            let cloud = Cloud { positions: positions.clone(), level: None, normals };
+            let cloud = Cloud { positions: positions.clone(), normals, ..Cloud::default() };
             let clouds = Clouds::from([("/surface", cloud)]);
             let plan = OutputPlan { every_time: None, series_every_steps: 1 };
             let (interrupt, cpu_clock) = (Interrupt::default(), CpuClock::still());

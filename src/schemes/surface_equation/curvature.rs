@@ -7,6 +7,7 @@ use super::method::Wanted;
 use super::problem::{Problem, Tools, Watched};
 use super::quantities::{CURVATURE_MEAN, GAUSS_INTEGRAL};
 use super::shape_tensor::{self, ShapeTensor};
+use super::triangle_curvature;
 use crate::geometry::Vector;
 use crate::operators::{derivative_tensor, divergence, sum_of_minors};
 use crate::schemes::measured_errors::against_exact;
@@ -48,6 +49,8 @@ pub struct Curvature {
     /// The shape tensor at each point in space; NaN before the first step.
     shapes: Vec<ShapeTensor>,
     of_heights: bool,
+    /// Points whose mean and Gauss curvature come from triangles.
+    from_triangles: u64,
 }
 
 impl Curvature {
@@ -61,7 +64,24 @@ impl Curvature {
     /// Of so many points; `of_heights`: heights are fitted.
     #[must_use]
     pub fn new(rows: usize, of_heights: bool) -> Self {
-        Self { mean: vec![0.0; rows], gauss: vec![0.0; rows], shapes: vec![[f64::NAN; 6]; rows], of_heights }
+        Self {
+            mean: vec![0.0; rows],
+            gauss: vec![0.0; rows],
+            shapes: vec![[f64::NAN; 6]; rows],
+            of_heights,
+            from_triangles: 0,
+        }
+    }
+}
+
+impl Curvature {
+    /// Mean and Gauss curvature from triangles, where these are all around a point.
+    fn take_triangles<const D: usize>(&mut self, cloud: &SurfaceCloud<D>) {
+        let found = triangle_curvature::curvatures(&cloud.points, &cloud.normals, &cloud.triangles);
+        self.from_triangles = found.iter().flatten().count() as u64;
+        for (i, [bend, gauss]) in found.iter().enumerate().filter_map(|(i, found)| Some((i, (*found)?))) {
+            (self.mean[i], self.gauss[i]) = (share(D) * bend, gauss);
+        }
     }
 }
 
@@ -82,6 +102,9 @@ impl<const D: usize> Problem<D> for Curvature {
                 (self.mean[i], self.gauss[i]) = (share(D) * bend, *gauss);
             }
             self.shapes.clone_from(&operators.shapes);
+            if operators.is_lowered {
+                self.take_triangles(cloud);
+            }
             return Ok(());
         }
         phases.measure("operators/application", || {
@@ -160,6 +183,7 @@ impl<const D: usize> Problem<D> for Curvature {
     fn save(&self, section: &mut Section) {
         section.put_reals("mean_curvature", &self.mean);
         section.put_reals("gauss_curvature", &self.gauss);
+        section.put_count("from_triangles", self.from_triangles);
         if self.shapes.iter().all(|shape| shape[0].is_finite()) {
             section.put_reals("shape_tensor", self.shapes.as_flattened());
         }
@@ -171,6 +195,8 @@ impl<const D: usize> Problem<D> for Curvature {
         // There is none before the step, and in checkpoints of earlier versions.
         let shapes =
             if section.has("shape_tensor") { section.reals_of("shape_tensor", 6 * self.mean.len())? } else { &[] };
+        let is_known = section.has("from_triangles");
+        self.from_triangles = if is_known { section.count("from_triangles")? } else { 0 };
         for (to, from) in self.shapes.iter_mut().zip(shapes.as_chunks::<6>().0) {
             *to = *from;
         }
@@ -185,6 +211,10 @@ impl<const D: usize> Problem<D> for Curvature {
 
     fn describe(&self, method: &mut BTreeMap<&'static str, String>) {
         let from = if self.of_heights { "heights fitted over the tangent planes" } else { "the shape tensor ∇_S n" };
-        method.insert("curvature", format!("from {from}"));
+        let triangles = match self.from_triangles {
+            0 => String::new(),
+            count => format!("; mean and Gauss curvature of {count} points from triangles"),
+        };
+        method.insert("curvature", format!("from {from}{triangles}"));
     }
 }

@@ -63,7 +63,7 @@ fn cylinder(cells: i64) -> Vec<Vector<3>> {
 
 fn context(points: &[Vector<3>]) -> BuildContext {
     let positions = points.iter().map(|x| [x[0], x[1], x[2]]).collect();
-    let clouds = Clouds::from([("/surface", Cloud { positions, level: None, normals: None })]);
+    let clouds = Clouds::from([("/surface", Cloud { positions, ..Cloud::default() })]);
     let plan = OutputPlan { every_time: None, series_every_steps: 1 };
     BuildContext { plan, interrupt: Interrupt::default(), cpu_clock: CpuClock::still(), clouds }
 }
