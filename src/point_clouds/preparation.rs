@@ -109,20 +109,18 @@ impl<const D: usize> PreparedCloud<D> {
             }
         }
         let joined_sheets = PointList::from_condition(present.len(), |i| joins_sheets(&present, &normals, &graph, i));
-        let places = cleaned.places(points.len());
-        let (kept, merged, dropped) = (cleaned.kept, cleaned.merged, cleaned.dropped);
         Ok(Self {
             points: present,
-            kept,
-            places,
+            places: cleaned.places(points.len()),
+            kept: cleaned.kept,
             normals,
             source,
             spacings,
             spacing,
             stars,
             graph,
-            merged,
-            dropped,
+            merged: cleaned.merged,
+            dropped: cleaned.dropped,
             verdict,
             joined_sheets,
             closed_pieces,

@@ -14,6 +14,7 @@ mod solvers;
 pub mod spec;
 mod surface_scene;
 mod surfaces;
+mod transport_spec;
 mod velocities;
 
 use crate::scene::{self, Quantities, SceneKind};

@@ -1,8 +1,8 @@
 //! The motion of a surface from its choice, and what is known of the field on it.
 
 use super::field_choices::vector_in_space;
-use super::spec::MotionChoice;
 use super::surfaces::Shape;
+use super::transport_spec::MotionChoice;
 use crate::geometry::Vector;
 use crate::geometry::flows::FlowChoice;
 use crate::schemes::surface_equation::{Course, ExactField, Motion, MovingParts};

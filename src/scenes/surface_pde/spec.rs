@@ -1,6 +1,6 @@
 //! The parameters of a `surface_pde` scene.
 
-use crate::geometry::flows::FlowChoice;
+use super::transport_spec::{MotionChoice, VelocityChoice};
 use crate::scene::cloud::PointsSource;
 use crate::spec::choice::with_defaults;
 use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Places, Sign, whole};
@@ -196,52 +196,6 @@ crate::choice! {
             b: f64 = 0.9, in POSITIVE;
             /// rate γ
             gamma: f64 = 1.0, in POSITIVE;
-        }
-    }
-}
-
-crate::choice! {
-    /// A tangential velocity: the tangential part of what is given.
-    pub enum VelocityChoice {
-        /// ω e × (x − c)
-        Rotation = "rotation" {
-            /// direction e of the axis; z when not given
-            axis: Option<Coordinates>;
-            /// a place c on the axis; the origin when not given
-            center: Option<Coordinates>;
-            /// angular speed ω
-            rate: f64 = 1.0;
-        }
-        /// a constant velocity
-        Uniform = "uniform" {
-            /// the velocity; 1 along x when not given
-            velocity: Option<Coordinates>;
-        }
-        /// n × ∇ₛψ with ψ = a sin(k·x): without divergence on any surface
-        Stream = "stream" {
-            /// wave vector k; when not given, (2, −1, 3) by the extent of the surface
-            k: Option<Coordinates>;
-            /// amplitude a
-            amplitude: f64 = 1.0;
-        }
-    }
-}
-
-crate::choice! {
-    /// The motion of a surface, whose points go along.
-    pub enum MotionChoice {
-        ..Flow(FlowChoice)
-        /// v = a (x − c)
-        Expansion = "expansion" {
-            /// rate a
-            rate: f64 = 0.5;
-            /// place c that stays; the origin when not given
-            center: Option<Coordinates>;
-        }
-        /// along the normals of the surface
-        Normal = "normal" {
-            /// speed, outward
-            speed: f64 = 0.1;
         }
     }
 }

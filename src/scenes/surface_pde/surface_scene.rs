@@ -3,6 +3,7 @@
 use super::methods::Scheme;
 use super::plan::{Normals, SurfaceScene};
 use super::points;
+use super::problems::ProblemChoice;
 use super::simulations::{self, Run};
 use super::surfaces::{self, Shape};
 use crate::geometry::random::CounterRandom;
@@ -128,7 +129,7 @@ impl Scene for SurfaceScene {
         let mut fields = self.problem.fields(&self.shape);
         fields.push(&NORMAL);
         fields.extend(COMMON_FIELDS);
-        if self.points.is_none() {
+        if self.points.is_none() && !matches!(self.problem, ProblemChoice::Moving { .. }) {
             fields.push(&CURVATURE);
         }
         fields

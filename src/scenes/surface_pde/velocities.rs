@@ -2,8 +2,9 @@
 
 use super::field_choices::{Site, vector_in_space};
 use super::motions::place;
-use super::spec::{FieldChoice, VelocityChoice};
+use super::spec::FieldChoice;
 use super::surfaces::Shape;
+use super::transport_spec::VelocityChoice;
 use crate::geometry::Vector;
 use crate::schemes::surface_equation::{Course, ExactField, SurfaceCloud};
 use crate::spec::{Coordinates, Parameter, Violation};

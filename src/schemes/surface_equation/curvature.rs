@@ -75,12 +75,20 @@ impl Curvature {
 }
 
 impl Curvature {
-    /// Mean and Gauss curvature from triangles, where these are all around a point.
+    /// Mean and Gauss curvature from triangles, but for points of an edge of the surface. Where triangles are not all around a point
+    /// within it, the Gauss curvature stays that of a fit.
     fn take_triangles<const D: usize>(&mut self, cloud: &SurfaceCloud<D>) {
         let found = triangle_curvature::curvatures(&cloud.points, &cloud.normals, &cloud.triangles);
-        self.from_triangles = found.iter().flatten().count() as u64;
-        for (i, [bend, gauss]) in found.iter().enumerate().filter_map(|(i, found)| Some((i, (*found)?))) {
-            (self.mean[i], self.gauss[i]) = (share(D) * bend, gauss);
+        let is_edge = |i: usize| cloud.conormals.get(i).is_some_and(Option::is_some);
+        self.from_triangles = 0;
+        for (i, found) in found.iter().enumerate().filter(|(i, _)| !is_edge(*i)) {
+            if let Some(bend) = found.bend {
+                self.mean[i] = share(D) * bend;
+                self.from_triangles += 1;
+            }
+            if let Some(gauss) = found.gauss {
+                self.gauss[i] = gauss;
+            }
         }
     }
 }
