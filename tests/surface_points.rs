@@ -105,9 +105,48 @@ fn modes_are_zero_where_an_edge_holds_zero() {
     };
     for (edges, exact) in [(json!("neumann"), [0.0, 2.0, 2.0]), (json!("dirichlet"), [2.0, 6.0, 6.0])] {
         let found = modes(edges.clone());
+        assert_eq!(found.len(), 3, "{edges}");
         let is_near = |(value, exact): (&f64, &f64)| (value - exact).abs() < 0.02 * exact + 1e-8;
         assert!(found.iter().zip(&exact).all(is_near), "{edges}: {found:?}");
     }
+}
+
+/// More modes than points, and a source far from the surface: a run ends, or a person is told.
+#[test]
+fn what_is_asked_of_too_few_points_is_refused_or_told() {
+    let cloud = bare(sphere(150, 1.0, [0.0; 3]));
+    let problem = json!({"type": "eigenvalues", "count": 200});
+    let refused = build(&body(&json!({"problem": problem, "method": "conservative"})), &cloud).err().unwrap();
+    assert_eq!(refused[0].pointer, "/problem/count");
+    let problem = json!({"type": "geodesic_distance", "from": [[0, 0, 4]]});
+    let found = finished(&body(&json!({"problem": problem})), &cloud).take_findings();
+    assert!(found.iter().any(|finding| finding.code == "source_far"), "{found:?}");
+}
+
+/// A sheet that is pulled apart is torn; a body that a flow turns inside out ends the run.
+#[test]
+fn surfaces_that_move_too_far_are_told_or_end_the_run() {
+    let cloud = bare(sphere(600, 0.15, [0.35; 3]));
+    let moving = |motion: Value, end: f64, step: f64| {
+        let problem = json!({"type": "moving_diffusion", "motion": motion, "end_time": end, "time_step": step});
+        let mut simulation = build(&body(&json!({"problem": problem})), &cloud).unwrap();
+        pool(2).install(|| {
+            while !simulation.is_finished() {
+                if let Err(error) = simulation.step() {
+                    return (error.to_string(), simulation);
+                }
+            }
+            (String::new(), simulation)
+        })
+    };
+    let (reason, _) = moving(json!({"type": "normal", "speed": -0.2}), 1.5, 0.05);
+    assert!(reason.contains("inside out"), "{reason}");
+    let (reason, mut simulation) = moving(json!({"type": "vortex_3d", "period": null}), 2.5, 0.02);
+    let told = simulation.take_findings();
+    assert!(
+        !reason.is_empty() || told.iter().any(|finding| ["torn", "uneven"].contains(&&*finding.code)),
+        "{reason} {told:?}"
+    );
 }
 
 /// Points on parts without a source have no distance, and a person is told so.

@@ -204,6 +204,11 @@ fn a_concentration_follows_a_surface_in_motion() {
         let (value, mass) = (error(&report, "value", "relative", None), error(&report, "mass", "relative", None));
         assert!(value < most && mass < 1e-13, "{surface} {motion}: {value:e}, {mass:e}");
     }
+    let inward = json!({"type": "moving_diffusion", "motion": {"type": "normal", "speed": -2}, "end_time": 0.6});
+    let refusal = meniscus::scene::parse(&json!({"kind": "surface_pde", "problem": inward}), meniscus::scenes::SCENES)
+        .err()
+        .unwrap();
+    assert!(refusal[0].pointer == "/problem/motion/speed" && refusal[0].detail.contains("shrinks"), "{refusal:?}");
     let refused = |motion: Value| {
         let problem = json!({"type": "moving_diffusion", "motion": motion});
         let body = json!({"kind": "surface_pde", "problem": problem});

@@ -15,7 +15,7 @@ const MOST_COLUMNS: u64 = 7;
 /// Bytes of a triangle.
 const TRIANGLE: usize = 12;
 /// Triangles at most: a closed surface has about twice as many as points.
-const MOST_TRIANGLES: u64 = 4 * crate::spec::uploads::MOST_POINTS;
+pub const MOST_TRIANGLES: u64 = 4 * crate::spec::uploads::MOST_POINTS;
 /// Bytes of a file at most.
 pub const MOST_BYTES: u64 =
     HEAD as u64 + crate::spec::uploads::MOST_POINTS * MOST_COLUMNS * 8 + MOST_TRIANGLES * TRIANGLE as u64;

@@ -127,7 +127,9 @@ fn array<W: Write + io::Seek>(
     archive.write_all(b"\x93NUMPY\x01\x00")?;
     archive.write_all(&(header.len() as u16).to_le_bytes())?;
     archive.write_all(header.as_bytes())?;
-    fill(&mut BufWriter::new(archive))
+    let mut out = BufWriter::new(archive);
+    fill(&mut out)?;
+    out.flush()
 }
 
 #[cfg(test)]

@@ -63,6 +63,9 @@ fn of_mesh(purpose: Purpose, path: &Path) -> Result<(Contents, Option<Cloud>), S
     let is_surface = purpose == Purpose::Surface;
     let has_normals = !mesh.normals.is_empty();
     let triangles = if is_surface { mesh.triangles() } else { Vec::new() };
+    if triangles.len() as u64 > cloud_file::MOST_TRIANGLES {
+        return Err(format!("{} triangles; at most {} are read", triangles.len(), cloud_file::MOST_TRIANGLES));
+    }
     let normals = (is_surface && has_normals).then_some(mesh.normals);
     let cloud = Cloud { positions: mesh.points, level: None, normals, triangles };
     let contents = PointContents {

@@ -3,7 +3,7 @@
 use crate::spec::calibration::{Calibration, Measured, PhaseMeasured, TimeForecast, wall_phase};
 use crate::spec::json_numbers::{null_is_zero, nulls_are_zero};
 use crate::spec::report::Cost;
-use crate::spec::run_options::RunOptions;
+use crate::spec::run_options::{OperatorFormat, RunOptions};
 use meniscus::scene::{Estimate, PhaseWork, Scene};
 use meniscus::scenes::work_estimate;
 use serde::{Deserialize, Serialize};
@@ -137,7 +137,13 @@ pub(crate) fn disk_bytes(scene: &dyn Scene, estimate: &Estimate, options: &RunOp
     let rows = estimate.steps / plan.series_every_steps.max(1) + 2;
     let checkpoints_bytes = state.saturating_add(FILE).saturating_mul(written);
     // A picture shows every particle of the plane three times over, and a slice through those of space.
-    let operators = if options.output.operators.is_some() { 28 * scene.operator_entries(estimate) as u64 } else { 0 };
+    // Two indices and seventeen digits, or a double and an index of eight bytes.
+    let entry = match options.output.operators {
+        Some(OperatorFormat::MatrixMarket) => 40.0,
+        Some(OperatorFormat::Npz) => 16.0,
+        None => 0.0,
+    };
+    let operators = (entry * scene.operator_entries(estimate)) as u64;
     let picture = estimate.particles.saturating_mul(if scene.dimension() == 2 { 225 } else { 6 });
     // SQLite's whole numbers end at 2⁶³.
     frames_bytes

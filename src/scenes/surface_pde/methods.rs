@@ -82,7 +82,15 @@ pub(super) fn scheme(spec: &mut SurfacePde, points: Points, errors: &mut Vec<Vio
             let grid = *spacing.get_or_insert(points.shape.spacing(points.count));
             Some(Scheme::Embedding { order: *order as usize, spacing: grid })
         }
-        MethodSpec::Auto { .. } if is_by_cells => points.conservative(errors),
+        MethodSpec::Auto { order, cutoff_dn } if is_by_cells => {
+            for (name, given) in [("order", order.to_json()), ("cutoff_dn", cutoff_dn.to_json())] {
+                if !given.is_null() {
+                    let (at, detail) = (format!("/method/{name}"), "this problem takes cells, and no fits");
+                    errors.push(Violation::new(at, "conflict", detail, given, Value::Null));
+                }
+            }
+            points.conservative(errors)
+        }
         MethodSpec::Auto { order, cutoff_dn } => points.auto(order, cutoff_dn, &spec.problem, errors),
         MethodSpec::Conservative => points.conservative(errors),
         MethodSpec::SurfaceDcpse { order, form: FormWord::Copies, cutoff_dn, layers, normal_spacing, supports } => {

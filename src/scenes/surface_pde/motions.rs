@@ -7,6 +7,7 @@ use crate::geometry::Vector;
 use crate::geometry::flows::FlowChoice;
 use crate::schemes::surface_equation::{Course, ExactField, Motion, MovingParts};
 use crate::spec::{Coordinates, Parameter, Violation};
+use serde_json::json;
 
 /// A planned motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +30,7 @@ pub(super) fn place(numbers: &Coordinates, shape: &Shape, pointer: &str, errors:
 }
 
 /// The motion of a choice.
-pub(super) fn plan(choice: &MotionChoice, shape: &Shape, errors: &mut Vec<Violation>) -> MotionPlan {
+pub(super) fn plan(choice: &MotionChoice, shape: &Shape, end_time: f64, errors: &mut Vec<Violation>) -> MotionPlan {
     match choice {
         MotionChoice::Flow(flow) => {
             let refused = if shape.is_curve() { flow.flow::<2>().err() } else { flow.flow::<3>().err() };
@@ -44,7 +45,14 @@ pub(super) fn plan(choice: &MotionChoice, shape: &Shape, errors: &mut Vec<Violat
             let center = center.as_ref().map_or(Vector::<3>::zeros(), |center| place(center, shape, at, errors));
             MotionPlan::Expansion { rate: *rate, center }
         }
-        MotionChoice::Normal { speed } => MotionPlan::Normal { speed: *speed },
+        MotionChoice::Normal { speed } => {
+            if let Some(radius) = shape.radius().filter(|radius| radius + speed * end_time <= 0.0) {
+                let detail = format!("the surface shrinks to a point at time {:.4e}, before the end", radius / -speed);
+                let allowed = json!({"above": -radius / end_time});
+                errors.push(Violation::new("/problem/motion/speed", "range", detail, *speed, allowed));
+            }
+            MotionPlan::Normal { speed: *speed }
+        }
     }
 }
 

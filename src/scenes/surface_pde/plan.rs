@@ -134,7 +134,7 @@ fn check_together(
     if let (Some(problem), Some(solver)) = (problem, given.solver.as_ref().filter(is_wish))
         && problem.solver().is_none()
     {
-        let detail = "this problem has no system of equations to solve: `poisson` and `bdf2` have";
+        let detail = "only `poisson` and `bdf2` have a choice of solvers";
         errors.push(Violation::new("/solver", "conflict", detail, solver.to_json(), default.to_json()));
     }
     let is_applied = matches!(problem, Some(ProblemChoice::LaplaceBeltrami { .. }) | None);

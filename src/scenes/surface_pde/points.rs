@@ -147,10 +147,8 @@ impl<const D: usize> Found<D> {
         );
         let own = (prepared.points.as_slice(), prepared.normals.as_slice());
         let given = cloud::triangles(clouds, PLACE).map_err(|refused| vec![refused])?;
-        let triangles = match given_triangles(&given, &prepared.places, own) {
-            given if given.is_empty() => triangles(own.0, own.1, &prepared.stars),
-            given => given,
-        };
+        let given = given_triangles(&given, &prepared.places, own);
+        let triangles = if given.is_empty() { triangles(own.0, own.1, &prepared.stars) } else { given };
         let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
         let areas = Some(graph.areas.clone());
         let rows = points.len();

@@ -39,7 +39,9 @@ impl ProblemChoice {
             Self::Eigenvalues { count } => {
                 // Factors, and so many solutions that are made orthogonal to those before.
                 let solutions = 3.0 * *count as f64 + 50.0;
-                let work = points.powf(1.5) + solutions * points * (wide + solutions);
+                // The small problem is solved some tens of times.
+                let small = 30.0 * solutions.powi(3);
+                let work = points.powf(1.5) + solutions * points * (wide + solutions) + small;
                 vec![PhaseWork::at_milestones("solver/eigenmodes", work)]
             }
             // Stars and a solution in every step.
@@ -78,12 +80,19 @@ impl ProblemChoice {
         }
     }
 
-    /// The larger of the diffusivities.
-    pub fn diffusivity(&self) -> f64 {
-        match self {
-            Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => diffusivity[0].max(diffusivity[1]),
-            _ => 1.0,
-        }
+    /// Inner steps of one of the scene when stability binds them, for a spacing and a length that the surface is within: 2 δn² by the
+    /// diffusivity, and for what is carried half a spacing by the speed.
+    pub fn inner_steps(&self, time_step: f64, spacing: f64, reach: f64) -> f64 {
+        let rate = match self {
+            Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => {
+                diffusivity[0].max(diffusivity[1]) / (2.0 * spacing * spacing)
+            }
+            Self::Advection { velocity, diffusivity, .. } => {
+                2.0 * velocity.top_speed(reach) / spacing + 4.0 * diffusivity / (spacing * spacing)
+            }
+            _ => 1.0 / (2.0 * spacing * spacing),
+        };
+        (time_step * rate).max(1.0)
     }
 
     /// Bytes a point that a solver fills beside its system, for rows of so many entries: the basis of GMRES, or a direct decomposition,

@@ -85,7 +85,7 @@ pub(super) fn plan(
             ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator }
         }
         ProblemSpec::Eigenvalues { count } => {
-            check_eigenvalues(&spec.edges, errors);
+            check_eigenvalues(&spec.edges, (*count, site("").count, shape), errors);
             ProblemChoice::Eigenvalues { count: *count as usize }
         }
         ProblemSpec::GeodesicDistance { from } => {
@@ -93,7 +93,7 @@ pub(super) fn plan(
         }
         ProblemSpec::MovingDiffusion { initial, motion, diffusivity, end_time, time_step } => ProblemChoice::Moving {
             initial: start(site("/problem/initial"), initial, errors),
-            motion: motions::plan(motion, shape, errors),
+            motion: motions::plan(motion, shape, *end_time, errors),
             diffusivity: *diffusivity,
             end_time: *end_time,
             time_step: time_step.unwrap_or(*end_time / DEFAULT_STEPS),
@@ -149,7 +149,12 @@ fn reaction_diffusion(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<Vi
 }
 
 /// What eigenvalues do not go together with.
-fn check_eigenvalues(edges: &EdgesChoice, errors: &mut Vec<Violation>) {
+fn check_eigenvalues(edges: &EdgesChoice, (modes, points, shape): (u64, u64, &Shape), errors: &mut Vec<Violation>) {
+    // How many points from outside there are is known when they are read.
+    if modes > points && !matches!(shape, Shape::Points(extent) if !extent.is_known) {
+        let detail = format!("{points} points have as many eigenvalues at most");
+        errors.push(Violation::new("/problem/count", "range", detail, modes, json!({"most": points})));
+    }
     if let EdgesChoice::Dirichlet { value, .. } = edges
         && *value != 0.0
     {
@@ -194,7 +199,7 @@ fn raised<const D: usize>(x: &Vector<D>) -> Vector<3> {
 }
 
 /// A field at the points of a cloud.
-pub(super) fn values<const D: usize>(field: &ExactField, cloud: &SurfaceCloud<D>) -> Vec<f64> {
+fn values<const D: usize>(field: &ExactField, cloud: &SurfaceCloud<D>) -> Vec<f64> {
     cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect()
 }
 
@@ -305,7 +310,7 @@ impl ProblemChoice {
                 Box::new(Eigenmodes::new(cloud.rows, *count, shift, shape.eigenvalues(*count)))
             }
             Self::Advection { initial, velocity, diffusivity, .. } => {
-                let (values, at) = (values(initial, cloud), |x: &Vector<D>, n: &Vector<D>| velocity.at(x, n));
+                let (values, at) = (start_values(initial, cloud)?, |x: &Vector<D>, n: &Vector<D>| velocity.at(x, n));
                 let course = velocity.course(*initial, *diffusivity, shape, cloud);
                 if D == 2 {
                     Box::new(Advection::new::<1>(values, &at, *diffusivity, course, cloud))
@@ -332,15 +337,33 @@ impl ProblemChoice {
             }
             Self::Evolution { start, integrator, .. } => {
                 let (initial, reaction, exact) = begin(start, shape, cloud, seed);
-                if initial.iter().all(|value| *value == 0.0) {
-                    let detail = format!("the field is zero at all of the {} points", cloud.rows);
-                    return Err(vec![Violation::new("/problem/initial", "data", detail, Value::Null, Value::Null)]);
-                }
+                check_not_zero(&initial[..cloud.rows])?;
                 let parts = EvolutionParts { initial, reaction, time_step, integrator: *integrator, exact };
                 Box::new(Evolution::new(parts, cloud))
             }
         })
     }
+}
+
+/// Refuses a field that is zero at all points, as one that misses the surface.
+fn check_not_zero(values: &[f64]) -> Result<(), Vec<Violation>> {
+    if values.iter().any(|value| *value != 0.0) {
+        return Ok(());
+    }
+    let detail = format!("the field is zero at all of the {} points", values.len());
+    Err(vec![Violation::new("/problem/initial", "data", detail, Value::Null, Value::Null)])
+}
+
+/// The values of a field at the start.
+///
+/// # Errors
+/// One [`Violation`] where it is zero at all points.
+pub(super) fn start_values<const D: usize>(
+    field: &ExactField,
+    cloud: &SurfaceCloud<D>,
+) -> Result<Vec<f64>, Vec<Violation>> {
+    let values = values(field, cloud);
+    check_not_zero(&values).map(|()| values)
 }
 
 /// Distances from the points of a cloud nearest to given places, or from the topmost one.

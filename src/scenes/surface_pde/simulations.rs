@@ -1,6 +1,6 @@
 //! The simulation of a planned problem on a cloud.
 
-use super::problems::{ProblemChoice, values};
+use super::problems::{ProblemChoice, start_values};
 use super::surfaces::Shape;
 use crate::parallel::Interrupt;
 use crate::schemes::surface_equation::{Method, MovingSurface, SurfaceCloud, SurfaceEquation};
@@ -36,7 +36,7 @@ pub(super) fn build<const D: usize, const M: usize>(
     outside: Option<Outside>,
 ) -> Result<Box<dyn Simulation>, Vec<Violation>> {
     if let ProblemChoice::Moving { initial, motion, diffusivity, .. } = problem {
-        let values = values(initial, &cloud);
+        let values = start_values(initial, &cloud)?;
         let parts = motion.parts::<D>(*initial, *diffusivity, shape, &values)?;
         let moving = MovingSurface::new(cloud, values, parts, fixed, interrupt, cpu_clock);
         return Ok(Box::new(match outside {

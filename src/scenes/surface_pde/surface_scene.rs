@@ -43,10 +43,9 @@ impl SurfaceScene {
         }
     }
 
-    /// Steps of a controlled integrator to one of the scene, when stability binds them: 2 δn² by the diffusivity.
+    /// Steps of an integrator to one of the scene, when stability binds them.
     fn inner_steps(&self, count: u64) -> f64 {
-        let spacing = self.shape.spacing(count);
-        (self.fixed.time_step * self.problem.diffusivity() / (2.0 * spacing * spacing)).max(1.0)
+        self.problem.inner_steps(self.fixed.time_step, self.shape.spacing(count), self.shape.reach())
     }
 
     /// Functions of a fit.
@@ -138,7 +137,9 @@ impl Scene for SurfaceScene {
     fn operator_entries(&self, estimate: &Estimate) -> f64 {
         match &self.scheme {
             Scheme::Dcpse(method) => {
-                estimate.particles as f64 * self.entries(method) * self.problem.operators(self.shape.dimension())
+                // A point has six neighbors in the conservative form.
+                let entries = if method.form == Form::Conservative { 7.0 } else { self.entries(method) };
+                estimate.particles as f64 * entries * self.problem.operators(self.shape.dimension())
             }
             Scheme::Embedding { .. } => 0.0,
         }

@@ -77,6 +77,15 @@ pub(super) fn plan(choice: &mut VelocityChoice, site: Site, errors: &mut Vec<Vio
 }
 
 impl Velocity {
+    /// The largest speed within a length of the origin.
+    pub fn top_speed(&self, reach: f64) -> f64 {
+        match self {
+            Self::Rotation { omega, center } => omega.norm() * (reach + center.norm()),
+            Self::Uniform(velocity) => velocity.norm(),
+            Self::Stream { k, amplitude } => amplitude.abs() * k.norm(),
+        }
+    }
+
     /// The tangential velocity at a place with a unit normal.
     pub fn at<const D: usize>(&self, x: &Vector<D>, n: &Vector<D>) -> Vector<D> {
         let raised = |v: &Vector<D>| Vector::<3>::from_fn(|d, _| if d < D { v[d] } else { 0.0 });

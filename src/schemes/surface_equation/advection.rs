@@ -69,6 +69,8 @@ struct Transport {
 
 /// Inner steps by the longest one at which no cell loses more than it has.
 const SAFETY: f64 = 0.5;
+/// Inner steps of a step at most.
+const MOST_INNER_STEPS: f64 = 1e6;
 /// Overshoot by the range at the start that is a doubt.
 const DOUBTFUL: f64 = 5e-2;
 /// Points of a parallel task.
@@ -299,6 +301,14 @@ impl<const D: usize> Problem<D> for Advection<D> {
         let Tools { interrupt, phases, from, to, .. } = tools;
         let (whole, before) = (to.time - from.time, self.overshoot());
         let count = (whole / self.transport.longest).ceil().max(1.0);
+        if count > MOST_INNER_STEPS {
+            let longest = self.transport.longest;
+            let reason = format!(
+                "a step of {whole:.3e} would take {count:.1e} inner steps of {longest:.3e}, which stability asks for; a shorter \
+                 time_step, or a slower velocity and less diffusivity, help"
+            );
+            return Err(StepError::Unsolved { reason, step: to.step, time: to.time });
+        }
         let (range, step) = (self.range(), whole / count);
         let mut rate = vec![0.0; self.values.len()];
         phases.measure("evolution", || {

@@ -75,20 +75,14 @@ impl Curvature {
 }
 
 impl Curvature {
-    /// Mean and Gauss curvature from triangles, but for points of an edge of the surface. Where triangles are not all around a point
-    /// within it, the Gauss curvature stays that of a fit.
+    /// Mean and Gauss curvature from triangles. Where these are not all around a point, the Gauss curvature stays that of a fit. What
+    /// the mean curvature normal lacks there lies along the surface, so that its part along the normal holds.
     fn take_triangles<const D: usize>(&mut self, cloud: &SurfaceCloud<D>) {
         let found = triangle_curvature::curvatures(&cloud.points, &cloud.normals, &cloud.triangles);
-        let is_edge = |i: usize| cloud.conormals.get(i).is_some_and(Option::is_some);
-        self.from_triangles = 0;
-        for (i, found) in found.iter().enumerate().filter(|(i, _)| !is_edge(*i)) {
-            if let Some(bend) = found.bend {
-                self.mean[i] = share(D) * bend;
-                self.from_triangles += 1;
-            }
-            if let Some(gauss) = found.gauss {
-                self.gauss[i] = gauss;
-            }
+        self.from_triangles = found.iter().filter(|found| found.bend.is_some()).count() as u64;
+        for (i, found) in found.iter().enumerate() {
+            self.mean[i] = found.bend.map_or(self.mean[i], |bend| share(D) * bend);
+            self.gauss[i] = found.gauss.unwrap_or(self.gauss[i]);
         }
     }
 }
@@ -191,7 +185,9 @@ impl<const D: usize> Problem<D> for Curvature {
     fn save(&self, section: &mut Section) {
         section.put_reals("mean_curvature", &self.mean);
         section.put_reals("gauss_curvature", &self.gauss);
-        section.put_count("from_triangles", self.from_triangles);
+        if self.from_triangles > 0 {
+            section.put_count("from_triangles", self.from_triangles);
+        }
         if self.shapes.iter().all(|shape| shape[0].is_finite()) {
             section.put_reals("shape_tensor", self.shapes.as_flattened());
         }

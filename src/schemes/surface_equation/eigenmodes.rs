@@ -102,6 +102,11 @@ impl Eigenmodes {
         match problem.least_modes(self.count, interrupt) {
             // The step is abandoned in any case.
             Err(NotFound::Interrupted) => Ok(Vec::new()),
+            Ok(found) if found.len() < self.count => Err(format!(
+                "the operator has {} modes, fewer than the {} that were asked for: a smaller `count` or more points help",
+                found.len(),
+                self.count
+            )),
             found => found.map_err(|reason| reason.to_string()),
         }
     }

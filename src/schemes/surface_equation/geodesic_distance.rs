@@ -13,9 +13,11 @@ use super::quantities::LARGEST;
 use crate::geometry::Vector;
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::sparse_cholesky::SparseCholesky;
+use crate::parallel::Interrupt;
 use crate::point_clouds::StarGraph;
 use crate::schemes::measured_errors::against_exact;
 use crate::simulation::quantity::quantities;
+use crate::simulation::section::check_length;
 use crate::simulation::{Check, Diagnostic, ErrorEntry, Finding, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use std::collections::BTreeMap;
@@ -36,6 +38,8 @@ pub struct GeodesicDistance {
     farthest_source: f64,
     exact: Option<Vec<f64>>,
     distance: Vec<f64>,
+    /// Whether each point lies on a part with a source; empty before the step.
+    is_reached: Vec<bool>,
     /// Largest change in the last repetition, by the largest distance.
     change: f64,
     /// Mean of ||∇φ| − 1| at the end.
@@ -47,6 +51,8 @@ pub struct GeodesicDistance {
 /// point, and of 16, 9.9, 9.5, 12, 23 thousandths from two.
 const SMOOTHING: f64 = 0.7;
 const MOST_SMOOTHING: f64 = 1000.0;
+/// Least u that has all its digits.
+const LEAST_HEAT: f64 = 1e16 * f64::MIN_POSITIVE;
 /// Points nearer to a source than this many local spacings hold their distance.
 const HELD: f64 = 2.5;
 /// Solutions of the second part. More of them trade smooth errors for rough ones where ways around a body meet.
@@ -78,7 +84,8 @@ impl GeodesicDistance {
         };
         let exact = exact.map(|exact| points.iter().map(|x| least(&exact, x)).collect());
         let distance = vec![0.0; cloud.rows];
-        Self { sources, farthest_source, exact, distance, change: f64::NAN, off_one: f64::NAN }
+        let is_reached = Vec::new();
+        Self { sources, farthest_source, exact, distance, is_reached, change: f64::NAN, off_one: f64::NAN }
     }
 
     /// The fields that frames show, the surface's own excepted.
@@ -89,7 +96,7 @@ impl GeodesicDistance {
 
     /// Points on parts without a source.
     fn unreached(&self) -> usize {
-        self.distance.iter().filter(|distance| distance.is_nan()).count()
+        self.is_reached.iter().filter(|is_reached| !**is_reached).count()
     }
 
     /// Distances of points next to sources, along arcs between their normals.
@@ -112,17 +119,26 @@ impl GeodesicDistance {
         held
     }
 
-    fn find<const D: usize>(&mut self, cloud: &SurfaceCloud<D>, operators: &Operators) -> Result<(), String> {
+    /// Both parts of the method. Nothing is kept once the interrupt is raised.
+    fn find<const D: usize>(
+        &mut self,
+        cloud: &SurfaceCloud<D>,
+        operators: &Operators,
+        interrupt: &Interrupt,
+    ) -> Result<(), String> {
         let graph = &cloud.graph;
         let held = self.held(cloud);
         let mut is_reached = vec![false; graph.part_count];
         self.sources.iter().for_each(|source| is_reached[graph.parts[*source] as usize] = true);
         let is_on = |i: usize| is_reached[graph.parts[i] as usize];
         let spacing = (graph.areas.iter().sum::<f64>() / cloud.rows as f64).powf(1.0 / (D - 1) as f64);
-        let mut value = self.varadhan(graph, SMOOTHING * spacing, is_on)?;
+        let mut value = self.varadhan(graph, SMOOTHING * spacing, is_on, interrupt)?;
         let second = system(graph, 0.0, 1.0, |i| held[i].is_some() || !is_on(i))?;
         let mut next = vec![0.0; cloud.rows];
         for _ in 0..REPETITIONS {
+            if interrupt.is_raised() {
+                return Ok(());
+            }
             let slopes = slopes(operators, &value);
             right_side(cloud, &held, (&value, &slopes), &mut next);
             second.solve_in_place(&mut next);
@@ -135,6 +151,10 @@ impl GeodesicDistance {
         let areas = (0..cloud.rows).filter(|i| is_on(*i)).map(|i| (graph.areas[i], (slopes[i] - 1.0).abs()));
         let (whole, off) = areas.fold((0.0, 0.0), |(whole, off), (area, one)| (whole + area, off + area * one));
         self.off_one = off / whole;
+        if let Some(i) = (0..cloud.rows).find(|i| is_on(*i) && !value[*i].is_finite()) {
+            return Err(format!("the distance of point {i} is not finite"));
+        }
+        self.is_reached = (0..cloud.rows).map(is_on).collect();
         for (i, distance) in self.distance.iter_mut().enumerate() {
             *distance = if is_on(i) { value[i] } else { f64::NAN };
         }
@@ -144,11 +164,17 @@ impl GeodesicDistance {
 
 impl GeodesicDistance {
     /// −√t ln u with the least √t that is not less than a given one and leaves a positive number everywhere.
-    fn varadhan(&self, graph: &StarGraph, least: f64, is_on: impl Fn(usize) -> bool) -> Result<Vec<f64>, String> {
+    fn varadhan(
+        &self,
+        graph: &StarGraph,
+        least: f64,
+        is_on: impl Fn(usize) -> bool,
+        interrupt: &Interrupt,
+    ) -> Result<Vec<f64>, String> {
         let mut length = least;
         loop {
             let mut value = self.heat(graph, length)?;
-            if (0..graph.len()).all(|i| value[i] > 0.0 || !is_on(i)) {
+            if interrupt.is_raised() || (0..graph.len()).all(|i| value[i] > LEAST_HEAT || !is_on(i)) {
                 value.iter_mut().for_each(|value| *value = -length * value.max(f64::MIN_POSITIVE).ln());
                 return Ok(value);
             }
@@ -256,7 +282,7 @@ impl<const D: usize> Problem<D> for GeodesicDistance {
 
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
         let Tools { cloud, operators, interrupt, phases, to, .. } = tools;
-        let found = phases.measure("solver/distances", || self.find(cloud, operators));
+        let found = phases.measure("solver/distances", || self.find(cloud, operators, interrupt));
         interrupt.check()?;
         found.map_err(|reason| StepError::Unsolved { reason, step: to.step, time: to.time })
     }
@@ -290,10 +316,10 @@ impl<const D: usize> Problem<D> for GeodesicDistance {
     }
 
     fn save(&self, section: &mut Section) {
-        section.put_reals(
-            "distance",
-            &self.distance.iter().map(|d| if d.is_nan() { -1.0 } else { *d }).collect::<Vec<_>>(),
-        );
+        // A state has no numbers that are none.
+        let known = |d: &f64| if d.is_nan() { 0.0 } else { *d };
+        section.put_reals("distance", &self.distance.iter().map(known).collect::<Vec<_>>());
+        section.put_counts("is_reached", self.is_reached.iter().map(|is_reached| u64::from(*is_reached)));
         section.put_optional("change", Some(self.change).filter(|change| change.is_finite()));
         section.put_optional("off_one", Some(self.off_one).filter(|off| off.is_finite()));
     }
@@ -301,8 +327,13 @@ impl<const D: usize> Problem<D> for GeodesicDistance {
     fn load(&mut self, section: &Section) -> Result<(), LoadError> {
         let distance = section.reals_of("distance", self.distance.len())?;
         let (change, off_one) = (section.optional("change")?, section.optional("off_one")?);
-        // Points that are not reached.
-        self.distance = distance.iter().map(|d| if *d < 0.0 { f64::NAN } else { *d }).collect();
+        let is_reached = section.counts("is_reached")?.to_vec();
+        if !is_reached.is_empty() {
+            check_length("is_reached", is_reached.len(), distance.len())?;
+        }
+        self.is_reached = is_reached.iter().map(|is_reached| *is_reached > 0).collect();
+        let known = |(i, d): (usize, &f64)| if self.is_reached.get(i) == Some(&false) { f64::NAN } else { *d };
+        self.distance = distance.iter().enumerate().map(known).collect();
         (self.change, self.off_one) = (change.unwrap_or(f64::NAN), off_one.unwrap_or(f64::NAN));
         Ok(())
     }

@@ -53,6 +53,8 @@ pub struct MovingSurface<const D: usize> {
     initial_size: f64,
     /// Open stars at the start.
     initial_open: usize,
+    /// Largest by least area of a cell at the start.
+    initial_unevenness: f64,
     iterations: u64,
     workspace: Workspace,
     interrupt: Interrupt,
@@ -76,6 +78,8 @@ pub struct MovingParts<const D: usize> {
 const STOPPING: Stopping = Stopping { tolerance: 1e-12, max_iterations: 5000 };
 /// Open stars beyond those at the start, by the number of points, above which a surface counts as torn.
 const TORN: f64 = 1e-2;
+/// Share of the pieces of the surface that may be turned inside out.
+const MOST_TURNED: f64 = 1e-2;
 /// Largest by least area of a cell, by that at the start, above which points are too uneven.
 const UNEVEN: f64 = 100.0;
 
@@ -91,6 +95,13 @@ fn look<const D: usize>(
     let stars = Stars::new(points, &nearest, &normals, &spacings);
     let graph = StarGraph::new(&stars);
     (normals, stars, graph)
+}
+
+/// Largest by least area of a cell.
+fn unevenness(areas: &[f64]) -> f64 {
+    let extremes = |(least, most): (f64, f64), area: &f64| (least.min(*area), most.max(*area));
+    let (least, most) = areas.iter().fold((f64::INFINITY, 0.0), extremes);
+    most / least
 }
 
 /// Pieces of a curve between neighbors.
@@ -113,11 +124,11 @@ impl<const D: usize> MovingSurface<D> {
         interrupt: Interrupt,
         cpu_clock: CpuClock,
     ) -> Self {
-        let SurfaceCloud { points, normals, .. } = cloud;
+        let SurfaceCloud { points, normals, triangles: given, .. } = cloud;
         let (normals, stars, graph) = look(&points, normals, 0);
-        let triangles = triangles(&points, &normals, &stars);
+        let triangles = if given.is_empty() { triangles(&points, &normals, &stars) } else { given };
         let pieces = if D == 2 { pieces(&graph) } else { triangles.clone() };
-        let cells = MaterialCells::new(&points, &graph.areas, pieces);
+        let cells = MaterialCells::new((&points, &normals), &graph.areas, pieces);
         let areas = cells.areas(&points);
         let initial_integral = areas.iter().zip(&values).map(|(area, value)| area * value).sum();
         let initial_size: f64 = areas.iter().zip(&values).map(|(area, value)| area * value.abs()).sum();
@@ -126,6 +137,7 @@ impl<const D: usize> MovingSurface<D> {
             initial_size: initial_size.max(f64::MIN_POSITIVE),
             initial_integral,
             initial_open: graph.open_count(),
+            initial_unevenness: unevenness(&areas),
             parts,
             points,
             normals,
@@ -230,7 +242,8 @@ impl<const D: usize> MovingSurface<D> {
             (*defect, *whole) = (*defect + right[i] - self.areas[i] * self.values[i], *whole + self.areas[i]);
         }
         for (value, part) in self.values.iter_mut().zip(&self.graph.parts) {
-            *value += left[*part as usize][0] / left[*part as usize][1];
+            let [defect, whole] = left[*part as usize];
+            *value += if whole > 0.0 { defect / whole } else { 0.0 };
         }
         Ok(())
     }
@@ -239,13 +252,9 @@ impl<const D: usize> MovingSurface<D> {
         (self.mass().iter().sum::<f64>() - self.initial_integral).abs() / self.initial_size
     }
 
-    /// Largest by least area of a cell.
+    /// Largest by least area of a cell, by that at the start.
     fn unevenness(&self) -> f64 {
-        let (least, most) = self
-            .areas
-            .iter()
-            .fold((f64::INFINITY, 0.0), |(least, most), area| (f64::min(least, *area), f64::max(most, *area)));
-        most / least
+        unevenness(&self.areas) / self.initial_unevenness
     }
 
     /// Open stars beyond those at the start, by the number of points.
@@ -283,6 +292,15 @@ impl<const D: usize> Simulation for MovingSurface<D> {
         done?;
         self.interrupt.check()?;
         check_finite("value", &self.values, to)?;
+        check_finite("area", &self.areas, to)?;
+        let turned = self.cells.turned(&self.points, &self.normals);
+        if turned > MOST_TURNED {
+            let reason = format!(
+                "{:.1} % of the triangles of the surface are turned inside out: it passes through itself, or a step is too long",
+                100.0 * turned
+            );
+            return Err(StepError::Unsolved { reason, step: to.step, time: to.time });
+        }
         if self.torn() > TORN && torn <= TORN {
             let open = self.graph.open_count();
             let message =
@@ -293,7 +311,8 @@ impl<const D: usize> Simulation for MovingSurface<D> {
                 .push(finding.with_count(open as u64).with_advice("more points, or a shorter run, help"));
         }
         if self.unevenness() > UNEVEN && uneven <= UNEVEN {
-            let message = format!("the largest cell has {:.0} times the area of the least one", self.unevenness());
+            let message =
+                format!("the largest cell by the least one is {:.0} times what it was at the start", self.unevenness());
             let finding = Finding::warning("uneven", message, (to.step, to.time));
             self.course
                 .findings
@@ -371,7 +390,11 @@ impl<const D: usize> Simulation for MovingSurface<D> {
             self.iterations,
             "Iterations of the solver in all steps.",
         ));
-        diagnostics.push(Diagnostic::new("cells.unevenness", self.unevenness(), "Largest by least area of a cell."));
+        diagnostics.push(Diagnostic::new(
+            "cells.unevenness",
+            self.unevenness(),
+            "Largest by least area of a cell, by that at the start.",
+        ));
         Report { errors: self.errors(), health: self.health(), diagnostics, method }
     }
 

@@ -100,7 +100,7 @@ mod tests {
         let triangles = triangles(&cloud.points, &cloud.normals, &cloud.stars);
         for found in curvatures(&cloud.points, &cloud.normals, &triangles) {
             let (bend, gauss) = (found.bend.unwrap(), found.gauss.unwrap());
-            assert!((bend - 1.0).abs() < 0.02 && (gauss - 0.25).abs() < 0.02, "{bend} {gauss}");
+            assert!((bend - 1.0).abs() < 0.05 && (gauss - 0.25).abs() < 0.02, "{bend} {gauss}");
         }
         // Without one triangle, its corners have no Gauss curvature.
         let open = curvatures(&cloud.points, &cloud.normals, &triangles[1..]);
