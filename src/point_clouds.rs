@@ -12,6 +12,7 @@ pub mod given_normals;
 pub mod local_spacing;
 pub mod normals;
 pub mod orientation;
+pub mod periodic;
 pub mod planes;
 pub mod preparation;
 mod rays;

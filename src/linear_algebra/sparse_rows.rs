@@ -106,6 +106,13 @@ impl SparseRows {
         sorted
     }
 
+    /// The same matrix with other numbers of its columns; the columns of every row are ascending, and equal ones are added up.
+    #[must_use]
+    pub fn renumbered(mut self, numbers: &[u32]) -> Self {
+        self.columns.iter_mut().for_each(|column| *column = numbers[*column as usize]);
+        self.sorted()
+    }
+
     /// Changes the weights row by row. `change` gets the index, the columns and the weights of a row.
     pub fn change_rows(&mut self, mut change: impl FnMut(usize, &[u32], &mut [f64])) {
         for i in 0..self.rows() {

@@ -58,6 +58,8 @@ pub struct StarCloud<'a, const D: usize> {
     pub metric: Metric,
     /// What the rows of points near an edge keep to.
     pub edges: EdgeRule<'a, D>,
+    /// Number of points that get a row; those behind are there as neighbors alone.
+    pub rows: usize,
 }
 
 /// Degree of polynomials, and the radius of supports in local spacings.
@@ -141,6 +143,7 @@ fn ratio(weights: impl Iterator<Item = f64>) -> f64 {
 ///     graph: &found.graph,
 ///     metric: Metric::FromHeights,
 ///     edges: EdgeRule::OneSided,
+///     rows: points.len(),
 /// };
 /// let supports = [StarSupport { degree: 3, cutoff: 2.4 }];
 /// let built = construct_star_rows::<3, 2>(cloud, &supports, &[Functional::LaplaceBeltrami], &Interrupt::default()).unwrap();
@@ -155,7 +158,7 @@ pub fn construct_star_rows<const D: usize, const M: usize>(
     functionals: &[Functional<M>],
     interrupt: &Interrupt,
 ) -> Result<StarRows<M>, Interrupted> {
-    let count = cloud.points.len();
+    let count = cloud.rows;
     let builder = Builder { cloud, functionals, fits: supports.iter().map(|s| GrowingFits::new(*s)).collect() };
     let blocks: Vec<Block<M>> = (0..count.div_ceil(BLOCK))
         .into_par_iter()

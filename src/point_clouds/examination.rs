@@ -93,6 +93,26 @@ pub enum Unusable {
         /// Distance of this pair.
         distance: f64,
     },
+    /// A period that is short beside the distance of points.
+    #[error(
+        "the period {period:.4e} is short: supports reach up to {least:.4e}; more points, or a longer part of the surface, help"
+    )]
+    ShortPeriod {
+        /// Length of the period.
+        period: f64,
+        /// The length that it must exceed.
+        least: f64,
+    },
+    /// After a period the surface does not go on.
+    #[error(
+        "shifted by the period, no point comes closer than {closest:.3e} to another one, {spacing:.3e} apart: the surface does not go on there"
+    )]
+    NoRepetition {
+        /// Least distance of a copy from a point.
+        closest: f64,
+        /// Largest local spacing.
+        spacing: f64,
+    },
     /// Points at a place with so many others that their local spacing is zero.
     #[error("{0}: so many others lie at the same place that there is no spacing; `clean`: \"drop\" keeps one of them")]
     Stacked(PointList),

@@ -55,6 +55,44 @@ impl StarGraph {
         graph
     }
 
+    /// The graph of the first `own` points, where neighbors that are copies stand for the points that they are copies of (`source`).
+    /// Conductances are the mean of both sides, so that they are symmetric to the last bit.
+    #[must_use]
+    pub fn folded(&self, own: usize, source: &[u32]) -> Self {
+        let mut lists: Vec<Vec<(u32, f64, f64)>> = Vec::with_capacity(own);
+        for i in 0..own {
+            let entries = self.neighbors(i).iter().zip(self.conductances(i)).zip(self.offsets(i));
+            let mut list: Vec<_> =
+                entries.map(|((j, conductance), offset)| (source[*j as usize], *conductance, *offset)).collect();
+            list.retain(|(j, ..)| *j as usize != i);
+            // Equal neighbors are copies of one point; their order has no effect on the sum of two.
+            list.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            let merged = list.chunk_by(|a, b| a.0 == b.0).map(|same| {
+                let conductance: f64 = same.iter().map(|entry| entry.1).sum();
+                let moment: f64 = same.iter().map(|entry| entry.1 * entry.2).sum();
+                (same[0].0, conductance, if conductance > 0.0 { moment / conductance } else { 0.0 })
+            });
+            lists.push(merged.collect());
+        }
+        let back = |i: usize, j: u32| {
+            let list = &lists[j as usize];
+            list.binary_search_by_key(&(i as u32), |entry| entry.0).map_or(0.0, |place| list[place].1)
+        };
+        let mut graph = Self { starts: vec![0], areas: self.areas[..own].to_vec(), ..Self::default() };
+        for (i, list) in lists.iter().enumerate() {
+            for (j, conductance, offset) in list {
+                let other = back(i, *j);
+                graph.neighbors.push(*j);
+                graph.conductances.push(0.5 * conductance.min(other) + 0.5 * conductance.max(other));
+                graph.offsets.push(*offset);
+            }
+            graph.starts.push(graph.neighbors.len());
+        }
+        graph.is_open = self.is_open[..own].to_vec();
+        graph.find_parts();
+        graph
+    }
+
     /// Numbers the connected components.
     fn find_parts(&mut self) {
         const NONE: u32 = u32::MAX;

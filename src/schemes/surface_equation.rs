@@ -34,7 +34,7 @@ pub mod surface_gradient;
 mod triangle_curvature;
 
 pub use advection::{Advection, Course};
-pub use cloud::SurfaceCloud;
+pub use cloud::{Copies, SurfaceCloud};
 pub use curvature::Curvature;
 pub use eigenmodes::Eigenmodes;
 pub use evolution::{Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse};

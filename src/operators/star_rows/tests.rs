@@ -28,7 +28,7 @@ fn built_with(
     functionals: &[Functional<2>],
 ) -> StarRows<2> {
     let PreparedCloud { points, normals, spacings, graph, .. } = cloud;
-    let cloud = StarCloud { points, normals, spacings, graph, metric: Metric::FromHeights, edges };
+    let cloud = StarCloud { points, normals, spacings, graph, metric: Metric::FromHeights, edges, rows: points.len() };
     construct_star_rows(cloud, supports, functionals, &Interrupt::default()).unwrap()
 }
 

@@ -7,7 +7,7 @@ use crate::geometry::Vector;
 use crate::point_clouds::{PreparedCloud, edges};
 use crate::schemes::surface_equation::{Form, SurfaceCloud};
 use crate::simulation::Diagnostic;
-use crate::spec::{Choice, Parameter, Violation};
+use crate::spec::{Choice, Coordinates, Parameter, Violation};
 use serde_json::{Value, json};
 
 /// Refuses edges that hold a value where there are none, or where a problem does not keep to them.
@@ -18,7 +18,14 @@ pub(super) fn check(
     problem: Option<&ProblemChoice>,
     errors: &mut Vec<Violation>,
 ) {
-    let EdgesChoice::Dirichlet { normal, offset, .. } = &given.edges else { return };
+    let (normal, offset) = match &given.edges {
+        EdgesChoice::Neumann => return,
+        EdgesChoice::Periodic { period, second_period } => {
+            check_periods((period, second_period.as_ref()), (given, shape, form), problem, errors);
+            return;
+        }
+        EdgesChoice::Dirichlet { normal, offset, .. } => (normal, offset),
+    };
     let conflict =
         |at: &str, detail: &str, given: Value, allowed: Value| Violation::new(at, "conflict", detail, given, allowed);
     if !matches!(shape, Shape::Points(_)) {
@@ -63,6 +70,48 @@ pub(super) fn check(
     }
 }
 
+/// Refuses periods where the points are not from outside, or a problem takes the chords between neighbors.
+fn check_periods(
+    (period, second): (&Coordinates, Option<&Coordinates>),
+    (given, shape, form): (&SurfacePde, &Shape, Option<Form>),
+    problem: Option<&ProblemChoice>,
+    errors: &mut Vec<Violation>,
+) {
+    let conflict =
+        |at: &str, detail: &str, given: Value| Violation::new(at, "conflict", detail, given, json!(["neumann"]));
+    if !matches!(shape, Shape::Points(_)) {
+        errors.push(conflict(
+            "/edges",
+            "only points from outside have edges where the surface repeats",
+            json!("periodic"),
+        ));
+    } else if form.is_some_and(|form| !matches!(form, Form::Stars { .. } | Form::Conservative)) {
+        errors.push(conflict("/edges", "edges are found by the stars of points", json!("periodic")));
+    }
+    let takes_chords = matches!(
+        problem,
+        Some(ProblemChoice::Advection { .. } | ProblemChoice::Moving { .. } | ProblemChoice::GeodesicDistance { .. })
+    );
+    if takes_chords {
+        let detail = "this problem takes the way from a point to its neighbors, which periods break";
+        errors.push(conflict("/edges", detail, json!(given.problem.name())));
+    }
+    for (at, period) in [("/edges/period", Some(period)), ("/edges/second_period", second)] {
+        let dimension = shape.dimension();
+        if let Some(period) = period.filter(|period| period.len() != dimension || period.iter().all(|c| *c == 0.0)) {
+            let detail = format!("a period has {dimension} numbers, which are not all zero");
+            errors.push(Violation::new(at, "range", detail, period.to_json(), dimension));
+        }
+    }
+}
+
+/// The periods of a choice; none where the surface does not repeat.
+pub(super) fn periods<const D: usize>(choice: &EdgesChoice) -> Vec<Vector<D>> {
+    let EdgesChoice::Periodic { period, second_period } = choice else { return Vec::new() };
+    let vector = |period: &Coordinates| Vector::<D>::from_fn(|d, _| period.get(d).copied().unwrap_or(0.0));
+    std::iter::once(period).chain(second_period).map(vector).collect()
+}
+
 /// Conormals where nothing flows, and points that hold a value.
 pub(super) struct Edges<const D: usize> {
     conormals: Vec<Option<Vector<D>>>,
@@ -72,11 +121,11 @@ pub(super) struct Edges<const D: usize> {
 }
 
 impl<const D: usize> Edges<D> {
-    /// The edges of a prepared cloud.
-    pub fn new(cloud: &PreparedCloud<D>, choice: &EdgesChoice) -> Self {
+    /// The edges of a prepared cloud, whose first `rows` points count.
+    pub fn new(cloud: &PreparedCloud<D>, rows: usize, choice: &EdgesChoice) -> Self {
         let conormals = edges::conormals(&cloud.points, &cloud.normals, &cloud.graph);
         let is_edge = edges::in_rows(&conormals, &cloud.graph);
-        let single = cloud.graph.open_count() - is_edge.iter().filter(|is_edge| **is_edge).count();
+        let single = (0..rows).filter(|i| cloud.graph.is_open(*i) && !is_edge[*i]).count();
         let mut found = Self { conormals, held: Vec::new(), single };
         if let EdgesChoice::Dirichlet { value, normal, offset } = choice {
             for (i, x) in cloud.points.iter().enumerate().filter(|(i, _)| is_edge[*i]) {
@@ -100,7 +149,7 @@ impl<const D: usize> Edges<D> {
     /// # Errors
     /// One [`Violation`].
     pub fn check(&self, cloud: &PreparedCloud<D>, choice: &EdgesChoice) -> Result<(), Vec<Violation>> {
-        if matches!(choice, EdgesChoice::Neumann) {
+        if !matches!(choice, EdgesChoice::Dirichlet { .. }) {
             return Ok(());
         }
         let mut has_held = vec![false; cloud.graph.part_count];
@@ -119,9 +168,9 @@ impl<const D: usize> Edges<D> {
         Err(vec![Violation::new("/edges", "data", detail, choice.to_json(), json!(["neumann"]))])
     }
 
-    /// Counts for the report.
-    pub fn counted(&self) -> Vec<Diagnostic> {
-        let closed = self.conormals.iter().flatten().count() as u64;
+    /// Counts of the first `rows` points for the report.
+    pub fn counted(&self, rows: usize) -> Vec<Diagnostic> {
+        let closed = self.conormals[..rows].iter().flatten().count() as u64;
         vec![
             Diagnostic::count("edges.no_flux", closed, "Points of edges that fits keep free of flux."),
             Diagnostic::count("edges.held", self.held.len() as u64, "Points of edges that hold a value in equations."),
@@ -129,9 +178,13 @@ impl<const D: usize> Edges<D> {
         ]
     }
 
-    /// Puts the edges into the cloud of a simulation.
+    /// Puts the edges into the cloud of a simulation, those of copies into theirs.
     pub fn put_into(self, cloud: &mut SurfaceCloud<D>) {
-        (cloud.conormals, cloud.held) = (self.conormals, self.held);
+        cloud.conormals = self.conormals[..cloud.rows].to_vec();
+        if let Some(copies) = &mut cloud.copies {
+            copies.conormals = self.conormals;
+        }
+        cloud.held = self.held;
     }
 }
 

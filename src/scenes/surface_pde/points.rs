@@ -2,25 +2,26 @@
 //! them. No exact answer is known on such a surface. Its report has no errors, and the plan refuses problems that need an
 //! exact answer.
 
-use super::edges::Edges;
+use super::edges::{self, Edges};
 use super::methods::Scheme;
 use super::plan::{Normals, SurfaceScene, choices};
 use super::preparation::Preparation;
 use super::problems::ProblemChoice;
 use super::simulations::{self, Outside, Run};
-use super::spec::{CleanWord, SurfaceChoice};
+use super::spec::{CleanWord, EdgesChoice, SurfaceChoice};
 use super::surfaces::{Extent, Sampling, Shape};
 use crate::geometry::Vector;
 use crate::parallel::Interrupt;
 use crate::point_clouds::cleaning::Cleaning;
-use crate::point_clouds::examination::{Flaw, NormalSource, unit_normals};
+use crate::point_clouds::examination::{Flaw, NormalSource, Unusable, unit_normals};
 use crate::point_clouds::given_normals::Verdict;
 use crate::point_clouds::normals;
+use crate::point_clouds::periodic::Repeated;
 use crate::point_clouds::triangulation::{given_triangles, triangles};
 use crate::point_clouds::{Examined, PreparedCloud};
 use crate::scene::BuildContext;
 use crate::scene::cloud::{self, Clouds};
-use crate::schemes::surface_equation::{Form, Method, SurfaceCloud};
+use crate::schemes::surface_equation::{Copies, Form, Method, SurfaceCloud};
 use crate::simulation::{Finding, Mark, Simulation};
 use crate::spec::Violation;
 use serde_json::Value;
@@ -117,8 +118,7 @@ impl<const D: usize> Found<D> {
             SurfaceChoice::Points { clean: CleanWord::Off, .. } => Cleaning::Off,
             _ => Cleaning::Drop,
         };
-        let prepared = PreparedCloud::with_interrupt(points, given, cleaning, interrupt);
-        let prepared = prepared.map_err(|reason| refuse(reason.to_string()))?;
+        let Seen { prepared, whole, source } = Seen::new(points, given, (cleaning, &scene.spec.edges), interrupt)?;
         let must_be_right = matches!(scene.normals, Normals::Given { must_be_there: true });
         if must_be_right && prepared.verdict.as_ref().is_some_and(|verdict| verdict.is_wrong_together) {
             let detail = "the normals of the points do not stand on the surface, so they cannot be taken as exact \
@@ -131,10 +131,11 @@ impl<const D: usize> Found<D> {
             return Err(refuse(detail.to_owned()));
         }
         let is_equation = !scene.problem.is_pointwise();
-        let edges = Edges::new(&prepared, &scene.spec.edges);
+        let rows = prepared.points.len();
+        let edges = Edges::new(whole.as_ref().unwrap_or(&prepared), rows, &scene.spec.edges);
         edges.check(&prepared, &scene.spec.edges)?;
         let Preparation { findings, marks, mut counted } = Preparation::new(&prepared, is_equation, edges.held_count());
-        counted.extend(edges.counted());
+        counted.extend(edges.counted(rows));
         let measure = prepared.graph.areas.iter().sum();
         let origin = format!(
             "{} of them, {:.4e} apart, {} normals, {} {}, {} of {measure:.6e}",
@@ -148,14 +149,55 @@ impl<const D: usize> Found<D> {
         let own = (prepared.points.as_slice(), prepared.normals.as_slice());
         let given = cloud::triangles(clouds, PLACE).map_err(|refused| vec![refused])?;
         let given = given_triangles(&given, &prepared.places, own);
-        let triangles = if given.is_empty() { triangles(own.0, own.1, &prepared.stars) } else { given };
+        let triangles = if given.is_empty() {
+            let all = whole.as_ref().unwrap_or(&prepared);
+            let mut found = triangles(&all.points, &all.normals, &all.stars);
+            found.retain(|corners| corners.iter().all(|corner| (*corner as usize) < rows));
+            found
+        } else {
+            given
+        };
         let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
         let areas = Some(graph.areas.clone());
-        let rows = points.len();
-        let mut cloud = SurfaceCloud { rows, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
+        let copies = whole.map(|PreparedCloud { points, normals, spacings, graph, .. }| Copies {
+            points,
+            normals,
+            spacings,
+            graph,
+            conormals: Vec::new(),
+            source,
+        });
+        let mut cloud =
+            SurfaceCloud { rows, copies, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
         cloud.triangles = triangles;
         edges.put_into(&mut cloud);
         Ok(Self { cloud, measure, outside: Outside { origin, findings, marks, counted } })
+    }
+}
+
+/// A prepared cloud, and where the surface repeats the whole of points and copies with the point that each is a copy of.
+struct Seen<const D: usize> {
+    prepared: PreparedCloud<D>,
+    whole: Option<PreparedCloud<D>>,
+    source: Vec<u32>,
+}
+
+impl<const D: usize> Seen<D> {
+    fn new(
+        points: &[Vector<D>],
+        given: Option<&[Vector<D>]>,
+        (cleaning, edges): (Cleaning, &EdgesChoice),
+        interrupt: &Interrupt,
+    ) -> Result<Self, Vec<Violation>> {
+        let refused = |reason: Unusable| refuse(reason.to_string());
+        let periods = edges::periods::<D>(edges);
+        if periods.is_empty() {
+            let prepared = PreparedCloud::with_interrupt(points, given, cleaning, interrupt).map_err(refused)?;
+            return Ok(Self { prepared, whole: None, source: Vec::new() });
+        }
+        let repeated = Repeated::new(points, &periods, cleaning).map_err(refused)?;
+        let (whole, prepared) = repeated.prepare(given, interrupt).map_err(refused)?;
+        Ok(Self { prepared, whole: Some(whole), source: repeated.source })
     }
 }
 

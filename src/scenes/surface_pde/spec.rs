@@ -154,6 +154,13 @@ crate::choice! {
             /// offset of the half-space of `normal`
             offset: f64 = 0.0;
         }
+        /// the surface repeats: beyond an edge it goes on at the opposite one; nothing flows through other edges
+        Periodic = "periodic" {
+            /// the way from an edge to where the surface goes on
+            period: Coordinates;
+            /// a second one
+            second_period: Option<Coordinates>;
+        }
     }
 }
 

@@ -35,8 +35,27 @@ pub struct SurfaceCloud<const D: usize> {
     pub triangles: Vec<[u32; 3]>,
     /// The direction out of the surface at points of an edge that nothing flows through; empty where there are none.
     pub conormals: Vec<Option<Vector<D>>>,
+    /// With copies beyond edges where the surface repeats.
+    pub copies: Option<Copies<D>>,
     /// Points of an edge that hold a value in equations, with the value.
     pub held: Vec<(usize, f64)>,
+}
+
+/// Points of a surface that repeats with their copies beyond opposite edges.
+#[derive(Debug, Clone, Default)]
+pub struct Copies<const D: usize> {
+    /// Positions of the points and then of the copies.
+    pub points: Vec<Vector<D>>,
+    /// Their unit normals.
+    pub normals: Vec<Vector<D>>,
+    /// Their local spacings.
+    pub spacings: Vec<f64>,
+    /// Their graph of stars.
+    pub graph: StarGraph,
+    /// Their conormals at edges that nothing flows through.
+    pub conormals: Vec<Option<Vector<D>>>,
+    /// The point that each is a copy of.
+    pub source: Vec<u32>,
 }
 
 impl<const D: usize> SurfaceCloud<D> {

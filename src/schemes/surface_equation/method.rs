@@ -1,6 +1,6 @@
 //! From points to operators, in the form that was chosen.
 
-use super::cloud::SurfaceCloud;
+use super::cloud::{Copies, SurfaceCloud};
 use super::conservative;
 use super::row_quality::RowQuality;
 use super::shape_tensor::{self, ShapeTensor};
@@ -170,23 +170,36 @@ impl Method {
                 Ok(operators(construct::<D>(&chart, self.support, &functionals(wanted), interrupt)?, None))
             }
             Form::Stars { metric, cutoff, may_switch, may_lower } => {
-                let SurfaceCloud { points, normals, spacings, graph, conormals, .. } = cloud;
-                let is_held = &cloud.held_mask();
-                let edges = match purpose {
+                let is_held = &if cloud.held.is_empty() { Vec::new() } else { cloud.held_mask() };
+                let edges = |conormals| match purpose {
                     Use::Equation => EdgeRule::Equation { conormals, is_held },
                     Use::Pointwise => EdgeRule::OneSided,
                 };
-                let cloud = StarCloud { points, normals, spacings, graph, metric, edges };
-                self.by_stars::<D, M>(cloud, (cutoff, may_switch, may_lower), wanted, purpose, interrupt)
+                let choice = (cutoff, may_switch, may_lower);
+                let (rows, own) = (cloud.rows, &cloud.graph);
+                match &cloud.copies {
+                    Some(Copies { points, normals, spacings, graph, conormals, source }) => {
+                        let edges = edges(conormals.as_slice());
+                        let cloud = StarCloud { points, normals, spacings, graph, metric, edges, rows };
+                        self.by_stars::<D, M>((cloud, own, Some(source)), choice, wanted, purpose, interrupt)
+                    }
+                    None => {
+                        let SurfaceCloud { points, normals, spacings, conormals, .. } = cloud;
+                        let edges = edges(conormals.as_slice());
+                        let cloud = StarCloud { points, normals, spacings, graph: own, metric, edges, rows };
+                        self.by_stars::<D, M>((cloud, own, None), choice, wanted, purpose, interrupt)
+                    }
+                }
             }
             Form::Conservative => Ok(conservative_operators(&cloud.graph, None)),
         }
     }
 
-    /// Rows by stars; the conservative form where they would not hold.
+    /// Rows by stars; the conservative form where they would not hold. Columns of copies are those of their `source`, and `own_graph`
+    /// is that without copies.
     fn by_stars<const D: usize, const M: usize>(
         &self,
-        cloud: StarCloud<'_, D>,
+        (cloud, own_graph, source): (StarCloud<'_, D>, &StarGraph, Option<&Vec<u32>>),
         (cutoff, may_switch, may_lower): (f64, bool, bool),
         wanted: &[Wanted],
         purpose: Use,
@@ -203,13 +216,16 @@ impl Method {
         if is_lowered {
             built = construct_star_rows::<D, M>(cloud, &lower[lower.len() - 1..], &functionals(wanted), interrupt)?;
         }
+        if let Some(source) = source {
+            built.operators = built.operators.into_iter().map(|rows| rows.renumbered(source)).collect();
+        }
         let laplacian = wanted.iter().position(|wanted| *wanted == Wanted::LaplaceBeltrami);
         let judged = laplacian.filter(|_| purpose == Use::Equation).map(|place| &built.operators[place]);
-        let open = if degree == LOWEST_DEGREE || is_lowered { cloud.graph.open_count() } else { 0 };
+        let open = if degree == LOWEST_DEGREE || is_lowered { own_graph.open_count() } else { 0 };
         let quality = RowQuality::new(&built, judged, interrupt).with_open_points(open);
         interrupt.check()?;
         if may_switch && purpose == Use::Equation && quality.reason_to_switch().is_some() {
-            return Ok(conservative_operators(cloud.graph, Some(quality)));
+            return Ok(conservative_operators(own_graph, Some(quality)));
         }
         let curvatures = (!built.heights.is_empty()).then(|| built.heights.iter().map(bends).collect());
         let fit_diagnostics = SupportDiagnostics { enlarged: built.grown, ..SupportDiagnostics::default() };

@@ -231,6 +231,84 @@ fn solutions_have_second_order_up_to_the_edge() {
     }
 }
 
+/// Points of the unit square that repeat along both sides, and of a cylinder that repeats along its axis.
+fn repeated(cells: i64, is_cylinder: bool) -> Vec<Vector<3>> {
+    if is_cylinder {
+        return cylinder(cells).into_iter().filter(|x| x[2] < 1.0).collect();
+    }
+    let at = |i: i64, j: i64| {
+        Vector::<3>::new((i as f64 + shift(i, j, 0)) / cells as f64, (j as f64 + shift(i, j, 1)) / cells as f64, 0.0)
+    };
+    (0..cells).flat_map(|i| (0..cells).map(move |j| at(i, j))).collect()
+}
+
+/// Where a surface repeats, solutions have second order across the seam, with fits and with the conservative form; nothing is lost
+/// there, and modes are those of a torus.
+#[test]
+fn surfaces_that_repeat_have_no_seam() {
+    const FINE: [i64; 4] = [16, 20, 26, 32];
+    let square = json!({"type": "periodic", "period": [1, 0, 0], "second_period": [0, 1, 0]});
+    let tube = json!({"type": "periodic", "period": [0, 0, 1]});
+    for (is_cylinder, edges, k) in [(false, square.clone(), [TAU, TAU, 0.0]), (true, tube, [0.0, 0.0, TAU])] {
+        let size = k.iter().map(|k| k * k).sum::<f64>();
+        for method in ["surface_dcpse", "conservative"] {
+            let (mut solved, mut heated) = (Vec::new(), Vec::new());
+            for cells in FINE {
+                let points = repeated(cells, is_cylinder);
+                let wave = |x: &[f64; 3]| (k[0] * x[0] + k[1] * x[1] + k[2] * x[2]).sin();
+                let check = |problem: &Value, factor: f64| {
+                    let simulation = finished(&body(problem, &edges, method), &points);
+                    assert_eq!(simulation.particle_count(), points.len());
+                    let places = simulation.fields(Selection::All).points;
+                    let exact: Vec<f64> = places.iter().map(|x| factor * wave(x)).collect();
+                    let report = simulation.report();
+                    assert!(report.diagnostic("stars.open").unwrap() < 1.0, "there is no edge");
+                    error(&column(simulation.as_ref(), "value"), &exact, true)
+                };
+                solved.push(check(&poisson(k), -1.0 / size));
+                let end = 0.5 / size;
+                let heat = json!({
+                    "type": "diffusion", "initial": {"type": "plane_wave", "k": k}, "end_time": end, "time_step": end / 100.0
+                });
+                heated.push(check(&heat, (-0.5_f64).exp()));
+            }
+            for errors in [&solved, &heated] {
+                let order = order(&FINE, errors);
+                assert!(order > 1.7 && errors[3] < 1e-2, "{method}, cylinder {is_cylinder}: order {order}, {errors:?}");
+            }
+        }
+    }
+    // The least eigenvalues of a square torus are (2π)², four times.
+    let problem = json!({"type": "eigenvalues", "count": 5});
+    let simulation = finished(&body(&problem, &square, "conservative"), &repeated(32, false));
+    let found = simulation.report().method["eigenvalues"].clone();
+    let values: Vec<f64> = found.split(", ").filter_map(|value| value.parse().ok()).collect();
+    assert!(values.len() == 5 && values[1..].iter().all(|value| (value / (TAU * TAU) - 1.0).abs() < 0.02), "{found}");
+}
+
+/// Points that are given on both edges are one; periods that lead nowhere are refused.
+#[test]
+fn periods_that_do_not_fit_are_refused() {
+    let lattice: Vec<_> = (0..=20)
+        .flat_map(|i| (0..=20).map(move |j| Vector::<3>::new(f64::from(i) / 20.0, f64::from(j) / 20.0, 0.0)))
+        .collect();
+    let edges = |x: f64| json!({"type": "periodic", "period": [x, 0, 0]});
+    let simulation = finished(&body(&poisson([TAU, 0.0, 0.0]), &edges(1.0), "auto"), &lattice);
+    assert_eq!(simulation.particle_count(), 20 * 21);
+    for (period, words) in [(1.7, "does not go on"), (0.2, "is short")] {
+        let given = body(&poisson([TAU, 0.0, 0.0]), &edges(period), "auto");
+        let built = scene::parse(&given, crate::scenes::SCENES).unwrap().build(context(&lattice));
+        let detail = built.err().unwrap()[0].detail.clone();
+        assert!(detail.contains(words), "{detail}");
+    }
+    let refused = |problem: Value, edges: Value| {
+        let given = body(&problem, &edges, "auto");
+        scene::parse(&given, crate::scenes::SCENES).err().unwrap()[0].pointer.clone()
+    };
+    assert_eq!(refused(json!("advection"), edges(1.0)), "/edges");
+    assert_eq!(refused(json!("poisson"), json!({"type": "periodic", "period": [0, 0, 0]})), "/edges/period");
+}
+
 /// Points at random, cut off without points on the edge: first order, but no flux and no growth.
 #[test]
 fn ragged_edges_hold() {
@@ -264,7 +342,7 @@ fn edges_are_open_stars_in_a_row() {
     let half: Vec<_> = points.into_iter().filter(|x| x[2] > 0.0).collect();
     let cloud = PreparedCloud::new(&half, None, Cleaning::Drop).unwrap();
     let choice = EdgesChoice::Dirichlet { value: 1.0, normal: None, offset: 0.0 };
-    let edges = Edges::new(&cloud, &choice);
+    let edges = Edges::new(&cloud, cloud.points.len(), &choice);
     // Points are 0.056 apart.
     assert!(edges.held_count() > 60, "{}", edges.held_count());
     let inside = edges.held.iter().filter(|(i, _)| cloud.points[*i][2] > 0.25).count();
