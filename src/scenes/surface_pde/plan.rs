@@ -258,7 +258,7 @@ pub(super) fn choices(
     };
     let solver = solvers::solver(spec.solver.get_or_insert_with(|| default_solver(shape)));
     let scheme = methods::scheme(spec, Points { shape, sampling, count, metric }, errors);
-    (scheme, problems::plan(spec, shape, (metric, solver), errors))
+    (scheme, problems::plan(spec, shape, (metric, solver, count), errors))
 }
 
 /// Where normals come from; the spec gets the choice. The exact normals of points from outside are not known, and those of

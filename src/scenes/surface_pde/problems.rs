@@ -6,7 +6,7 @@ use super::solvers::explicit;
 use super::spec::{
     ConditionWord, EdgesChoice, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SurfacePde,
 };
-use super::surfaces::{DEFAULT_COUNT, Shape};
+use super::surfaces::Shape;
 use super::velocities::{self, Velocity};
 use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
@@ -54,10 +54,9 @@ fn places(from: &Places, shape: &Shape, errors: &mut Vec<Violation>) -> Vec<Vect
 pub(super) fn plan(
     spec: &mut SurfacePde,
     shape: &Shape,
-    (metric, solver): (Metric, Solver),
+    (metric, solver, count): (Metric, Solver, u64),
     errors: &mut Vec<Violation>,
 ) -> Option<ProblemChoice> {
-    let count = spec.count.unwrap_or(DEFAULT_COUNT);
     let site = |pointer| Site { pointer, shape, count };
     let name = spec.problem.name();
     Some(match &mut spec.problem {

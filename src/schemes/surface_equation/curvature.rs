@@ -78,7 +78,7 @@ impl Curvature {
     /// Mean and Gauss curvature from triangles. Where these are not all around a point, the Gauss curvature stays that of a fit. What
     /// the mean curvature normal lacks there lies along the surface, so that its part along the normal holds.
     fn take_triangles<const D: usize>(&mut self, cloud: &SurfaceCloud<D>) {
-        let found = triangle_curvature::curvatures(&cloud.points, &cloud.normals, &cloud.triangles);
+        let found = triangle_curvature::curvatures(&cloud.points, &cloud.triangles);
         self.from_triangles = found.iter().filter(|found| found.bend.is_some()).count() as u64;
         for (i, found) in found.iter().enumerate() {
             self.mean[i] = found.bend.map_or(self.mean[i], |bend| share(D) * bend);

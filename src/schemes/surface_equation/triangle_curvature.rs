@@ -36,13 +36,11 @@ fn shape<const D: usize>(points: &[Vector<D>], at: [usize; 3]) -> Option<Shape> 
     })
 }
 
-/// Curvatures at points with normals to the outer side.
+/// Curvatures at the corners of triangles that are counter-clockwise about the outer side. The normal of a corner is that of the
+/// triangles about it, by area: at a crease other normals are those of one side.
 #[must_use]
-pub fn curvatures<const D: usize>(
-    points: &[Vector<D>],
-    normals: &[Vector<D>],
-    triangles: &[[u32; 3]],
-) -> Vec<CornerCurvature> {
+pub fn curvatures<const D: usize>(points: &[Vector<D>], triangles: &[[u32; 3]]) -> Vec<CornerCurvature> {
+    let mut normals = vec![Vector::<D>::zeros(); points.len()];
     let mut pull = vec![Vector::<D>::zeros(); points.len()];
     let (mut areas, mut angles) = (vec![0.0; points.len()], vec![0.0; points.len()]);
     let mut uses: HashMap<[u32; 2], u32> = HashMap::new();
@@ -52,6 +50,9 @@ pub fn curvatures<const D: usize>(
             let edge = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
             *uses.entry([edge[0].min(edge[1]), edge[0].max(edge[1])]).or_default() += 1;
         }
+        let (a, b) = (points[at[1]] - points[at[0]], points[at[2]] - points[at[0]]);
+        let cross = Vector::<D>::from_fn(|d, _| a[(d + 1) % D] * b[(d + 2) % D] - a[(d + 2) % D] * b[(d + 1) % D]);
+        at.iter().for_each(|i| normals[*i] += cross);
         let Some(shape) = shape(points, at) else { continue };
         let obtuse = shape.angles.iter().position(|angle| *angle > FRAC_PI_2);
         for (k, cotangent) in shape.cotangents.iter().enumerate() {
@@ -75,9 +76,9 @@ pub fn curvatures<const D: usize>(
         (is_inner[*i as usize], is_inner[*j as usize]) = (false, false);
     }
     let at = |i: usize| {
-        let has_area = areas[i] > 0.0;
+        let has_area = areas[i] > 0.0 && normals[i].norm() > 0.0;
         CornerCurvature {
-            bend: has_area.then(|| -pull[i].dot(&normals[i]) / areas[i]),
+            bend: has_area.then(|| -pull[i].dot(&normals[i].normalize()) / areas[i]),
             gauss: (has_area && is_inner[i]).then(|| (TAU - angles[i]) / areas[i]),
         }
     };
@@ -98,13 +99,13 @@ mod tests {
         let points: Vec<_> = fibonacci::sphere(2000).iter().map(|x| x * 2.0).collect();
         let cloud = PreparedCloud::new(&points, None, Cleaning::Drop).unwrap();
         let triangles = triangles(&cloud.points, &cloud.normals, &cloud.stars);
-        for found in curvatures(&cloud.points, &cloud.normals, &triangles) {
+        for found in curvatures(&cloud.points, &triangles) {
             let (bend, gauss) = (found.bend.unwrap(), found.gauss.unwrap());
             assert!((bend - 1.0).abs() < 0.05 && (gauss - 0.25).abs() < 0.02, "{bend} {gauss}");
         }
         // Without one triangle, its corners have no Gauss curvature.
-        let open = curvatures(&cloud.points, &cloud.normals, &triangles[1..]);
+        let open = curvatures(&cloud.points, &triangles[1..]);
         assert_eq!(open.iter().filter(|found| found.gauss.is_none()).count(), 3);
-        assert!(curvatures(&cloud.points, &cloud.normals, &[]).iter().all(|found| found.bend.is_none()));
+        assert!(curvatures(&cloud.points, &[]).iter().all(|found| found.bend.is_none()));
     }
 }
