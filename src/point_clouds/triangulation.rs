@@ -55,6 +55,9 @@ pub fn triangles<const D: usize>(points: &[Vector<D>], normals: &[Vector<D>], st
 
 /// Triangles that came with a cloud, on the points that stay. `places` has the index there of each given point. Those that have lost
 /// a corner are left out, and so are repeated ones.
+///
+/// They keep the order of their corners, or are turned together, where nearly all agree with the normals on their outer side. At a
+/// crease the normals of the points are less sure than they are. Otherwise each is turned by its normals.
 #[must_use]
 pub fn given_triangles<const D: usize>(
     given: &[[u32; 3]],
@@ -71,10 +74,23 @@ pub fn given_triangles<const D: usize>(
         let mut sorted = corners;
         sorted.sort_unstable();
         let is_new = sorted[0] != sorted[1] && sorted[1] != sorted[2] && taken.insert(sorted);
-        is_new.then(|| turned(points, normals, corners))
+        is_new.then_some(corners)
     };
-    given.iter().filter_map(on_kept).collect()
+    let mut found: Vec<[u32; 3]> = given.iter().filter_map(on_kept).collect();
+    let by_normals: Vec<[u32; 3]> = found.iter().map(|corners| turned(points, normals, *corners)).collect();
+    let other = found.iter().zip(&by_normals).filter(|(given, turned)| given != turned).count() as f64;
+    let share = other / found.len().max(1) as f64;
+    if (FEW..1.0 - FEW).contains(&share) {
+        return by_normals;
+    }
+    if share > 0.5 {
+        found.iter_mut().for_each(|corners| corners.swap(1, 2));
+    }
+    found
 }
+
+/// Share of triangles that may disagree with the normals where all are on one side.
+const FEW: f64 = 0.05;
 
 /// The corners, counter-clockwise about the sum of their normals.
 fn turned<const D: usize>(points: &[Vector<D>], normals: &[Vector<D>], [i, j, k]: [u32; 3]) -> [u32; 3] {

@@ -146,17 +146,7 @@ impl<const D: usize> Found<D> {
             if prepared.graph.part_count == 1 { "part" } else { "parts" },
             if D == 2 { "a length" } else { "an area" },
         );
-        let own = (prepared.points.as_slice(), prepared.normals.as_slice());
-        let given = cloud::triangles(clouds, PLACE).map_err(|refused| vec![refused])?;
-        let given = given_triangles(&given, &prepared.places, own);
-        let triangles = if given.is_empty() {
-            let all = whole.as_ref().unwrap_or(&prepared);
-            let mut found = triangles(&all.points, &all.normals, &all.stars);
-            found.retain(|corners| corners.iter().all(|corner| (*corner as usize) < rows));
-            found
-        } else {
-            given
-        };
+        let triangles = shown_triangles(clouds, &prepared, whole.as_ref())?;
         let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
         let areas = Some(graph.areas.clone());
         let copies = whole.map(|PreparedCloud { points, normals, spacings, graph, .. }| Copies {
@@ -173,6 +163,23 @@ impl<const D: usize> Found<D> {
         edges.put_into(&mut cloud);
         Ok(Self { cloud, measure, outside: Outside { origin, findings, marks, counted } })
     }
+}
+
+/// The triangles of the file, else those of the stars.
+fn shown_triangles<const D: usize>(
+    clouds: &Clouds,
+    prepared: &PreparedCloud<D>,
+    whole: Option<&PreparedCloud<D>>,
+) -> Result<Vec<[u32; 3]>, Vec<Violation>> {
+    let given = cloud::triangles(clouds, PLACE).map_err(|refused| vec![refused])?;
+    let given = given_triangles(&given, &prepared.places, (&prepared.points, &prepared.normals));
+    if !given.is_empty() {
+        return Ok(given);
+    }
+    let (all, rows) = (whole.unwrap_or(prepared), prepared.points.len());
+    let mut found = triangles(&all.points, &all.normals, &all.stars);
+    found.retain(|corners| corners.iter().all(|corner| (*corner as usize) < rows));
+    Ok(found)
 }
 
 /// A prepared cloud, and where the surface repeats the whole of points and copies with the point that each is a copy of.

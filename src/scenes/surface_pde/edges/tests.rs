@@ -274,7 +274,10 @@ fn surfaces_that_repeat_have_no_seam() {
             }
             for errors in [&solved, &heated] {
                 let order = order(&FINE, errors);
-                assert!(order > 1.7 && errors[3] < 1e-2, "{method}, cylinder {is_cylinder}: order {order}, {errors:?}");
+                assert!(
+                    order > 1.7 && errors[3] < 1.5e-2,
+                    "{method}, cylinder {is_cylinder}: order {order}, {errors:?}"
+                );
             }
         }
     }
