@@ -96,7 +96,8 @@ impl Mesh {
             Some((sum, 2.0)) => x * 0.75 + sum * 0.125,
             Some(_) => *x,
             None => {
-                let share: f64 = if degrees[i] == 3.0 { 3.0 / 16.0 } else { 3.0 / (8.0 * degrees[i]) };
+                let turn = (std::f64::consts::TAU / degrees[i]).cos();
+                let share = (0.625 - (0.375 + 0.25 * turn).powi(2)) / degrees[i];
                 x * (1.0 - degrees[i] * share) + sums[i] * share
             }
         };
@@ -288,7 +289,9 @@ fn mean_curvatures_of_the_bunny_are_those_of_a_finer_one() {
     let fine = mesh.subdivided().subdivided();
     let count = mesh.corners.len();
     let problem = json!({"problem": "curvature"});
-    let exact = column(&*finished(&fine, &problem), "mean_curvature");
+    // Fits, also where a few points have no bounded one: cotangents are least exact at the corners of the first mesh.
+    let fits = json!({"problem": "curvature", "method": {"type": "auto", "order": 4}});
+    let exact = column(&*finished(&fine, &fits), "mean_curvature");
     let bare = Mesh { corners: mesh.corners.clone(), triangles: Vec::new() };
     for (mesh, least) in [(&mesh, 0.98), (&bare, 0.97)] {
         let found = column(&*finished(mesh, &problem), "mean_curvature");
