@@ -9,6 +9,7 @@ pub mod cleaning;
 pub mod edges;
 pub mod examination;
 pub mod given_normals;
+mod least_turn;
 pub mod local_spacing;
 pub mod normals;
 pub mod orientation;

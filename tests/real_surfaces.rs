@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
-use support::{pool, scene};
+use support::{column, pool, scene};
 
 const PLAN: OutputPlan = OutputPlan { every_time: None, series_every_steps: 1 };
 
@@ -205,14 +205,6 @@ fn finished(mesh: &Mesh, more: &Value) -> Box<dyn Simulation> {
         }
     });
     simulation
-}
-
-fn column(simulation: &dyn Simulation, name: &str) -> Vec<f64> {
-    let fields = simulation.fields(Selection::All);
-    let FieldValues::Scalar(values) = &fields.columns.iter().find(|c| c.name == name).unwrap().values else {
-        panic!("{name} is no number a point")
-    };
-    values.clone()
 }
 
 /// The error of the solution of Poisson's equation against finite elements, weighted by areas.

@@ -86,7 +86,8 @@ pub fn smoothed<const D: usize>(values: &[f64], nearest: &Nearest) -> Vec<f64> {
 }
 
 /// Median of numbers, which are sorted; 0 for an empty list.
-pub(super) fn median(numbers: &mut [f64]) -> f64 {
+#[must_use]
+pub fn median(numbers: &mut [f64]) -> f64 {
     numbers.sort_unstable_by(f64::total_cmp);
     numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
 }

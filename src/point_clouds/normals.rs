@@ -3,10 +3,10 @@
 //! A normal is the direction of least variance of the neighbors of its point. Its sign is propagated along the spanning
 //! tree whose edges turn least.
 
+use super::least_turn::Edge;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// A point has too few neighbors to determine a plane.
@@ -88,34 +88,6 @@ pub(super) fn plane<const D: usize>(
     Ok(Vector::<D>::from_fn(|d, _| eigen.eigenvectors[(d, least)]).normalize())
 }
 
-/// An edge to a point that is not yet oriented. The heap returns the edge that turns least.
-struct Edge {
-    /// 1 − |cos| of the angle between the normals.
-    turn: f64,
-    from: usize,
-    to: usize,
-}
-
-impl Ord for Edge {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.turn.total_cmp(&self.turn).then_with(|| (other.to, other.from).cmp(&(self.to, self.from)))
-    }
-}
-
-impl PartialOrd for Edge {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Edge {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Edge {}
-
 /// Orients normals consistently, along the edges that turn least first.
 fn orient<const D: usize>(points: &[Vector<D>], cells: &CellList<D>, radius: f64, normals: &mut [Vector<D>]) {
     let mut order: Vec<usize> = (0..points.len()).collect();
@@ -135,11 +107,13 @@ fn orient<const D: usize>(points: &[Vector<D>], cells: &CellList<D>, radius: f64
         while let Some(from) = at {
             cells.for_each_within(&points[from], radius, |to, _, _| {
                 if !is_done[to] {
-                    heap.push(Edge { turn: 1.0 - normals[from].dot(&normals[to]).abs(), from, to });
+                    let turn = 1.0 - normals[from].dot(&normals[to]).abs();
+                    heap.push(Edge { turn, from: from as u32, to: to as u32 });
                 }
             });
             at = None;
             while let Some(Edge { from, to, .. }) = heap.pop() {
+                let (from, to) = (from as usize, to as usize);
                 if !is_done[to] {
                     if normals[from].dot(&normals[to]) < 0.0 {
                         normals[to] = -normals[to];

@@ -6,40 +6,12 @@
 //! Bodies that touch are one part of the graph, and the tree passes sides on through their contact, where normals mean nothing.
 //! So every piece of trusted points is turned outward by itself.
 
+use super::least_turn::Edge;
 use super::rays::outward_share;
 use super::star_graph::StarGraph;
 use crate::geometry::Vector;
 use crate::parallel::Interrupt;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
-
-/// An edge to a point that is not yet oriented. The heap returns the edge that turns least.
-struct Edge {
-    /// 1 − |n_i · mirrored n_j|.
-    turn: f64,
-    from: u32,
-    to: u32,
-}
-
-impl Ord for Edge {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.turn.total_cmp(&self.turn).then_with(|| (other.to, other.from).cmp(&(self.to, self.from)))
-    }
-}
-
-impl PartialOrd for Edge {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Edge {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Edge {}
 
 /// The product n_i · (n_j − 2 (n_j·e) e), where e is the direction of the edge: positive where both have the same side.
 #[must_use]

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../support/mod.rs"]
+#[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
 use serde_json::{Value, json};

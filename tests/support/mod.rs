@@ -3,7 +3,7 @@
 use meniscus::parallel::Interrupt;
 use meniscus::scene::{BuildContext, Clouds, Scene, parse};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::{CpuClock, OutputPlan, Report, Simulation};
+use meniscus::simulation::{CpuClock, FieldValues, OutputPlan, Report, Selection, Simulation};
 use serde_json::Value;
 
 pub const PLAN: OutputPlan = OutputPlan { every_time: None, series_every_steps: 10 };
@@ -30,6 +30,15 @@ pub fn run(value: &Value) -> Report {
         }
         simulation.report()
     })
+}
+
+/// The numbers of a field of a frame.
+pub fn column(simulation: &dyn Simulation, name: &str) -> Vec<f64> {
+    let fields = simulation.fields(Selection::All);
+    let FieldValues::Scalar(values) = &fields.columns.iter().find(|c| c.name == name).unwrap().values else {
+        panic!("{name} is no number a point")
+    };
+    values.clone()
 }
 
 /// The error of a quantity in a norm at the latest time, or at the given one.

@@ -35,6 +35,11 @@ pub(super) fn default_field(shape: &Shape) -> FieldChoice {
     }
 }
 
+/// A point in space, z = 0 in the plane.
+pub(super) fn raised<const D: usize>(x: &Vector<D>) -> Vector<3> {
+    Vector::<3>::from_fn(|d, _| if d < D { x[d] } else { 0.0 })
+}
+
 /// Where a field stands, and on what.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {

@@ -1,6 +1,6 @@
 //! The problem of a scene: what it is made of, what it costs.
 
-use super::field_choices::{Site, default_field};
+use super::field_choices::{Site, default_field, raised};
 use super::motions::{self, MotionPlan, place};
 use super::solvers::explicit;
 use super::spec::{
@@ -13,8 +13,8 @@ use crate::geometry::random::CounterRandom;
 use crate::operators::charts::tangent::Metric;
 use crate::schemes::surface_equation::{
     Advection, Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse,
-    ExactField, GeodesicDistance, Model, Pointwise, Poisson, Problem, Reaction, Solver, SurfaceCloud, SurfaceGradient,
-    surface_gradient,
+    ExactField, GeodesicDistance, Model, MovingSurface, Pointwise, Poisson, Problem, Reaction, Solver, SurfaceCloud,
+    SurfaceGradient, surface_gradient,
 };
 use crate::simulation::Quantity;
 use crate::spec::{Choice, Parameter, Places, Violation};
@@ -192,11 +192,6 @@ fn check_poisson(shape: &Shape, condition: ConditionWord, name: &str, errors: &m
     }
 }
 
-/// A point in space, z = 0 in the plane.
-fn raised<const D: usize>(x: &Vector<D>) -> Vector<3> {
-    Vector::<3>::from_fn(|d, _| if d < D { x[d] } else { 0.0 })
-}
-
 /// A field at the points of a cloud.
 fn values<const D: usize>(field: &ExactField, cloud: &SurfaceCloud<D>) -> Vec<f64> {
     cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect()
@@ -256,11 +251,7 @@ impl ProblemChoice {
             Self::Eigenvalues { .. } => Eigenmodes::shown_fields(),
             Self::GeodesicDistance { .. } => GeodesicDistance::shown_fields(),
             Self::Moving { motion, initial, diffusivity, .. } => {
-                crate::schemes::surface_equation::MovingSurface::<3>::shown_fields(motion.has_course(
-                    *initial,
-                    *diffusivity,
-                    shape,
-                ))
+                MovingSurface::<3>::shown_fields(motion.has_course(*initial, *diffusivity, shape))
             }
             Self::Advection { velocity, initial, diffusivity, .. } => {
                 Advection::<3>::shown_fields(velocity.has_course(*initial, *diffusivity, shape))

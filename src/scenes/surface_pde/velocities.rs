@@ -1,6 +1,6 @@
 //! The tangential velocity of a choice, and the exact course of what it carries where that is known.
 
-use super::field_choices::{Site, vector_in_space};
+use super::field_choices::{Site, raised, vector_in_space};
 use super::motions::place;
 use super::spec::FieldChoice;
 use super::surfaces::Shape;
@@ -88,7 +88,6 @@ impl Velocity {
 
     /// The tangential velocity at a place with a unit normal.
     pub fn at<const D: usize>(&self, x: &Vector<D>, n: &Vector<D>) -> Vector<D> {
-        let raised = |v: &Vector<D>| Vector::<3>::from_fn(|d, _| if d < D { v[d] } else { 0.0 });
         let (x, normal) = (raised(x), raised(n));
         let v = match self {
             Self::Rotation { omega, center } => omega.cross(&(x - center)),
@@ -123,10 +122,7 @@ impl Velocity {
             return None;
         }
         let decay = diffusivity * shape.radius().and_then(|radius| field.decay(radius)).unwrap_or(0.0);
-        let points: Vec<Vector<3>> = cloud.points[..cloud.rows]
-            .iter()
-            .map(|x| Vector::<3>::from_fn(|d, _| if d < D { x[d] } else { 0.0 }))
-            .collect();
+        let points: Vec<Vector<3>> = cloud.points[..cloud.rows].iter().map(raised).collect();
         let (axis, rate) = (omega.try_normalize(0.0).unwrap_or_else(Vector::<3>::z), omega.norm());
         Some(Box::new(move |time| {
             // Where the value came from: turned back (Rodrigues).

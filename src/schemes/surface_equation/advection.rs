@@ -50,6 +50,8 @@ struct Transport {
     /// First edge of each point, and their number at the end.
     starts: Vec<usize>,
     neighbors: Vec<u32>,
+    /// The same edge seen from the neighbor.
+    back: Vec<usize>,
     /// v·e ℓ |x_j − x_i| through each facet, outward; antisymmetric.
     fluxes: Vec<f64>,
     /// d ℓ.
@@ -151,22 +153,17 @@ impl Transport {
         }
     }
 
-    /// What leaves a point for its neighbor arrives there: both sides take the mean.
+    /// What leaves a point for its neighbor arrives there: both sides take the mean. The graph is symmetric.
     fn make_antisymmetric(&mut self) {
-        for i in 0..self.starts.len() - 1 {
-            for k in self.starts[i]..self.starts[i + 1] {
-                let j = self.neighbors[k] as usize;
-                if j <= i {
-                    continue;
-                }
-                let others = &self.neighbors[self.starts[j]..self.starts[j + 1]];
-                if let Ok(place) = others.binary_search(&(i as u32)) {
-                    let back = self.starts[j] + place;
-                    let mean = 0.5 * (self.fluxes[k] - self.fluxes[back]);
-                    (self.fluxes[k], self.fluxes[back]) = (mean, -mean);
-                }
-            }
-        }
+        let Self { starts, neighbors, .. } = &*self;
+        let back = |i: usize, k: usize| {
+            let edges = starts[neighbors[k] as usize]..starts[neighbors[k] as usize + 1];
+            edges.start + neighbors[edges].binary_search(&(i as u32)).unwrap_or_default()
+        };
+        let of = |i: usize| (starts[i]..starts[i + 1]).map(move |k| back(i, k));
+        self.back = (0..starts.len() - 1).flat_map(of).collect();
+        let mean = |k: usize| 0.5 * (self.fluxes[k] - self.fluxes[self.back[k]]);
+        self.fluxes = (0..self.fluxes.len()).map(mean).collect();
     }
 
     /// The limited gradient at each point.
@@ -208,12 +205,7 @@ impl Transport {
             for k in self.starts[i]..self.starts[i + 1] {
                 let j = self.neighbors[k] as usize;
                 let flux = self.fluxes[k];
-                let upstream = if flux > 0.0 {
-                    along(i, k)
-                } else {
-                    let others = &self.neighbors[self.starts[j]..self.starts[j + 1]];
-                    others.binary_search(&(i as u32)).map_or(u[j], |place| along(j, self.starts[j] + place))
-                };
+                let upstream = if flux > 0.0 { along(i, k) } else { along(j, self.back[k]) };
                 sum += self.exchange[k] * (u[j] - u[i]) - flux * upstream;
             }
             *out = sum / self.areas[i];
@@ -299,7 +291,7 @@ impl<const D: usize> Problem<D> for Advection<D> {
     /// u₁ = u + Δt u', u₂ = ¾ u + ¼ (u₁ + Δt u₁'), u⁺ = ⅓ u + ⅔ (u₂ + Δt u₂').
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
         let Tools { interrupt, phases, from, to, .. } = tools;
-        let (whole, before) = (to.time - from.time, self.overshoot());
+        let (whole, overshoot) = (to.time - from.time, self.overshoot());
         let count = (whole / self.transport.longest).ceil().max(1.0);
         if count > MOST_INNER_STEPS {
             let longest = self.transport.longest;
@@ -311,10 +303,11 @@ impl<const D: usize> Problem<D> for Advection<D> {
         }
         let (range, step) = (self.range(), whole / count);
         let mut rate = vec![0.0; self.values.len()];
+        let mut before = self.values.clone();
         phases.measure("evolution", || {
             for _ in 0..count as u64 {
                 interrupt.check()?;
-                let before = self.values.clone();
+                before.copy_from_slice(&self.values);
                 for share in [0.0, 0.75, 1.0 / 3.0] {
                     self.transport.rates(&self.values, range, &mut rate);
                     for ((value, before), rate) in self.values.iter_mut().zip(&before).zip(&rate) {
@@ -327,7 +320,7 @@ impl<const D: usize> Problem<D> for Advection<D> {
         self.inner_steps += count as u64;
         self.findings.clear();
         let now = self.overshoot();
-        if now > self.most_overshoot(to.time) && before <= self.most_overshoot(from.time) {
+        if now > self.most_overshoot(to.time) && overshoot <= self.most_overshoot(from.time) {
             let message = format!(
                 "values lie {now:.1e} of their range beyond those at the start, more than the velocity accounts for"
             );

@@ -67,6 +67,12 @@ impl<const D: usize> SurfaceCloud<D> {
         mask
     }
 
+    /// Areas of the cells that the conservative form exchanges between; without stars those of the surface, where they are known.
+    #[must_use]
+    pub fn cell_areas(&self) -> Option<&[f64]> {
+        if self.graph.is_empty() { self.areas.as_deref() } else { Some(&self.graph.areas) }
+    }
+
     /// Σ area f, or the mean where areas are not known.
     #[must_use]
     pub fn integral(&self, field: &[f64]) -> f64 {

@@ -34,6 +34,57 @@ pub(super) fn rows(graph: &StarGraph) -> SparseRows {
     rows
 }
 
+/// The symmetric matrix diag(own) + exchange · Σ ℓ_ij (x_i − x_j), columns ascending. Rows and columns of held points are those of
+/// the identity.
+pub(super) fn exchange_matrix(
+    graph: &StarGraph,
+    own: impl Fn(usize) -> f64,
+    exchange: f64,
+    is_held: impl Fn(usize) -> bool,
+) -> SparseRows {
+    let mut rows = SparseRows::default();
+    let (mut columns, mut weights) = (Vec::new(), Vec::new());
+    for i in 0..graph.len() {
+        columns.clear();
+        weights.clear();
+        columns.push(i as u32);
+        weights.push(1.0);
+        if !is_held(i) {
+            weights[0] = own(i);
+            for (j, conductance) in graph.neighbors(i).iter().zip(graph.conductances(i)) {
+                weights[0] += exchange * conductance;
+                if !is_held(*j as usize) {
+                    columns.push(*j);
+                    weights.push(-exchange * conductance);
+                }
+            }
+        }
+        rows.push_row(&columns, &weights);
+    }
+    rows.sorted()
+}
+
+/// Gives back to each part what a solver left of Σ A u = Σ right, evenly: exchange between points cancels. `left` is a buffer.
+pub(super) fn keep_integrals(
+    graph: &StarGraph,
+    areas: &[f64],
+    right: &[f64],
+    values: &mut [f64],
+    left: &mut Vec<[f64; 2]>,
+) {
+    left.clear();
+    left.resize(graph.part_count, [0.0; 2]);
+    for (((part, area), value), right) in graph.parts.iter().zip(areas).zip(values.iter()).zip(right) {
+        let [defect, whole] = &mut left[*part as usize];
+        (*defect, *whole) = (*defect + right - area * value, *whole + area);
+    }
+    for (value, part) in values.iter_mut().zip(&graph.parts) {
+        let [defect, whole] = left[*part as usize];
+        // A part without an area holds nothing.
+        *value += if whole > 0.0 { defect / whole } else { 0.0 };
+    }
+}
+
 /// The term that makes Δ_S regular on every part of a cloud: area means, with α about the least eigenvalue of a sphere of
 /// the same area, −8π/A, or of a circle of the same length, −(2π/L)².
 pub(super) fn mean_term(graph: &StarGraph, dimension: usize) -> MeanTerm {

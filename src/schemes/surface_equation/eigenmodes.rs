@@ -86,9 +86,8 @@ impl Eigenmodes {
         interrupt: &Interrupt,
     ) -> Result<Vec<Mode>, String> {
         let rows = &operators.rows[0];
-        let areas = if cloud.graph.is_empty() { cloud.areas.as_deref() } else { Some(&cloud.graph.areas[..]) };
         let even = vec![1.0; self.rows];
-        let weights = areas.unwrap_or(&even);
+        let weights = cloud.cell_areas().unwrap_or(&even);
         let is_zero = if cloud.held.is_empty() { Vec::new() } else { cloud.held_mask() };
         let factors = Factors::new(rows, weights, (self.shift, &is_zero), operators.is_conservative)?;
         let problem = ShiftedInverse {
@@ -131,7 +130,7 @@ impl<'a> Factors<'a> {
             let scale = if is_symmetric { weights[i] } else { 1.0 };
             for (j, w) in columns.iter().zip(entries.iter_mut()) {
                 let j = *j as usize;
-                // Rows of held points are empty already.
+                // Rows of held points are zero already.
                 let own = if is_held(j) { 0.0 } else { *w };
                 *w = scale * (if i == j { shift } else { 0.0 } - own);
             }

@@ -3,6 +3,7 @@
 //! the operator, and ends the run.
 
 use super::cloud::SurfaceCloud;
+use super::conservative;
 use super::field_bounds::FieldBounds;
 use super::format_1;
 use super::method::{Operators, Use, Wanted};
@@ -12,7 +13,6 @@ use super::reactions::Reaction;
 use super::solver::{LinearSystem, Solver, Workspace};
 use crate::linear_algebra::SparseRows;
 use crate::parallel::Interrupt;
-use crate::point_clouds::StarGraph;
 use crate::schemes::measured_errors::{against_exact, entry};
 use crate::simulation::{Check, Diagnostic, ErrorEntry, Finding, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
@@ -222,18 +222,7 @@ impl Evolution {
         interrupt.check()?;
         self.iterations += found.map_err(unsolved)?.iterations;
         if is_symmetric {
-            // What the solver left of the integral: Σ A u = Σ A b on each part, since the exchange cancels.
-            let StarGraph { areas, parts, part_count, .. } = &cloud.graph;
-            self.defects.clear();
-            self.defects.resize(*part_count, [0.0; 2]);
-            for (((part, area), value), right) in parts.iter().zip(areas).zip(values.iter()).zip(right.iter()) {
-                let [defect, whole] = &mut self.defects[*part as usize];
-                (*defect, *whole) = (*defect + right - area * value, *whole + area);
-            }
-            for (value, part) in values.iter_mut().zip(parts) {
-                let [defect, whole] = self.defects[*part as usize];
-                *value += defect / whole;
-            }
+            conservative::keep_integrals(&cloud.graph, &cloud.graph.areas, right, values, &mut self.defects);
         }
         Ok(())
     }

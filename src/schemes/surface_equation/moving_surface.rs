@@ -6,12 +6,12 @@
 
 use super::advection::Course as ExactCourse;
 use super::cloud::SurfaceCloud;
+use super::conservative;
 use super::material_cells::MaterialCells;
 use super::motion::Motion;
 use super::quantities::{INTEGRAL, LARGEST, LEAST, NORMAL, REFERENCE, TIME, VALUE};
 use super::solver::{LinearSystem, Solver, Workspace};
 use crate::geometry::Vector;
-use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::Stopping;
 use crate::parallel::Interrupt;
 use crate::point_clouds::StarGraph;
@@ -21,6 +21,7 @@ use crate::point_clouds::triangulation::triangles;
 use crate::schemes::measured_errors::{against_exact, entry};
 use crate::simulation::course::check_finite;
 use crate::simulation::quantity::quantities;
+use crate::simulation::section::check_length;
 use crate::simulation::{
     Check, Course, CpuClock, Diagnostic, ErrorEntry, Fields, Finding, Health, LoadError, Mark, Observables, Phases,
     Report, Section, Selection, Simulation, StepError,
@@ -57,6 +58,8 @@ pub struct MovingSurface<const D: usize> {
     initial_unevenness: f64,
     iterations: u64,
     workspace: Workspace,
+    /// What a solver left of the integral of each part, and its area, a buffer.
+    defects: Vec<[f64; 2]>,
     interrupt: Interrupt,
     origin: Option<String>,
     marks: Vec<Mark>,
@@ -78,6 +81,8 @@ pub struct MovingParts<const D: usize> {
 const STOPPING: Stopping = Stopping { tolerance: 1e-12, max_iterations: 5000 };
 /// Open stars beyond those at the start, by the number of points, above which a surface counts as torn.
 const TORN: f64 = 1e-2;
+/// Change of Σ A u by Σ A |u| that is more than rounding.
+const MOST_DRIFT: f64 = 1e-9;
 /// Share of the pieces of the surface that may be turned inside out.
 const MOST_TURNED: f64 = 1e-2;
 /// Largest by least area of a cell, by that at the start, above which points are too uneven.
@@ -148,6 +153,7 @@ impl<const D: usize> MovingSurface<D> {
             triangles,
             iterations: 0,
             workspace: Workspace::default(),
+            defects: Vec::new(),
             interrupt,
             origin: None,
             marks: Vec::new(),
@@ -216,35 +222,13 @@ impl<const D: usize> MovingSurface<D> {
     /// Solves (A − share L) u = right.
     fn solve(&mut self, share: f64, right: &[f64], to: Clock) -> Result<(), StepError> {
         let Self { graph, areas, values, interrupt, workspace, .. } = self;
-        let mut rows = SparseRows::default();
-        let (mut columns, mut weights) = (Vec::new(), Vec::new());
-        for (i, area) in areas.iter().enumerate() {
-            columns.clear();
-            weights.clear();
-            columns.push(i as u32);
-            weights.push(*area);
-            for (j, conductance) in graph.neighbors(i).iter().zip(graph.conductances(i)) {
-                weights[0] += share * conductance;
-                columns.push(*j);
-                weights.push(-share * conductance);
-            }
-            rows.push_row(&columns, &weights);
-        }
+        let rows = conservative::exchange_matrix(graph, |i| areas[i], share, |_| false);
         let unsolved = |reason: String| StepError::Unsolved { reason, step: to.step, time: to.time };
-        let mut system = LinearSystem::new(rows.sorted(), None, Solver::Cg(STOPPING), true).map_err(unsolved)?;
+        let mut system = LinearSystem::new(rows, None, Solver::Cg(STOPPING), true).map_err(unsolved)?;
         let found = system.solve(right, values, interrupt, workspace);
         interrupt.check()?;
         self.iterations += found.map_err(unsolved)?.iterations;
-        // What the solver left of the sum over each part.
-        let mut left = vec![[0.0; 2]; self.graph.part_count];
-        for (i, part) in self.graph.parts.iter().enumerate() {
-            let [defect, whole] = &mut left[*part as usize];
-            (*defect, *whole) = (*defect + right[i] - self.areas[i] * self.values[i], *whole + self.areas[i]);
-        }
-        for (value, part) in self.values.iter_mut().zip(&self.graph.parts) {
-            let [defect, whole] = left[*part as usize];
-            *value += if whole > 0.0 { defect / whole } else { 0.0 };
-        }
+        conservative::keep_integrals(&self.graph, &self.areas, right, &mut self.values, &mut self.defects);
         Ok(())
     }
 
@@ -359,8 +343,8 @@ impl<const D: usize> Simulation for MovingSurface<D> {
         let clock = self.course.check(state)?;
         let count = self.points.len();
         let (positions, normals) = (state.vectors::<D>("positions")?, state.vectors::<D>("normals")?);
-        crate::simulation::section::check_length("positions", positions.len(), count)?;
-        crate::simulation::section::check_length("normals", normals.len(), count)?;
+        check_length("positions", positions.len(), count)?;
+        check_length("normals", normals.len(), count)?;
         let (values, previous) = (state.reals_of("value", count)?, state.reals_of("previous", count)?);
         let iterations = state.count("iterations")?;
         self.values.copy_from_slice(values);
@@ -401,7 +385,7 @@ impl<const D: usize> Simulation for MovingSurface<D> {
     fn health(&self) -> Health {
         let finite = self.values.iter().all(|value| value.is_finite());
         let checks = vec![
-            Check::at_most("mass_drift", Some(self.drift()), 1e-9, ""),
+            Check::at_most("mass_drift", Some(self.drift()), MOST_DRIFT, ""),
             Check::watched("torn_share", Some(self.torn()), ""),
             Check::watched("unevenness", Some(self.unevenness()), ""),
         ];

@@ -331,8 +331,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
             self.construct_operators()?;
         }
         let Some(operators) = &self.operators else { return Ok(Vec::new()) };
-        let areas =
-            if self.cloud.graph.is_empty() { self.cloud.areas.as_deref() } else { Some(&self.cloud.graph.areas[..]) };
+        let areas = self.cloud.cell_areas();
         let named = |(wanted, rows): (Wanted, _)| NamedOperator { name: wanted.name(), rows, areas };
         Ok(self.problem.wanted().into_iter().zip(&operators.rows).map(named).collect())
     }
