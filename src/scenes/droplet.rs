@@ -11,6 +11,8 @@ mod preset;
 pub mod spec;
 mod start_lattice;
 mod start_levels;
+mod varying_tension;
+mod vectors;
 
 use crate::scene::{self, Quantities, SceneKind};
 use crate::schemes::weakly_compressible_sph::{frame_fields, quantities as own};

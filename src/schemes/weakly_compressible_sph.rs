@@ -10,17 +10,19 @@
 //! | sums over pairs | `neighbor_lists`, `pair_workspace`, `pair_sums`, `column` |
 //! | terms of the equations | `interactions` |
 //! | equations that combine the terms | `equations`: `volume_form`, `mass_form` or `dcpse` |
-//! | the interface and what it encloses | `interface`, `droplets`, `strays` |
+//! | the interface and what it encloses | `interface`, `smoothed_delta`, `droplets`, `strays` |
+//! | a tension that varies | [`tension_law`], `varying_tension`, `surfactant`, `tension_record`, `migration` |
 //! | one evaluation | `system` |
 //! | steps in time | `stepping`, [`time_step`] |
 //! | what a run watches | `budget`, `checks`, `guard` |
-//! | the simulation and what it shows | `simulation`, `saved_state`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
+//! | the simulation and what it shows | `simulation`, `saved_state`, `diagnostics`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
 
 mod budget;
 mod checks;
 mod column;
 pub mod config;
 mod dcpse;
+mod diagnostics;
 pub mod dimensionless;
 mod droplets;
 mod energy_rise;
@@ -35,6 +37,7 @@ mod interface;
 mod kernel_choice;
 pub mod level_update;
 mod mass_form;
+mod migration;
 mod monitors;
 mod neighbor_lists;
 mod pacing;
@@ -45,12 +48,17 @@ mod pressures;
 mod saved_state;
 mod simulation;
 pub mod species;
+mod smoothed_delta;
 mod standing_wave;
 mod stepping;
 mod strays;
 mod summary;
+mod surfactant;
 mod system;
+pub mod tension_law;
+mod tension_record;
 pub mod time_step;
+mod varying_tension;
 mod volume_form;
 mod wave_record;
 
@@ -67,6 +75,7 @@ pub use simulation::WeaklyCompressibleSph;
 pub use species::{Fluids, Species};
 pub use standing_wave::StandingWave;
 pub use system::{Drop, SphSystem};
+pub use tension_law::{EquationOfState, SurfactantConfig, TensionLaw};
 
 #[cfg(test)]
 mod test_setting;

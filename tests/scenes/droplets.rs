@@ -45,5 +45,12 @@ pub fn bodies() -> Vec<Value> {
         "fluids": {"outside": {"density": 0.5}},
         "body_force": {"type": "pulse", "coefficient": -60, "duration": 0.01, "A": 0.8, "B": 100}
     })));
+    let surfactant = json!({"coverage": 0.3, "slope": [0.4, 0.1], "diffusivity": 0.1, "equation": "linear"});
+    bodies.push(droplet(json!({"shape": {"type": "circle", "radius": 0.4}, "surfactant": surfactant})));
+    bodies.push(droplet(json!({"shape": {"type": "circle", "radius": 0.4}, "tension_slope": [0.3, 0.2]})));
+    bodies.push(json!({
+        "kind": "droplet", "dimension": 3, "case": "static", "spacing": 0.16, "steps": 4, "end_time": 4e-3,
+        "shape": {"type": "sphere", "radius": 0.6}, "surfactant": {"coverage": 0.5, "slope": [0, 0, 0.2]}
+    }));
     bodies
 }

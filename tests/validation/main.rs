@@ -10,6 +10,7 @@ mod linear_theory;
 mod ring;
 mod hard_cases;
 mod surfaces;
+mod varying_tension;
 #[path = "../support/mod.rs"]
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;

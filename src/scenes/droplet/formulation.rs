@@ -20,9 +20,11 @@ struct Balanced {
     background_in_oscillation: f64,
     background: f64,
     bulk_damping: f64,
-    /// Share of a deviation of the level that is repaired in a repair time, of a drop at rest, and of others. Less keeps a drop
-    /// at rest quieter; merging drops need more, or some of them gain energy.
+    /// Share of a deviation of the level that is repaired in a repair time, of a drop at rest, of one that oscillates, and of others.
+    /// Less keeps a drop at rest quieter, and costs an oscillation less of its amplitude; merging drops need more, or some of them
+    /// gain energy.
     relaxation_at_rest: f64,
+    relaxation_in_oscillation: f64,
     relaxation: f64,
     curvature_filter_h: f64,
 }
@@ -33,6 +35,7 @@ const BALANCED: Balanced = Balanced {
     background: 0.05,
     bulk_damping: 0.2,
     relaxation_at_rest: 0.05,
+    relaxation_in_oscillation: 0.02,
     relaxation: 0.1,
     curvature_filter_h: 6.0,
 };
@@ -113,6 +116,11 @@ pub(super) fn of_earlier_version(given: Given) -> Preset {
         .set_if(is_without_lattice && force.is_some(), Droplet::body_force(), force.map(falling_freely))
 }
 
+/// Whether a slope of the tension drives a flow along the interface.
+fn is_driven(spec: &Droplet) -> bool {
+    spec.tension_slope.is_some() || spec.surfactant.as_ref().is_some_and(|surfactant| surfactant.slope.is_some())
+}
+
 /// Pressures of a scene; the spec gets what was left open. Densities by continuity have none of these parameters.
 pub(super) fn pressures(spec: &mut Droplet, scope: Scope, errors: &mut Vec<Violation>) -> PressureConfig {
     let is_balanced = spec.tension_force == TensionWord::Balanced;
@@ -137,6 +145,7 @@ pub(super) fn pressures(spec: &mut Droplet, scope: Scope, errors: &mut Vec<Viola
     }
     let background = match spec.case {
         _ if !is_balanced => 0.0,
+        _ if is_driven(spec) => BALANCED.background_in_oscillation,
         CaseName::Static => BALANCED.background_at_rest,
         CaseName::Oscillating => BALANCED.background_in_oscillation,
         CaseName::Dividing | CaseName::Custom => BALANCED.background,
@@ -174,7 +183,12 @@ pub(super) fn level_and_curvature(
     // Particles that are shifted or whose densities drift have not been tried with a level of their own.
     let is_balanced = spec.tension_force == TensionWord::Balanced && scope.is_summation;
     let default = if is_balanced { with_defaults("transparent") } else { RedistancingChoice::Overwrite };
-    let by_case = if spec.case == CaseName::Static { BALANCED.relaxation_at_rest } else { BALANCED.relaxation };
+    let by_case = match spec.case {
+        _ if is_driven(spec) => BALANCED.relaxation,
+        CaseName::Static => BALANCED.relaxation_at_rest,
+        CaseName::Oscillating => BALANCED.relaxation_in_oscillation,
+        CaseName::Dividing | CaseName::Custom => BALANCED.relaxation,
+    };
     let update = match spec.redistancing.get_or_insert(default) {
         RedistancingChoice::Transparent { relaxation, radius_h } => {
             let relaxation = *relaxation.get_or_insert(by_case);

@@ -11,6 +11,8 @@ use super::spec::{
     TensionWord,
 };
 use super::start_lattice::StartLattice;
+use super::varying_tension::{StartBox, tension_law};
+use super::vectors::vector;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::Pencils;
@@ -28,7 +30,7 @@ use crate::schemes::weakly_compressible_sph::{
     WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{Finding, OutputPlan, Quantity, Simulation};
-use crate::spec::{Coordinates, Parameter, Violation};
+use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -61,15 +63,6 @@ impl SceneSpec for Droplet {
             _ => plan::<2>(self),
         }
     }
-}
-
-/// The numbers of a field as a vector.
-fn vector<const D: usize>(at: &str, numbers: &Coordinates, errors: &mut Vec<Violation>) -> Vector<D> {
-    if numbers.len() != D {
-        let detail = format!("the scene has {D} dimensions");
-        errors.push(Violation::new(at, "conflict", detail, numbers.to_json(), format!("{D} numbers")));
-    }
-    Vector::<D>::from_fn(|d, _| numbers.get(d).copied().unwrap_or(0.0))
 }
 
 /// Where normals and curvatures come from; the spec gets what was left open.
@@ -188,6 +181,8 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
     let mut config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
     config.start_velocity = velocity;
+    let start = StartBox { shape: shape.as_ref().map(|(shape, _)| shape), low, lengths };
+    config.tension_law = tension_law(&spec, &start, &config, &mut errors);
     config.wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     if is_box
@@ -239,6 +234,7 @@ fn sph_config<const D: usize>(
             TensionWord::Balanced01 => TensionForce::BalancedUncorrected,
             TensionWord::Csf => TensionForce::Csf,
         },
+        tension_law: None,
         geometry: geometry.unwrap_or(Geometry::ColorField),
         discretization: flow.discretization,
         density: flow.density,

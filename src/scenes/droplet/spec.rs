@@ -94,14 +94,40 @@ crate::choice! {
     pub enum RedistancingChoice {
         /// long waves of the interface move with the particles alone; short waves and slopes are repaired
         Transparent = "transparent" {
-            /// share of a deviation that is repaired in the time ½ √(ρh³/(2πτ)), about a step; .05 for case static, else .1, when
-            /// not given
+            /// share of a deviation that is repaired in the time ½ √(ρh³/(2πτ)), about a step; .05 for case static, .02
+            /// for case oscillating, else .1, when not given
             relaxation: Option<f64>, in POSITIVE.and_at_most(1.0);
             /// radius of the surface filter in h
             radius_h: f64 = 6.0, in Interval::at_least(2.0).and_at_most(20.0);
         }
         /// the signed distance replaces the level at every evaluation (the paper)
         Overwrite = "overwrite",
+    }
+}
+
+crate::words! {
+    /// How the tension follows from the covered share x of the interface.
+    pub enum EquationWord {
+        /// τ₀ (1 − βx)
+        Linear = "linear",
+        /// τ₀ (1 + β ln(1 − x))
+        Langmuir = "langmuir",
+    }
+}
+
+crate::group! {
+    /// An insoluble surfactant on the interface.
+    pub struct SurfactantSpec {
+        /// share of the interface that is covered at the start
+        coverage: f64 = 0.3, in Interval::at_least(0.0).and_below(1.0);
+        /// change of the coverage at the start by length, from the middle of the box; 0 when not given
+        slope: Option<Coordinates>;
+        /// how the tension follows from the coverage
+        equation: EquationWord = EquationWord::Langmuir;
+        /// elasticity β
+        elasticity: f64 = 0.2, in POSITIVE.and_at_most(10.0);
+        /// diffusivity along the interface
+        diffusivity: f64 = 0.0, in NOT_NEGATIVE;
     }
 }
 
@@ -302,6 +328,11 @@ crate::group! {
         /// balanced: −(τ/ρ)(κ − κ₀) n δ with the curvature κ₀ of a ball for each droplet; balanced_0_1: that of version 0.1;
         /// csf: κ₀ = 0 (the paper)
         tension_force: TensionWord = TensionWord::Balanced;
+        /// b of a surface tension τ₀ (1 + b·x), x from the middle of the box, as a gradient of temperature sets it; it jumps at the
+        /// sides of the box, where no interface may be
+        tension_slope: Option<Coordinates>;
+        /// a surfactant on the interface, which lowers its tension; none when not given
+        surfactant: Option<SurfactantSpec>;
         /// where normals and curvatures come from
         geometry: GeometryChoice = with_defaults("pcp");
         /// how the flow is discretized

@@ -1,8 +1,9 @@
 //! Budgets of energy and momentum: what a run has, and what came in from outside.
 
-use super::interactions::surface_tension::smoothed_delta;
 use super::interface::Interface;
+use super::smoothed_delta::smoothed_delta;
 use super::system::SphSystem;
+use super::varying_tension::VaryingTension;
 use crate::geometry::Vector;
 use crate::simulation::section::known;
 use crate::simulation::{Component, LoadError, Section};
@@ -16,6 +17,8 @@ pub(super) struct Contents<const D: usize> {
     pub elastic: f64,
     /// Perimeter or surface area, Σ V δ(φ); NaN without a level set.
     pub interface: f64,
+    /// Energy of the interface: τ times it, or the integral of what varies.
+    pub surface: f64,
     /// Σ m u.
     pub momentum: Vector<D>,
     /// Σ m |u|.
@@ -39,10 +42,13 @@ impl<const D: usize> SphSystem<D> {
             kinetic: 0.0,
             elastic: 0.0,
             interface: self.interface_measure(),
+            surface: 0.0,
             momentum: Vector::<D>::zeros(),
             momentum_size: 0.0,
             mass: 0.0,
         };
+        let constant = self.config.tension * contents.interface;
+        contents.surface = self.varying.as_ref().map_or(constant, VaryingTension::surface_energy);
         for (i, u) in flow.velocity.iter().enumerate() {
             let mass = flow.mass(i);
             contents.mass += mass;
@@ -62,7 +68,7 @@ impl<const D: usize> SphSystem<D> {
         near.map(|i| self.flow.volume[*i] * smoothed_delta(phi[*i], self.config.smoothing_length)).sum()
     }
 
-    /// Power Σ m a·u and sum Σ m a of the body force at a time.
+    /// Power Σ m a·u and sum Σ m a of what comes from outside at a time: the body force, and what keeps up a slope of the tension.
     pub(super) fn body_force_sums(&self, time: f64) -> (f64, Vector<D>) {
         let mut sums = (0.0, Vector::<D>::zeros());
         if let Some(force) = &self.config.body_force {
@@ -72,6 +78,9 @@ impl<const D: usize> SphSystem<D> {
                 sums.0 += mass * acceleration.dot(&self.flow.velocity[i]);
                 sums.1 += acceleration * mass;
             }
+        }
+        if let Some(varying) = &self.varying {
+            sums.0 += varying.supplied_power(&self.flow.velocity);
         }
         sums
     }
@@ -89,9 +98,11 @@ pub(super) struct Budget<const D: usize> {
     pub start_energy: f64,
     /// Perimeter or surface area at the start; NaN before the first measurement and without a level set.
     pub start_interface: f64,
+    /// Energy of the interface at the start.
+    pub start_surface: f64,
     /// Enclosed area or volume at the first measurement; NaN before.
     pub start_measure: f64,
-    /// Work of the body force, ∫ Σ m a·u dt by trapezoids.
+    /// Work of the body force and of what keeps up a slope of the tension, ∫ Σ m a·u dt by trapezoids.
     pub work: f64,
     /// ∫ Σ m a dt of the body force by trapezoids.
     pub impulse: Vector<D>,
@@ -107,6 +118,7 @@ impl<const D: usize> Budget<D> {
         Self {
             start_energy: contents.kinetic + contents.elastic,
             start_interface: contents.interface,
+            start_surface: contents.surface,
             start_measure: f64::NAN,
             work: 0.0,
             impulse: Vector::<D>::zeros(),
@@ -116,8 +128,8 @@ impl<const D: usize> Budget<D> {
     }
 
     /// Energy gained from nothing: kinetic, elastic and surface energy beyond that of the start and the work done.
-    pub fn gain(&self, contents: &Contents<D>, tension: f64) -> f64 {
-        let surface = tension * (contents.interface - self.start_interface);
+    pub fn gain(&self, contents: &Contents<D>) -> f64 {
+        let surface = contents.surface - self.start_surface;
         contents.kinetic + contents.elastic - self.start_energy + surface - self.work
     }
 
@@ -131,6 +143,7 @@ impl<const D: usize> Component for Budget<D> {
     fn save(&self, section: &mut Section) {
         section.put_real("start_energy", self.start_energy);
         section.put_optional("start_interface", known(self.start_interface));
+        section.put_optional("start_surface", known(self.start_surface));
         section.put_optional("start_measure", known(self.start_measure));
         section.put_real("work", self.work);
         section.put_vectors("impulse", &[self.impulse]);
@@ -139,10 +152,16 @@ impl<const D: usize> Component for Budget<D> {
     }
 
     fn load(section: &Section) -> Result<Self, LoadError> {
+        let value = |name: &str| match section.has(name) {
+            true => Ok(section.optional(name)?.unwrap_or(f64::NAN)),
+            false => Ok::<f64, LoadError>(f64::NAN),
+        };
         let vector = |name: &str| Ok::<_, LoadError>(Vector::<D>::from_column_slice(section.reals_of(name, D)?));
         Ok(Self {
             start_energy: section.real("start_energy")?,
             start_interface: section.optional("start_interface")?.unwrap_or(f64::NAN),
+            // Earlier versions had one tension everywhere; see [`Guard::load`].
+            start_surface: value("start_surface")?,
             start_measure: section.optional("start_measure")?.unwrap_or(f64::NAN),
             work: section.real("work")?,
             impulse: vector("impulse")?,

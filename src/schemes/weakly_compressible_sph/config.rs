@@ -6,6 +6,7 @@ use super::kernel_choice::KernelChoice;
 use super::level_update::LevelUpdate;
 use super::species::Fluids;
 use super::standing_wave::StandingWave;
+use super::tension_law::TensionLaw;
 use crate::closest_point::PcpMethod;
 use crate::geometry::Vector;
 use crate::operators::Support;
@@ -114,6 +115,8 @@ pub struct SphConfig<const D: usize> {
     pub tension: f64,
     /// Form of the surface tension's force.
     pub tension_force: TensionForce,
+    /// What the tension depends on, where it is not the same everywhere.
+    pub tension_law: Option<TensionLaw<D>>,
     /// Method for normals and curvatures.
     pub geometry: Geometry,
     /// Method for the derivatives of the flow.

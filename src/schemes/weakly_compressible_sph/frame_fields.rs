@@ -2,6 +2,7 @@
 
 use super::config::{Geometry, SphConfig};
 use super::system::SphSystem;
+use super::tension_law::TensionLaw;
 use crate::geometry::Vector;
 use crate::simulation::fields::{
     COMMON_FIELDS, CURVATURE, FrameField, NORMAL, SURFACE_FIELDS, always_shown, quantities_of, shown_by_choice,
@@ -10,7 +11,7 @@ use crate::simulation::quantity::without_repetition;
 use crate::simulation::{FieldValues, Fields, Quantity, Selection};
 
 /// The fields that only this scheme has.
-fn table<const D: usize>() -> [FrameField<SphConfig<D>, SphSystem<D>>; 5] {
+fn table<const D: usize>() -> [FrameField<SphConfig<D>, SphSystem<D>>; 7] {
     [
         FrameField::new(
             &Quantity { name: "velocity", unit: "length/time", doc: "Velocity of the particle." },
@@ -44,6 +45,30 @@ fn table<const D: usize>() -> [FrameField<SphConfig<D>, SphSystem<D>>; 5] {
             },
         )
         .only_if(|config: &SphConfig<D>| !config.fluids.have_one_mass()),
+        FrameField::new(
+            &Quantity {
+                name: "surface_tension",
+                unit: "mass*length^(3-D)/time^2",
+                doc: "Surface tension at the closest point.",
+            },
+            |system: &SphSystem<D>| {
+                let known = system.varying.as_ref().map(|varying| varying.field.tension.clone());
+                FieldValues::Scalar(known.unwrap_or_default())
+            },
+        )
+        .only_if(|config: &SphConfig<D>| config.tension_law.is_some()),
+        FrameField::new(
+            &Quantity {
+                name: "coverage",
+                unit: "",
+                doc: "Share of the interface that the surfactant covers at the closest point.",
+            },
+            |system: &SphSystem<D>| {
+                let known = system.varying.as_ref().map(|varying| varying.field.coverage.clone());
+                FieldValues::Scalar(known.unwrap_or_default())
+            },
+        )
+        .only_if(|config: &SphConfig<D>| matches!(config.tension_law, Some(TensionLaw::Surfactant(_)))),
     ]
 }
 

@@ -100,15 +100,14 @@ impl<const D: usize> Guard<D> {
         (crowded, measure): (f64, f64),
         Clock { step, time }: Clock,
     ) -> Result<(), StepError> {
-        let tension = system.config.tension;
-        let scale = tension * self.budget.start_interface;
+        let scale = self.budget.start_surface.abs();
         let lost = system.strays.lost.unsigned_abs() as f64 / self.start_particles.max(1) as f64;
         if self.budget.start_measure.is_nan() {
             self.budget.start_measure = measure;
         }
         let creep = self.creep(system, contents, time);
         self.watched = Watched {
-            energy: self.budget.gain(contents, tension) / scale,
+            energy: self.budget.gain(contents) / scale,
             momentum: self.budget.momentum_gain(contents) / contents.momentum_size.max(least_momentum(system)),
             crowded,
             area: (measure / self.budget.start_measure - 1.0).abs(),
@@ -140,7 +139,7 @@ impl<const D: usize> Guard<D> {
     /// √(ρR³/τ) by the surface energy at the start; NaN in motion, and for the first capillary time of rest.
     fn creep(&mut self, system: &SphSystem<D>, contents: &Contents<D>, time: f64) -> f64 {
         let tension = system.config.tension;
-        let scale = tension * self.budget.start_interface;
+        let scale = self.budget.start_surface.abs();
         let radius = (D - 1) as f64 / ball_curvature::<D>(system.droplets.initial_measure);
         let capillary = (system.config.fluids.inside.density * radius.powi(3) / tension).sqrt();
         let kinetic = contents.inner_kinetic();
@@ -148,7 +147,7 @@ impl<const D: usize> Guard<D> {
             self.rest = [f64::NAN; 2];
             return f64::NAN;
         }
-        let balance = self.budget.tension_work + tension * contents.interface;
+        let balance = self.budget.tension_work + contents.surface;
         let [since, balance_then] = self.rest;
         if since.is_nan() {
             self.rest = [time, balance];
@@ -275,8 +274,13 @@ impl<const D: usize> Guard<D> {
     /// [`LoadError`].
     pub fn load(&self, section: &Section) -> Result<Self, LoadError> {
         let issued = section.counts_of("issued", DOUBTS.len())?;
+        let mut budget: Budget<D> = section.component("budget")?;
+        if budget.start_surface.is_nan() {
+            // Earlier versions had one tension everywhere.
+            budget.start_surface = budget.start_interface * (self.budget.start_surface / self.budget.start_interface);
+        }
         Ok(Self {
-            budget: section.component("budget")?,
+            budget,
             // Version 0.2.0 did not measure it.
             rise: if section.has("energy_rise") { section.component("energy_rise")? } else { EnergyRise::NONE },
             watched: section.component("watched")?,

@@ -31,6 +31,7 @@ use super::droplets::Droplets;
 use super::flow_state::FlowState;
 use super::fluids::Fluid;
 use super::interface::Interface;
+use super::varying_tension::TensionField;
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::Vector;
 use crate::particles::Particles;
@@ -82,6 +83,8 @@ pub(super) struct Moment<'a, const D: usize> {
     pub flow: &'a FlowState<D>,
     pub interface: &'a Interface<D>,
     pub droplets: &'a Droplets<D>,
+    /// The surface tension, where it is not the same everywhere.
+    pub tension: Option<&'a TensionField<D>>,
 }
 
 /// A force on each particle by itself.

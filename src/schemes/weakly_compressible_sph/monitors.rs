@@ -1,8 +1,8 @@
 //! What a series shows of two fluids, and what a report makes of it.
 
 use super::budget::Contents;
-use super::interactions::surface_tension::{smoothed_delta, smoothed_step};
 use super::quantities;
+use super::smoothed_delta::{smoothed_delta, smoothed_step};
 use super::species::Species;
 use super::system::SphSystem;
 use crate::closest_point::enclosed_moments::{EnclosedMoments, enclosed_moments};
@@ -174,7 +174,7 @@ impl<const D: usize> SphSystem<D> {
         row.extend([pressures.inside, pressures.outside, pressures.eos_jump, droplets, speed / sound]);
         let (least, close) = self.pair_distances(crowded);
         row.extend([speed * time_step / self.config.spacing, least, speed, contents.interface]);
-        row.extend([self.config.tension * contents.interface, contents.elastic, work]);
+        row.extend([contents.surface, contents.elastic, work]);
         let (elongation, angle) = moments.map_or((f64::NAN, f64::NAN), elongation);
         row.push(elongation);
         row.extend((D == 2).then_some(angle));

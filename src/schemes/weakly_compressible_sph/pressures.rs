@@ -1,7 +1,7 @@
 //! Pressures of both fluids, and the jump between them.
 
-use super::interactions::surface_tension::smoothed_step;
 use super::interface::Interface;
+use super::smoothed_delta::smoothed_step;
 use super::species::Species;
 use super::system::SphSystem;
 use crate::closest_point::enclosed_moments::EnclosedMoments;
@@ -87,7 +87,7 @@ impl<const D: usize> SphSystem<D> {
         let mut sums = (0.0, 0.0);
         for i in level_set.candidates().iter().copied().filter(|i| self.is_near(*i)) {
             let area = self.flow.volume[i] * tension.profile(phi[i]);
-            sums.0 += tension.absorbed_pressure(Species::Inside, &self.droplets, i) * area;
+            sums.0 += self.absorbed_inside(i) * area;
             sums.1 += area;
         }
         sums

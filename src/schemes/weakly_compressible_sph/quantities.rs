@@ -31,6 +31,12 @@ quantities! {
         PRESSURE_BALANCED = "pressure_balanced", "mass/(length*time^2)", "Jump tau kappa_0 that the balanced force takes out of the pressure.";
         PRESSURE_INSIDE_COUNT = "pressure_inside_count", "particles", "Particles over which the pressure inside is a mean.";
         WAVE_AMPLITUDE = "wave_amplitude", "length", "Amplitude of the wave on the sides of a layer.";
+        TENSION_MIN = "tension_min", "", "Least surface tension on the interface, by that of the scene.";
+        TENSION_MAX = "tension_max", "", "Largest surface tension on the interface, by that of the scene.";
+        SURFACTANT = "surfactant", "length^(D-1)", "Amount of the surfactant: the integral of its coverage over the interface.";
+        SURFACTANT_OFF_INTERFACE = "surfactant_off_interface", "", "Share of the surfactant on particles that are far from any interface.";
+        COVERAGE_MIN = "coverage_min", "", "Least coverage of the interface by the surfactant.";
+        COVERAGE_MAX = "coverage_max", "", "Largest coverage of the interface by the surfactant.";
         DROPLETS = "droplets", "", "Connected components of the inner fluid.";
         MACH = "mach", "", "Largest speed by the lower speed of sound.";
         CFL = "cfl", "spacings", "Longest way of a particle in a part of the last step.";

@@ -1,26 +1,28 @@
 //! Two fluids step by step.
 
 use super::checks::LIMITS;
-use super::config::SphConfig;
-use super::dimensionless::{DimensionlessNumbers, Scales};
+use super::diagnostics::diagnostics;
 use super::droplets::ball_curvature;
 use super::format_1;
 use super::frame_fields;
 use super::guard::Guard;
-use super::interactions::BodyForce;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
 use super::quantities::{TIME, TIME_STEP, WAVE_AMPLITUDE};
 use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, Instant, SphSystem};
+use super::tension_law::TensionLaw;
+use super::tension_record::TensionRecord;
 use super::time_step::{StepLimit, longest_step};
+use super::varying_tension::VaryingTension;
 use super::wave_record::WaveRecord;
-use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, entry, support_diagnostics};
+use crate::geometry::Vector;
+use crate::schemes::measured_errors::entry;
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
 use crate::simulation::{
-    Check, Course, CpuClock, Diagnostic, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan,
-    Phases, Report, Section, Selection, Simulation, StepError,
+    Check, Course, CpuClock, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Report,
+    Section, Selection, Simulation, StepError,
 };
 use crate::time::clock::TIME_SLACK;
 use crate::time::{Clock, FixedStep, Pace};
@@ -43,6 +45,7 @@ pub struct WeaklyCompressibleSph<const D: usize> {
     guard: Guard<D>,
     summary: Summary,
     wave: Option<WaveRecord>,
+    tension: Option<TensionRecord<D>>,
     course: Course,
 }
 
@@ -65,6 +68,8 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
     ) -> Self {
         let pace = Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 });
         let wave = system.config.wave.clone().map(WaveRecord::new);
+        let has_surfactant = matches!(system.config.tension_law, Some(TensionLaw::Surfactant(_)));
+        let tension = system.varying.as_ref().map(|_| TensionRecord::new(has_surfactant));
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
@@ -78,6 +83,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             row: Row::new(),
             summary: Summary::new(end_time),
             wave,
+            tension,
             course: Course::new(pace, Phases::new(cpu_clock), method),
         };
         this.failure = this.begin().err();
@@ -111,6 +117,12 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
     /// κ₀ of one droplet that holds everything.
     fn whole_curvature(&self) -> f64 {
         ball_curvature::<D>(self.system.droplets.initial_measure)
+    }
+
+    /// Mean tension over the interface.
+    fn mean_tension(&self) -> f64 {
+        let tension = self.system.config.tension;
+        self.system.varying.as_ref().map_or(tension, VaryingTension::mean)
     }
 
     fn time_of_part(&self) -> f64 {
@@ -150,10 +162,17 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         if let Some(wave) = &mut self.wave {
             wave.take(&self.system, time, is_measured);
         }
+        if let (Some(record), Some(varying)) = (&mut self.tension, &self.system.varying) {
+            record.look(&self.system, varying);
+        }
         if is_measured {
             self.summary.largest_speed = self.summary.largest_speed.max(self.system.flow.largest_relative_speed());
             let measured = (crowded, self.row_value(if D == 2 { "area" } else { "volume" }));
             self.guard.measure(&self.system, &contents, measured, clock)?;
+            let center = Vector::<D>::from_fn(|d, _| self.row_value(["center_x", "center_y", "center_z"][d]));
+            if let Some(record) = &mut self.tension {
+                self.course.findings.extend(record.measure(&self.system, (&center, self.end_time), clock)?);
+            }
             let Fastest { speed, sound_speed, .. } = fastest(&self.system);
             self.course.findings.extend(self.guard.new_doubts(&self.system, speed / sound_speed, clock));
         }
@@ -324,6 +343,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let mut row: Observables = vec![(&TIME, self.clock().time), (&TIME_STEP, self.time_of_part())];
         row.extend(names(D).into_iter().zip(self.row.iter().copied()));
         row.extend(self.wave.as_ref().map(|wave| (&WAVE_AMPLITUDE, wave.amplitude)));
+        row.extend(self.tension.iter().flat_map(TensionRecord::observables));
         row
     }
 
@@ -346,6 +366,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         state.put_component("summary", &self.summary);
         if let Some(wave) = &self.wave {
             state.put_section("wave", |section| wave.save(section));
+        }
+        if let Some(tension) = &self.tension {
+            state.put_section("tension", |section| tension.save(section));
         }
     }
 
@@ -372,12 +395,16 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             Some(wave) => Some(state.section("wave", |section| wave.load(section))?),
             None => None,
         };
+        let tension = match &self.tension {
+            Some(tension) => Some(state.section("tension", |section| tension.load(section))?),
+            None => None,
+        };
         self.system.load(state)?;
         // 2. From here on nothing fails.
         // An interrupt ends the run before its next step.
         let _ = self.system.derive();
         self.guard = guard.unwrap_or_else(|| Guard::new(&self.system));
-        (self.failure, self.wave) = (None, wave);
+        (self.failure, self.wave, self.tension) = (None, wave, tension);
         (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
         (self.row, self.summary) = (row, summary.with_end(self.end_time));
         self.course.pace = pace;
@@ -395,15 +422,21 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let whole = self.whole_curvature();
         let measure = self.system.droplets.initial_measure;
         let expected = match self.system.droplets.has_layer() {
-            false => (self.system.config.tension * whole, whole, measure),
+            false => (self.mean_tension() * whole, whole, measure),
             // A layer has no curvature as a ball.
             true => (f64::NAN, f64::NAN, measure),
         };
         let mut errors = self.summary.entries(D, self.clock().time, expected);
         errors.extend(self.scaled_speed());
         errors.extend(self.guard.energy_rise(&self.system, self.clock().time));
+        errors.extend(self.tension.iter().filter_map(|tension| tension.errors(&self.system, measure)));
         errors.extend(self.wave.iter().flat_map(|wave| wave.errors(self.clock().time)));
-        Report { errors, health: self.health(), diagnostics: self.diagnostics(), method: self.course.method.clone() }
+        Report {
+            errors,
+            health: self.health(),
+            diagnostics: diagnostics(&self.system, self.summary.largest_speed),
+            method: self.course.method.clone(),
+        }
     }
 
     fn health(&self) -> Health {
@@ -412,6 +445,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let Fastest { speed, sound_speed, .. } = fastest(&self.system);
         let mut checks = vec![Check::at_most("mach", Some(speed / sound_speed), 1.0, "")];
         checks.extend(self.guard.checks(&self.system));
+        checks.extend(self.tension.iter().flat_map(TensionRecord::checks));
         if self.system.interface.level_set().is_some() {
             checks.push(Check::watched(if D == 2 { "area_drift" } else { "volume_drift" }, volume_drift, ""));
             checks.push(Check::watched("absorbed_strays", Some(self.system.strays.absorbed as f64), "particles"));
@@ -422,42 +456,6 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
 
     fn particle_count(&self) -> usize {
         self.system.particles.len()
-    }
-}
-
-impl<const D: usize> WeaklyCompressibleSph<D> {
-    /// Numbers of the run, with the largest speed that was measured.
-    fn numbers(&self) -> DimensionlessNumbers {
-        let SphConfig { fluids, tension, spacing, wave, body_force, .. } = &self.system.config;
-        let largest = self.system.droplets.ball_curvatures.iter().copied().fold(0.0, f64::max);
-        let diameter = match wave {
-            Some(wave) => 2.0 * std::f64::consts::PI / wave.wavenumber,
-            None => 2.0 * (D - 1) as f64 / largest,
-        };
-        DimensionlessNumbers::from(Scales {
-            fluids: *fluids,
-            tension: *tension,
-            diameter,
-            speed: self.summary.largest_speed,
-            gravity: body_force.as_ref().map_or(0.0, BodyForce::constant_strength),
-            spacing: *spacing,
-        })
-    }
-
-    fn diagnostics(&self) -> Vec<Diagnostic> {
-        let mut diagnostics = Vec::new();
-        if let Some(interface) = self.system.interface.level_set() {
-            diagnostics.extend(closest_point_diagnostics(interface.surface.fit_diagnostics()));
-            let doc = "Curvatures that were bounded to what the spacing resolves.";
-            diagnostics.push(Diagnostic::count("curvature.clipped", interface.bounded, doc));
-        }
-        if let Some(flow) = self.system.equations.fits() {
-            diagnostics.extend(support_diagnostics(FLOW_FITS, &flow.fit_diagnostics));
-        }
-        diagnostics.extend(self.numbers().diagnostics());
-        let doc = "Particles without a neighbor of their own fluid that took the side of their neighbors.";
-        diagnostics.push(Diagnostic::count("strays.absorbed", self.system.strays.absorbed, doc));
-        diagnostics
     }
 }
 

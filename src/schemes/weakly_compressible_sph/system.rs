@@ -13,6 +13,8 @@ use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
 use super::species::{Fluids, Species};
 use super::strays::Strays;
+use super::surfactant::Scales;
+use super::varying_tension::{Surroundings, VaryingTension};
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
@@ -48,6 +50,7 @@ pub struct SphSystem<const D: usize> {
     pub(super) strays: Strays<D>,
     pub(super) equations: FlowEquations<D>,
     tension: Option<SurfaceTension>,
+    pub(super) varying: Option<VaryingTension<D>>,
     /// Accelerations by surface tension of the particles in the band, at the last evaluation.
     pub(super) band: BandForces<D>,
     /// Forces on particles, added in this order behind those of the band.
@@ -90,6 +93,13 @@ impl<const D: usize> SphSystem<D> {
         particles.scalar_mut(columns.phi).copy_from_slice(&drop.level);
         let interface = new_interface(&config, &domain, &mut particles, &columns);
         let tension = config.has_tension().then(|| config.surface_tension());
+        let scales = Scales {
+            spacing: config.spacing,
+            smoothing_length: config.smoothing_length,
+            repair_time: config.repair_time(),
+        };
+        let law = config.tension_law.filter(|_| interface.level_set().is_some());
+        let varying = law.map(|law| VaryingTension::new((law, config.tension), &domain, scales, &mut particles));
         let mut forces: Vec<Box<dyn ParticleForce<D>>> = Vec::new();
         if let Some(tension) = tension {
             forces.push(Box::new(tension));
@@ -108,6 +118,7 @@ impl<const D: usize> SphSystem<D> {
             particles,
             columns,
             tension,
+            varying,
             band: BandForces::default(),
             forces,
             config,
@@ -141,6 +152,7 @@ impl<const D: usize> SphSystem<D> {
         if bulk_damping > 0.0 && !self.config.is_density_integrated() {
             self.flow.damp_bulk(bulk_damping * self.config.smoothing_length, elapsed);
         }
+        phases.measure("sph/tension", || self.advance_tension(elapsed))?;
         if let Interface::ColorField(color) = &mut self.interface {
             phases.measure("sph/color", || {
                 let found = color.find(&self.flow, &mut self.pairs);
@@ -225,6 +237,12 @@ impl<const D: usize> SphSystem<D> {
             level_set.list_candidates();
         }
         self.flow.derive_pressures();
+        let Self { varying, interface, particles, columns, flow, droplets, .. } = self;
+        if let Some(varying) = varying {
+            flow.derive_volumes();
+            let surroundings = Surroundings { columns, flow, droplets, candidates: interface.candidates() };
+            varying.derive(particles, surroundings);
+        }
         Ok(())
     }
 
@@ -258,6 +276,14 @@ impl<const D: usize> SphSystem<D> {
         Ok(())
     }
 
+    /// Moves a surfactant on, and finds the tensions that vary.
+    fn advance_tension(&mut self, elapsed: f64) -> Result<(), Interrupted> {
+        let Self { varying, interface, particles, columns, flow, droplets, interrupt, .. } = self;
+        let Some(varying) = varying else { return Ok(()) };
+        let surroundings = Surroundings { columns, flow, droplets, candidates: interface.candidates() };
+        varying.advance(particles, surroundings, elapsed, interrupt)
+    }
+
     fn sum_densities(&mut self) -> Result<(), Interrupted> {
         density_summation::sum_volumes(&mut self.pairs, self.flow.calibration, &mut self.flow.volume)?;
         self.flow.derive_densities();
@@ -265,8 +291,9 @@ impl<const D: usize> SphSystem<D> {
     }
 
     fn add_forces(&mut self, time: f64) {
-        let Self { particles, columns, flow, interface, droplets, tension, band, forces, rates, .. } = self;
-        let moment = Moment { time, particles, columns, flow, interface, droplets };
+        let Self { particles, columns, flow, interface, droplets, tension, varying, band, forces, rates, .. } = self;
+        let field = varying.as_ref().map(|varying| &varying.field);
+        let moment = Moment { time, particles, columns, flow, interface, droplets, tension: field };
         if let Some(tension) = tension {
             tension.find_band_forces(band, &moment);
             for (i, force) in &band.forces {
@@ -285,8 +312,13 @@ impl<const D: usize> SphSystem<D> {
 
     /// The part of the pressure that the balanced force has absorbed, at a particle.
     pub(super) fn absorbed_pressure(&self, i: usize) -> f64 {
-        let absorbed = |tension: &SurfaceTension| tension.absorbed_pressure(self.flow.species[i], &self.droplets, i);
-        self.tension.as_ref().map_or(0.0, absorbed)
+        if self.flow.species[i] == Species::Inside { self.absorbed_inside(i) } else { 0.0 }
+    }
+
+    /// The part of the pressure inside that the balanced force has absorbed, of the droplet that a particle belongs to.
+    pub(super) fn absorbed_inside(&self, i: usize) -> f64 {
+        let field = self.varying.as_ref().map(|varying| &varying.field);
+        self.tension.as_ref().map_or(0.0, |tension| tension.absorbed_pressure(&self.droplets, field, i))
     }
 
     fn count_droplets(&mut self) -> Option<usize> {

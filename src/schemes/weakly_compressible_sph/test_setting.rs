@@ -35,6 +35,7 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
         fluids: Fluids { inside: fluid(ratio, 0.4 * ratio), outside: fluid(1.0, 0.4) },
         tension: 1.0,
         tension_force: TensionForce::Csf,
+        tension_law: None,
         geometry: Geometry::ColorField,
         discretization: Discretization::Kernels,
         density: DensityMethod::Summation,

@@ -5,6 +5,8 @@ use super::interactions::pressure::SoundWaves;
 use super::interactions::viscosity::ViscousDiffusion;
 use super::interactions::{LimitContext, LimitsStep, StabilityNumbers};
 use super::species::Species;
+use super::surfactant;
+use super::tension_law::TensionLaw;
 
 pub use super::interactions::StepLimit;
 
@@ -39,8 +41,22 @@ pub fn longest_step<const D: usize>(config: &SphConfig<D>, speed: f64) -> StepLi
     let of_fluids =
         fluids.iter().flat_map(|fluid| on_fluids.map(|interaction| interaction.step_limit(fluid, &context)));
     let of_force = config.body_force.as_ref().map(|force| force.step_limit(&fluids[0], &context));
+    let of_law = config.tension_law.map(|law| match law {
+        TensionLaw::Slope { largest, .. } => {
+            let at_scene = fluids.map(|fluid| tension.step_limit(&fluid, &context));
+            let [a, b] = at_scene.map(|limit| limit.length / largest.max(1.0).sqrt());
+            StepLimit { length: a.min(b), cause: "capillary waves where the tension is largest" }
+        }
+        TensionLaw::Surfactant(surfactant) => {
+            let length = surfactant::longest_step(surfactant.diffusivity, config.spacing);
+            StepLimit { length, cause: "diffusion of the surfactant" }
+        }
+    });
     let none = StepLimit { length: f64::INFINITY, cause: "nothing" };
-    of_fluids.chain(of_force).fold(none, |least, limit| if limit.length < least.length { limit } else { least })
+    of_fluids
+        .chain(of_force)
+        .chain(of_law)
+        .fold(none, |least, limit| if limit.length < least.length { limit } else { least })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Amplitude of the wave on the sides of a layer in a run, and its error against linear theory.
 
-use super::interactions::surface_tension::smoothed_delta;
+use super::smoothed_delta::smoothed_delta;
 use super::standing_wave::StandingWave;
 use super::system::SphSystem;
 use crate::schemes::measured_errors::entry;

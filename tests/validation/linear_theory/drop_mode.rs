@@ -12,6 +12,10 @@
 //! * tangential stress ∝ η (Q + 2(n m − d + 2) F − 2 G), continuous;
 //! * radial stress ∝ −p + 2η (G − F), with `p_i = −(ρ_i s R² F − η_i Q_i)/n`, `p_o = (ρ_o s R² F − η_o Q_o)/m`; its jump
 //!   (outside − inside) is the tension times the change of curvature, `τ (n−1)(n+d−1) F/(s R)`.
+//!
+//! A surfactant of the elasticity E = −Γ dτ/dΓ that is stretched by ∇_s·u = (F − G)/R, and spreads with the diffusivity D,
+//! changes the tension by `M (F − G)`, M = E/(R (s + D n m/R²)). The tangential jump is its gradient, `n m M (F − G)` in
+//! the units above; the radial one has `(d−1) M (F − G)` besides.
 
 use super::bessel_ratios::{ratio_i, ratio_k};
 use nalgebra::Complex;
@@ -55,22 +59,21 @@ pub fn confined_drop_mode(
     tension: f64,
     reflection: f64,
 ) -> Option<(f64, f64)> {
-    let drop = Drop { dimension, mode, radius, inside, outside, tension, reflection };
-    let frequency = drop.inviscid_frequency();
-    if inside.viscosity == 0.0 && outside.viscosity == 0.0 {
-        return Some((frequency, 0.0));
-    }
-    // From weak damping, where the inviscid mode is a good start, to the asked viscosities; each step is small enough for
-    // the secants to stay on the mode.
-    let mut rate = Complex::new(-0.01 * frequency, frequency);
-    for step in (0..=32).rev() {
-        let share = 2.0_f64.powf(-0.25 * f64::from(step));
-        rate = root_near(rate, |s| drop.determinant(s, share))?;
-        if rate.im < 1e-6 * frequency {
-            return None;
-        }
-    }
-    Some((rate.im, -rate.re))
+    Drop { dimension, mode, radius, inside, outside, tension, reflection, elastic: Elastic::NONE }.oscillation()
+}
+
+/// What a surfactant adds to an interface.
+#[derive(Debug, Clone, Copy)]
+pub struct Elastic {
+    /// E = −Γ dτ/dΓ.
+    pub elasticity: f64,
+    /// Diffusivity along the interface.
+    pub diffusivity: f64,
+}
+
+impl Elastic {
+    /// A clean interface.
+    pub const NONE: Self = Self { elasticity: 0.0, diffusivity: 0.0 };
 }
 
 /// Lamb's frequency of the same drop in fluids without viscosity: ω² = τ (n−1)(n+d−1)/(R³ (ρ_i/n + ρ_o/(n+d−2))).
@@ -82,7 +85,8 @@ pub fn inviscid_drop_frequency(
     outside: Fluid,
     tension: f64,
 ) -> f64 {
-    Drop { dimension, mode, radius, inside, outside, tension, reflection: 0.0 }.inviscid_frequency()
+    let (reflection, elastic) = (0.0, Elastic::NONE);
+    Drop { dimension, mode, radius, inside, outside, tension, reflection, elastic }.inviscid_frequency()
 }
 
 /// Reflection β = (R/b)^(2n+d−2) by a concentric circle or sphere of radius b that no fluid passes.
@@ -105,17 +109,48 @@ pub fn reflection_of_square_box(radius: f64, side: f64) -> f64 {
 }
 
 /// What the dispersion relation depends on.
-struct Drop {
-    dimension: usize,
-    mode: usize,
-    radius: f64,
-    inside: Fluid,
-    outside: Fluid,
-    tension: f64,
-    reflection: f64,
+pub struct Drop {
+    /// 2 or 3.
+    pub dimension: usize,
+    /// n.
+    pub mode: usize,
+    /// R.
+    pub radius: f64,
+    pub inside: Fluid,
+    pub outside: Fluid,
+    /// τ, of the covered interface where there is a surfactant.
+    pub tension: f64,
+    /// β of the potential outside.
+    pub reflection: f64,
+    pub elastic: Elastic,
 }
 
 impl Drop {
+    /// Angular frequency and decay rate, as [`two_fluid_drop_mode`] has them.
+    pub fn oscillation(&self) -> Option<(f64, f64)> {
+        let frequency = self.inviscid_frequency();
+        if self.inside.viscosity == 0.0 && self.outside.viscosity == 0.0 {
+            return Some((frequency, 0.0));
+        }
+        // From weak damping, where the inviscid mode is a good start, to the asked viscosities; each step is small enough for
+        // the secants to stay on the mode.
+        let mut rate = Complex::new(-0.01 * frequency, frequency);
+        for step in (0..=32).rev() {
+            let share = 2.0_f64.powf(-0.25 * f64::from(step));
+            rate = root_near(rate, |s| self.determinant(s, [share, 0.0]))?;
+            if rate.im < 1e-6 * frequency {
+                return None;
+            }
+        }
+        if self.elastic.elasticity > 0.0 {
+            // The same from a clean interface to the asked elasticity.
+            for step in 1..=64 {
+                rate = root_near(rate, |s| self.determinant(s, [1.0, f64::from(step) / 64.0]))?;
+            }
+        }
+        Some((rate.im, -rate.re))
+    }
+
     /// n and m = n + d − 2.
     fn exponents(&self) -> (f64, f64) {
         (self.mode as f64, (self.mode + self.dimension - 2) as f64)
@@ -138,8 +173,9 @@ impl Drop {
         (self.stiffness() / (inertia * self.radius.powi(3))).sqrt()
     }
 
-    /// The determinant of the two stress conditions in F and G at growth rate s, both viscosities times `share`.
-    fn determinant(&self, s: Complex<f64>, share: f64) -> Complex<f64> {
+    /// The determinant of the two stress conditions in F and G at growth rate s, both viscosities and the elasticity times their
+    /// shares.
+    fn determinant(&self, s: Complex<f64>, [share, elastic_share]: [f64; 2]) -> Complex<f64> {
         let ((n, m), (kappa, mu)) = (self.exponents(), self.outer_potential());
         let d = self.dimension as f64;
         let order = n + d / 2.0 - 1.0;
@@ -155,11 +191,16 @@ impl Drop {
             Complex::ZERO
         };
         let shear = 2.0 * (n * m - d + 2.0) * (eta_i - eta_o);
-        let tangential = (-q_i * n - q_o * mu + shear, q_i - q_o - 2.0 * (eta_i - eta_o));
+        let spreading = self.elastic.diffusivity * n * m / self.radius.powi(2);
+        let stretch = (s + spreading).inv() * (elastic_share * self.elastic.elasticity / self.radius);
+        let along = stretch * (n * m);
+        let tangential = (-q_i * n - q_o * mu + shear - along, q_i - q_o - 2.0 * (eta_i - eta_o) + along);
         let inertia = s * self.radius.powi(2) * (self.inside.density / n + self.outside.density * kappa);
         let radial = (
-            -inertia - q_i + q_o * kappa * mu + 2.0 * (eta_i - eta_o) - self.stiffness() / (s * self.radius),
-            q_i / n + q_o * kappa - 2.0 * (eta_i - eta_o),
+            -inertia - q_i + q_o * kappa * mu + 2.0 * (eta_i - eta_o)
+                - self.stiffness() / (s * self.radius)
+                - stretch * (d - 1.0),
+            q_i / n + q_o * kappa - 2.0 * (eta_i - eta_o) + stretch * (d - 1.0),
         );
         tangential.0 * radial.1 - tangential.1 * radial.0
     }

@@ -5,7 +5,8 @@ use crate::geometry::Vector;
 use crate::schemes::weakly_compressible_sph::droplets::Droplets;
 use crate::schemes::weakly_compressible_sph::fluids::Fluid;
 use crate::schemes::weakly_compressible_sph::interface::Interface;
-use crate::schemes::weakly_compressible_sph::species::Species;
+use crate::schemes::weakly_compressible_sph::smoothed_delta::smoothed_delta;
+use crate::schemes::weakly_compressible_sph::varying_tension::TensionField;
 use std::f64::consts::PI;
 
 /// The force of surface tension.
@@ -71,11 +72,6 @@ impl SurfaceTension {
         }
         self.narrow_share * smoothed_delta(distance, 0.5 * self.smoothing_length) + (1.0 - self.narrow_share) * wide
     }
-
-    /// The part τ κ₀ of the pressure that the balanced force has absorbed, at a particle: 0 outside the droplets.
-    pub fn absorbed_pressure<const D: usize>(&self, species: Species, droplets: &Droplets<D>, i: usize) -> f64 {
-        if species == Species::Inside { self.coefficient * self.force.absorbed_curvature(droplets, i) } else { 0.0 }
-    }
 }
 
 /// Accelerations by surface tension of the particles in a band.
@@ -99,7 +95,11 @@ impl SurfaceTension {
         for i in level_set.candidates().iter().copied().filter(|i| band[*i] == 1) {
             let delta = self.profile(phi[i]);
             if delta > 0.0 {
-                forces.push((i, normal[i] * (self.strength(i, curvature[i], moment) * delta)));
+                let force = match moment.tension {
+                    None => normal[i] * (self.strength(i, curvature[i], moment) * delta),
+                    Some(field) => self.varying_force(field, i, (curvature[i], normal[i]), moment) * delta,
+                };
+                forces.push((i, force));
             }
         }
         if self.force == TensionForce::Balanced {
@@ -111,6 +111,35 @@ impl SurfaceTension {
     fn strength<const D: usize>(&self, i: usize, curvature: f64, moment: &Moment<'_, D>) -> f64 {
         let absorbed = self.force.absorbed_curvature(moment.droplets, i);
         -self.coefficient / moment.flow.density[i] * (curvature - absorbed)
+    }
+
+    /// The acceleration −((τκ − τ̄κ₀) n − ∇τ)/ρ by δ, with the gradient along the interface (Marangoni) and the mean tension τ̄ of
+    /// the droplet.
+    fn varying_force<const D: usize>(
+        &self,
+        field: &TensionField<D>,
+        i: usize,
+        (curvature, normal): (f64, Vector<D>),
+        moment: &Moment<'_, D>,
+    ) -> Vector<D> {
+        if field.tension[i].is_nan() {
+            return Vector::<D>::zeros();
+        }
+        let absorbed = self.absorbed_pressure(moment.droplets, Some(field), i);
+        (field.gradient[i] - normal * (field.tension[i] * curvature - absorbed)) / moment.flow.density[i]
+    }
+
+    /// The part τ̄κ₀ of the pressure inside that the balanced force has absorbed, of the droplet that a particle belongs to.
+    pub fn absorbed_pressure<const D: usize>(
+        &self,
+        droplets: &Droplets<D>,
+        field: Option<&TensionField<D>>,
+        i: usize,
+    ) -> f64 {
+        let mean = field.map_or(self.coefficient, |field| field.means[droplets.group(i)]);
+        let kappa = self.force.absorbed_curvature(droplets, i);
+        // A group without an interface has no mean, and no curvature.
+        if kappa == 0.0 { 0.0 } else { mean * kappa }
     }
 
     /// Takes the sum over each droplet out of the forces: f_i ← f_i − F V_i δ_i/(D m_i) with F = Σ m f and D = Σ V δ.
@@ -153,40 +182,5 @@ impl LimitsStep for SurfaceTension {
     fn step_limit(&self, fluid: &Fluid, context: &LimitContext) -> StepLimit {
         let period = (fluid.density * self.smoothing_length.powi(3) / (2.0 * PI * self.coefficient.abs())).sqrt();
         StepLimit { length: context.numbers.capillary * period, cause: "capillary waves" }
-    }
-}
-
-/// The smoothed δ of a signed distance: Wendland's C² kernel of one dimension (B.3), with the support 2 ε.
-pub fn smoothed_delta(distance: f64, smoothing_length: f64) -> f64 {
-    let q = distance.abs() / smoothing_length;
-    let rest = (1.0 - 0.5 * q).max(0.0);
-    0.625 / smoothing_length * rest * rest * rest * (1.5 * q + 1.0)
-}
-
-/// The integral of [`smoothed_delta`] up to a signed distance, from 0 to 1.
-pub fn smoothed_step(distance: f64, smoothing_length: f64) -> f64 {
-    // ∫ (5/4) (1 − t)³ (1 + 3t) dt with t = |d|/(2ε).
-    let t = (0.5 * distance.abs() / smoothing_length).min(1.0);
-    let half = 1.25 * (t - 2.0 * t.powi(3) + 2.0 * t.powi(4) - 0.6 * t.powi(5));
-    0.5 + half.copysign(distance)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{smoothed_delta, smoothed_step};
-
-    #[test]
-    fn the_smoothed_step_is_the_integral_of_delta() {
-        for d in [-0.9, -0.5, -0.1, 0.0, 0.2, 0.7, 0.79] {
-            let slope = (smoothed_step(d + 1e-5, 0.4) - smoothed_step(d - 1e-5, 0.4)) / 2e-5;
-            assert!((slope - smoothed_delta(d, 0.4)).abs() < 1e-4, "{d}");
-        }
-        assert!((smoothed_step(2.0, 0.4) - 1.0).abs() < 1e-15 && smoothed_step(-2.0, 0.4).abs() < 1e-15);
-    }
-
-    #[test]
-    fn the_smoothed_delta_integrates_to_one() {
-        let sum: f64 = (0..4000).map(|k| smoothed_delta(f64::from(k - 2000) * 1e-3 + 5e-4, 0.4) * 1e-3).sum();
-        assert!((sum - 1.0).abs() < 1e-6, "{sum}");
     }
 }
