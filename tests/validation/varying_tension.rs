@@ -3,6 +3,7 @@
 use super::linear_theory::drop_mode::{Drop, Elastic, Fluid, reflection_of_square_box};
 use crate::support::{build, pool};
 use meniscus::simulation::{OutputPlan, Report, Simulation};
+use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 
 fn observable(simulation: &dyn Simulation, name: &str) -> f64 {
@@ -56,28 +57,17 @@ fn a_surfactant_spreads_as_on_a_circle_and_on_a_sphere() {
     let error = rate_of_decay(&with(&drop, &circle)) / 0.4 - 1.0;
     assert!(error.abs() < 0.01, "circle: {error}");
     let sphere = json!({
-        "dimension": 3, "spacing": 0.1, "end_time": 0.3,
+        "dimension": 3, "spacing": 0.0714, "end_time": 0.15, "domain": {"low": [-0.8, -0.8, -0.8], "high": [0.8, 0.8, 0.8]},
         "shape": {"type": "sphere", "center": [0.013, 0.007, 0.003], "radius": 0.5}, "surfactant": surfactant(json!([0, 0.2, 0]))
     });
     let error = rate_of_decay(&with(&drop, &sphere)) / 0.8 - 1.0;
-    assert!(error.abs() < 0.03, "sphere: {error}");
+    assert!(error.abs() < 0.02, "sphere: {error}");
 }
 
-/// Against linear theory with an elastic interface. Without the Marangoni stress the decay would be 0.51.
-#[test]
-fn a_drop_with_a_surfactant_oscillates_as_linear_theory_says() {
-    let fluid = json!({"density": 1, "viscosity": 0.01, "sound_speed": 20});
-    let simulation = run(
-        &json!({
-            "kind": "droplet", "case": "custom", "spacing": 0.03125, "end_time": 2.5, "surface_tension": 1,
-            "shape": {"type": "ellipse", "center": [0.0131, 0.0072], "semi_axes": [0.42, 0.380_952_380_952_380_93]},
-            "domain": {"low": [-1.2, -1.2], "high": [1.2, 1.2]}, "fluids": {"inside": fluid, "outside": fluid},
-            "surfactant": {"coverage": 0.3, "elasticity": 0.5, "equation": "linear"}
-        }),
-        |_| {},
-    );
-    let fluid = Fluid { density: 1.0, viscosity: 0.01 };
-    let drop = Drop {
+/// Rates of growth e^{st} of mode 2 of a drop with R = 0.4, η = 0.03 and a surfactant of E = 0.15, τ = 0.85.
+fn elastic_drop() -> Drop {
+    let fluid = Fluid { density: 1.0, viscosity: 0.03 };
+    Drop {
         dimension: 2,
         mode: 2,
         radius: 0.4,
@@ -86,14 +76,68 @@ fn a_drop_with_a_surfactant_oscillates_as_linear_theory_says() {
         tension: 0.85,
         reflection: reflection_of_square_box(0.4, 2.4),
         elastic: Elastic { elasticity: 0.15, diffusivity: 0.0 },
+    }
+}
+
+/// What is left of a series when the damped oscillations of two pairs (frequency, decay) and a constant are fitted to it.
+fn remainder(series: &[(f64, f64)], pairs: [(f64, f64); 2]) -> f64 {
+    let row = |t: f64| {
+        let [a, b] = pairs.map(|(frequency, decay)| {
+            let size = (-decay * t).exp();
+            [size * (frequency * t).cos(), size * (frequency * t).sin()]
+        });
+        [a[0], a[1], b[0], b[1], 1.0]
     };
-    let (frequency, decay) = drop.oscillation().unwrap();
-    let report = simulation.report();
-    let frequency_error = error(&report, "deformation", "frequency") / frequency - 1.0;
-    let decay_error = error(&report, "deformation", "decay") / decay - 1.0;
-    assert!(frequency_error.abs() < 0.03, "frequency: {frequency_error}, theory {frequency}");
-    assert!(decay_error.abs() < 0.08, "decay: {decay_error}, theory {decay}");
-    assert!(report.health.checks.iter().all(|check| check.holds != Some(false)), "{:?}", report.health.checks);
+    let matrix = DMatrix::from_fn(series.len(), 5, |k, c| row(series[k].0)[c]);
+    let values = DVector::from_fn(series.len(), |k, _| series[k].1);
+    let fit = matrix.clone().svd(true, true).solve(&values, 1e-12).unwrap();
+    (matrix * fit - values).norm()
+}
+
+/// The pair (frequency, decay) near a start that fits a series best beside another pair.
+fn fitted(series: &[(f64, f64)], start: (f64, f64), other: (f64, f64)) -> (f64, f64) {
+    let (mut best, mut width) = (start, 0.1);
+    let mut least = remainder(series, [best, other]);
+    while width > 1e-5 {
+        let steps = [(width, 0.0), (-width, 0.0), (0.0, width), (0.0, -width)];
+        let next = steps.map(|(a, b)| (best.0 + a, best.1 + b)).into_iter().find_map(|pair| {
+            let left = remainder(series, [pair, other]);
+            (left < least).then_some((pair, left))
+        });
+        match next {
+            Some((pair, left)) => (best, least) = (pair, left),
+            None => width *= 0.5,
+        }
+    }
+    best
+}
+
+/// Against linear theory with an elastic interface. Beside the capillary mode there is one of the surfactant, (3.201, 3.027),
+/// another root of the determinant. Errors with R/h = 8, 12.8, 19.2 and 25.6: frequency 2.1, 1.6, 1.3 and 1.0 %, decay −9.9, −2.7,
+/// 0.1 and 1.0 %. With a clean interface of the same tension the pair would be (5.508, 0.971).
+#[test]
+fn a_drop_with_a_surfactant_oscillates_as_linear_theory_says() {
+    let fluid = json!({"density": 1, "viscosity": 0.03, "sound_speed": 20});
+    let mut series = Vec::new();
+    let simulation = run(
+        &json!({
+            "kind": "droplet", "case": "custom", "spacing": 0.03125, "end_time": 1.8, "surface_tension": 1,
+            "shape": {"type": "ellipse", "center": [0.0131, 0.0072], "semi_axes": [0.42, 0.380_952_380_952_380_93]},
+            "domain": {"low": [-1.2, -1.2], "high": [1.2, 1.2]}, "fluids": {"inside": fluid, "outside": fluid},
+            "surfactant": {"coverage": 0.3, "elasticity": 0.5, "equation": "linear"}
+        }),
+        |now| {
+            if now.clock().step % 20 == 0 && now.clock().time > 0.3 {
+                series.push((now.clock().time, observable(now, "deformation")));
+            }
+        },
+    );
+    let theory = elastic_drop().oscillation().unwrap();
+    let (frequency, decay) = fitted(&series, theory, (3.2012, 3.02733));
+    assert!((frequency / theory.0 - 1.0).abs() < 0.025, "frequency {frequency}, theory {theory:?}");
+    assert!((decay / theory.1 - 1.0).abs() < 0.05, "decay {decay}, theory {theory:?}");
+    let checks = simulation.report().health.checks;
+    assert!(checks.iter().all(|check| check.holds != Some(false)), "{checks:?}");
 }
 
 /// A circle in a slope of the tension, 8 particles to a radius.
@@ -125,14 +169,20 @@ fn a_surfactant_makes_a_drop_softer() {
     let largest = |more: &Value| {
         let mut largest = 0.0_f64;
         let body = with(&body, more);
-        let simulation = run(&body, |now| largest = largest.max(observable(now, "deformation").abs()));
-        (largest, simulation)
+        let mut uneven = 0.0_f64;
+        let simulation = run(&body, |now| {
+            largest = largest.max(observable(now, "deformation").abs());
+            if more.get("surfactant").is_some() {
+                uneven = uneven.max(observable(now, "coverage_max") - observable(now, "coverage_min"));
+            }
+        });
+        (largest, uneven, simulation)
     };
-    let (clean, _) = largest(&json!({}));
-    let (covered, simulation) = largest(&json!({"surfactant": {"coverage": 0.5, "elasticity": 0.4}}));
+    let (clean, ..) = largest(&json!({}));
+    let (covered, uneven, simulation) = largest(&json!({"surfactant": {"coverage": 0.5, "elasticity": 0.4}}));
     assert!(covered > 1.1 * clean && clean > 0.05, "{covered} with a surfactant, {clean} without");
     let checks = simulation.health().checks;
     let drift = checks.iter().find(|check| check.name == "surfactant_drift").unwrap();
     assert!(drift.value.unwrap() < 1e-12 && drift.holds == Some(true));
-    assert!(observable(simulation.as_ref(), "coverage_max") > observable(simulation.as_ref(), "coverage_min") + 0.02);
+    assert!(uneven > 0.02, "{uneven}");
 }

@@ -429,7 +429,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let mut errors = self.summary.entries(D, self.clock().time, expected);
         errors.extend(self.scaled_speed());
         errors.extend(self.guard.energy_rise(&self.system, self.clock().time));
-        errors.extend(self.tension.iter().filter_map(|tension| tension.errors(&self.system, measure)));
+        errors.extend(self.tension.iter().flat_map(|record| record.errors(&self.system, measure, self.clock().time)));
         errors.extend(self.wave.iter().flat_map(|wave| wave.errors(self.clock().time)));
         Report {
             errors,

@@ -9,7 +9,7 @@
 //! | Langmuir | 1 + β ln(1 − x) | 1 + β (x ln x + (1 − x) ln(1 − x)) |
 //!
 //! The energy of the second follows from mixing covered and free places. Terms of E that are linear in x change nothing, since the
-//! surfactant is kept (Pawar and Stebe, Physics of Fluids 8, 1996).
+//! surfactant is kept (Pawar and Stebe 1996).
 
 use crate::geometry::Vector;
 

@@ -7,6 +7,7 @@ use super::surfactant::Amounts;
 use super::system::SphSystem;
 use super::varying_tension::VaryingTension;
 use crate::geometry::Vector;
+use crate::schemes::measured_errors::entry;
 use crate::simulation::section::known;
 use crate::simulation::{Check, Divergence, ErrorEntry, Finding, LoadError, Observables, Section, StepError};
 use crate::time::Clock;
@@ -113,9 +114,11 @@ impl<const D: usize> TensionRecord<D> {
         }
     }
 
-    /// Errors against theory.
-    pub fn errors(&self, system: &SphSystem<D>, measure: f64) -> Option<ErrorEntry> {
-        self.migration.error(system, measure)
+    /// Errors against theory, and what was lost or gained of the surfactant, at a time.
+    pub fn errors(&self, system: &SphSystem<D>, measure: f64, time: f64) -> Vec<ErrorEntry> {
+        let drift = self.total / self.start - 1.0;
+        let drift = self.has_surfactant.then(|| entry("surfactant", "relative", drift.abs(), time, "conservation"));
+        self.migration.error(system, measure).into_iter().chain(drift).collect()
     }
 
     /// The checks of the report.
