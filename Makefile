@@ -44,11 +44,16 @@ $(VENV)/ready: tests/python/requirements.txt tests/node/package.json | setup
 	npm install --prefix $(VENV)/node --silent --no-audit --no-fund
 	touch $@
 
+# Surfaces that people have; those that no registry gives are not run, and said to be.
+$(VENV)/models/ready: tests/python/models.py $(VENV)/ready
+	$(VENV)/bin/python tests/python/models.py $(VENV)/models
+	touch $@
+
 # The binary under test has debug assertions, like the tests.
-test: setup $(VENV)/ready
+test: setup $(VENV)/ready $(VENV)/models/ready
 	cargo build --profile test --locked -p meniscus-api
 	export MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)" \
-	MENISCUS_NODE_TOOLS="$(abspath $(VENV)/node/node_modules/.bin)"; \
+	MENISCUS_NODE_TOOLS="$(abspath $(VENV)/node/node_modules/.bin)" MENISCUS_MODELS="$(abspath $(VENV)/models)"; \
 	if cargo nextest --version > /dev/null 2>&1; then cargo nextest run --locked --workspace --no-fail-fast && cargo test --doc --locked --workspace; \
 	else cargo test --locked --workspace --no-fail-fast; fi
 

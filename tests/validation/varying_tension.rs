@@ -113,8 +113,8 @@ fn fitted(series: &[(f64, f64)], start: (f64, f64), other: (f64, f64)) -> (f64, 
 }
 
 /// Against linear theory with an elastic interface. Beside the capillary mode there is one of the surfactant, (3.201, 3.027),
-/// another root of the determinant. Errors with R/h = 8, 12.8, 19.2 and 25.6: frequency 2.1, 1.6, 1.3 and 1.0 %, decay −9.9, −2.7,
-/// 0.1 and 1.0 %. With a clean interface of the same tension the pair would be (5.508, 0.971).
+/// another root of the determinant. Errors with R/h = 8, 12.8, 19.2 and 25.6: frequency 2.1, 1.7, 1.2 and 0.9 %, decay −10, −2.7,
+/// −0.5 and 0.4 %. With a clean interface of the same tension the pair would be (5.508, 0.971).
 #[test]
 fn a_drop_with_a_surfactant_oscillates_as_linear_theory_says() {
     let fluid = json!({"density": 1, "viscosity": 0.03, "sound_speed": 20});
