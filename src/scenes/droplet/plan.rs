@@ -27,7 +27,7 @@ use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
     DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
-    WeaklyCompressibleSph, measurement_interval,
+    TensionLaw, WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{Finding, OutputPlan, Quantity, Simulation};
 use crate::spec::{Parameter, Violation};
@@ -349,7 +349,7 @@ impl<const D: usize> Scene for DropletScene<D> {
             steps: self.steps,
             time_step: self.time_step,
             end_time: self.steps as f64 * self.time_step,
-            memory_bytes: particles.saturating_mul(bytes),
+            memory_bytes: particles.saturating_mul(bytes).saturating_add(self.surfactant_bytes()),
         }
     }
 
@@ -377,11 +377,12 @@ impl<const D: usize> Scene for DropletScene<D> {
         let support = self.config.kernel.support() * self.config.smoothing_length / self.config.spacing;
         let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
         let pairs = particles * ball * support.powi(D as i32) * evaluations;
+        let exchanges = self.surfactant_pairs() * evaluations;
         let mut work = vec![
             PhaseWork::every_step("sph/momentum", self.momentum_work(2.0 * pairs, particles * evaluations)),
             PhaseWork::every_step("sph/gather", particles * evaluations),
             PhaseWork::every_step("sph/advance", particles * evaluations),
-            PhaseWork::every_step("sph/tension", particles * evaluations),
+            PhaseWork::every_step("sph/tension", particles * evaluations + EXCHANGE * exchanges),
             PhaseWork::every_step("neighbors", particles * steps_done),
         ];
         if self.config.density == DensityMethod::Summation {
@@ -458,7 +459,26 @@ impl<const D: usize> Scene for DropletScene<D> {
     }
 }
 
+/// Work of an exchange of a surfactant in a pair, by that of surface tension on a particle.
+const EXCHANGE: f64 = 12.0;
+/// Bytes of a pair that exchanges a surfactant.
+const PAIR_BYTES: f64 = 16.0;
+
 impl<const D: usize> DropletScene<D> {
+    /// Pairs of particles that exchange a surfactant: those of a band of 4 ε with feet within 3 h of each other.
+    fn surfactant_pairs(&self) -> f64 {
+        if !matches!(self.config.tension_law, Some(TensionLaw::Surfactant(_))) {
+            return 0.0;
+        }
+        let width = 4.0 * self.config.smoothing_length;
+        let patch = if D == 2 { 6.0 } else { 9.0 * std::f64::consts::PI };
+        self.near(width) * width / self.spec.spacing * patch
+    }
+
+    fn surfactant_bytes(&self) -> u64 {
+        (PAIR_BYTES * self.surfactant_pairs()) as u64
+    }
+
     /// Particles within a band of this width about the drop, about: that of a ball of its measure, which is taken for a fifth of the
     /// box where it is not known.
     fn near(&self, width: f64) -> f64 {

@@ -3,6 +3,7 @@
 use super::config::SphConfig;
 use super::dimensionless::{DimensionlessNumbers, Scales};
 use super::interactions::BodyForce;
+use super::species::Species;
 use super::system::SphSystem;
 use crate::schemes::measured_errors::{FLOW_FITS, closest_point_diagnostics, support_diagnostics};
 use crate::simulation::Diagnostic;
@@ -39,5 +40,9 @@ pub(super) fn diagnostics<const D: usize>(system: &SphSystem<D>, largest_speed: 
     diagnostics.extend(numbers(system, largest_speed).diagnostics());
     let doc = "Particles without a neighbor of their own fluid that took the side of their neighbors.";
     diagnostics.push(Diagnostic::count("strays.absorbed", system.strays.absorbed, doc));
+    let fragments = (0..system.flow.count())
+        .filter(|i| system.flow.species[*i] == Species::Inside && system.droplets.is_fragment(*i));
+    let doc = "Particles inside that are in fragments too small for a droplet; means of the curvature leave them out.";
+    diagnostics.push(Diagnostic::count("fragments.particles", fragments.count() as u64, doc));
     diagnostics
 }

@@ -105,6 +105,11 @@ impl<const D: usize> Droplets<D> {
         if self.number() > 1 { usize::from(self.label[i]) } else { 0 }
     }
 
+    /// Whether a particle belongs to or lies next to a fragment, as the last count has it; none where there is one droplet.
+    pub fn is_fragment(&self, i: usize) -> bool {
+        self.number() > 1 && self.label[i] == FRAGMENT
+    }
+
     /// Whether a component reaches across the box: a layer, or a fluid with holes.
     pub fn has_layer(&self) -> bool {
         self.ball_curvatures.contains(&0.0)

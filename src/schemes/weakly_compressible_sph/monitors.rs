@@ -92,14 +92,15 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 
 impl<const D: usize> SphSystem<D> {
     /// Mean and standard deviation of the curvature over the particles that feel the tension: |φ| < 2 ε, or those of the
-    /// color field's interface.
+    /// color field's interface. Fragments are left out: a few particles have no curvature that they resolve.
     fn curvature_spread(&self) -> (f64, f64) {
         let curvature = self.particles.scalar(self.columns.curvature);
         let band = self.particles.flag(self.columns.in_band);
         let phi = self.particles.scalar(self.columns.phi);
         let width =
             if self.interface.level_set().is_some() { 2.0 * self.config.smoothing_length } else { f64::INFINITY };
-        spread((0..band.len()).filter(|i| band[*i] == 1 && phi[*i].abs() < width).map(|i| curvature[i]))
+        let counts = |i: &usize| band[*i] == 1 && phi[*i].abs() < width && !self.droplets.is_fragment(*i);
+        spread((0..band.len()).filter(counts).map(|i| curvature[i]))
     }
 
     /// Area or volume, center and second moments of the inside, by quadrature on the fits; None without an interface.

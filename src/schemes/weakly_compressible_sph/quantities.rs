@@ -13,7 +13,7 @@ quantities! {
         MOMENTUM_X = "momentum_x", "mass*length/time", "Sum of m u over all particles, along x.";
         MOMENTUM_Y = "momentum_y", "mass*length/time", "Sum of m u over all particles, along y.";
         MOMENTUM_Z = "momentum_z", "mass*length/time", "Sum of m u over all particles, along z.";
-        CURVATURE_MEAN = "curvature_mean", "1/length", "Mean curvature over the particles that feel surface tension.";
+        CURVATURE_MEAN = "curvature_mean", "1/length", "Mean curvature over the particles that feel surface tension, those at fragments left out.";
         CURVATURE_STD = "curvature_std", "1/length", "Standard deviation of the curvature over the same particles.";
         AREA = "area", "length^2", "Area of the inner fluid, by quadrature on the fits.";
         VOLUME = "volume", "length^3", "Volume of the inner fluid, by quadrature on the fits.";
