@@ -226,3 +226,50 @@ fn gradients_of_a_wave_are_tangential_and_known_on_own_surfaces() {
         assert!((divergence[i] - exact).abs() < 0.5, "{i}: {} {exact}", divergence[i]);
     }
 }
+
+/// Points of the torus (1, .4), each farther from all before than its own distance, which grows by √10 from one side to the other.
+fn graded_torus(least: f64) -> Vec<Vector<3>> {
+    let random = meniscus::geometry::random::CounterRandom::new(5);
+    let distance = |x: &Vector<3>| least * (1.0 + (10.0_f64.sqrt() - 1.0) * (0.5 + x[0] / 2.8));
+    let mut points: Vec<(Vector<3>, f64)> = Vec::new();
+    for k in 0..120_000_i64 {
+        let draw = |d: i64| random.symmetric(&[k, d]);
+        let (around, along) = (std::f64::consts::PI * draw(0), std::f64::consts::PI * draw(1));
+        let radius = 0.4_f64.mul_add(around.cos(), 1.0);
+        // Areas grow with the distance from the axis.
+        if 0.7 * (draw(2) + 1.0) > radius {
+            continue;
+        }
+        let x = Vector::<3>::new(radius * along.cos(), radius * along.sin(), 0.4 * around.sin());
+        let own = distance(&x);
+        if points.iter().all(|(y, theirs)| (x - y).norm() > own.min(*theirs)) {
+            points.push((x, own));
+        }
+    }
+    points.into_iter().map(|(x, _)| x).collect()
+}
+
+/// A kind of `cases/surface/torus_10to1`: the Laplacian of a plane wave on points whose density changes tenfold.
+#[test]
+fn the_laplacian_holds_where_the_density_changes_tenfold() {
+    let points = graded_torus(0.036);
+    assert!((2000..3500).contains(&points.len()), "{}", points.len());
+    let wave = Vector::<3>::new(1.429_198_7, -0.714_599_3, 2.143_798);
+    let cloud = Cloud { positions: points.iter().map(|x| [x[0], x[1], x[2]]).collect(), ..Cloud::default() };
+    let problem = json!({"type": "laplace_beltrami", "field": {"type": "plane_wave", "k": wave.as_slice()}});
+    let method = json!({"type": "surface_dcpse", "order": 2});
+    let found = column(&*finished(&body(&json!({"problem": problem, "method": method})), &cloud), "value");
+    let (mut off, mut all) = (0.0, 0.0);
+    for (x, found) in points.iter().zip(&found) {
+        let from_axis = x[0].hypot(x[1]);
+        let center = Vector::<3>::new(x[0] / from_axis, x[1] / from_axis, 0.0);
+        let normal = (x - center) / 0.4;
+        let (along, across) = (wave.dot(x), wave.dot(&normal));
+        let curvature = 2.5 + (from_axis - 1.0) / (0.4 * from_axis);
+        let exact = -(wave.norm_squared() - across * across) * along.sin() - curvature * across * along.cos();
+        off += (found - exact).powi(2);
+        all += exact * exact;
+    }
+    let error = (off / all).sqrt();
+    assert!(error < 1e-2, "{error}");
+}

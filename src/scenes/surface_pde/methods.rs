@@ -39,6 +39,10 @@ fn support(order: u64, is_curve: bool, is_copies: bool, sampling: Sampling) -> O
     Some((degree, cutoff))
 }
 
+/// Radius of supports along stars for a Laplacian of order 2, in local spacings. They grow where a row would not be bounded, so that they
+/// can begin small; errors grow with their square (docs/results/surface-notes.md, points from outside). Slopes want more.
+const LAPLACIAN_OF_ORDER_2: f64 = 2.2;
+
 /// Points of a surface with fewer of them do not support fits of order 4.
 const FEW_FOR_ORDER_4: u64 = 160;
 
@@ -49,6 +53,8 @@ pub(super) struct Points<'a> {
     pub sampling: Sampling,
     pub count: u64,
     pub metric: Metric,
+    /// Whether the problem asks for slopes of a field or of the surface, not for the Laplacian alone.
+    pub has_slopes: bool,
 }
 
 fn wrong_order(order: u64, allowed: Value) -> Violation {
@@ -160,8 +166,9 @@ impl Points<'_> {
         (may_switch, may_lower): (bool, bool),
         errors: &mut Vec<Violation>,
     ) -> Option<Scheme> {
-        let (degree, default_cutoff) = Self { sampling: Sampling::Given, ..self }.support(order, false, errors)?;
-        let cutoff = *cutoff_dn.get_or_insert(default_cutoff);
+        let (degree, by_order) = Self { sampling: Sampling::Given, ..self }.support(order, false, errors)?;
+        let is_small = order == 2 && !self.has_slopes && !self.shape.is_curve();
+        let cutoff = *cutoff_dn.get_or_insert(if is_small { LAPLACIAN_OF_ORDER_2 } else { by_order });
         self.check_fit(degree, cutoff, errors);
         let support = Support { degree, radius: cutoff * self.shape.spacing(self.count) };
         let form = Form::Stars { metric: self.metric, cutoff, may_switch, may_lower };

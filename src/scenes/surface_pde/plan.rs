@@ -257,7 +257,14 @@ pub(super) fn choices(
         _ => Metric::FromHeights,
     };
     let solver = solvers::solver(spec.solver.get_or_insert_with(|| default_solver(shape)));
-    let scheme = methods::scheme(spec, Points { shape, sampling, count, metric }, errors);
+    let has_slopes = !matches!(
+        spec.problem,
+        ProblemSpec::LaplaceBeltrami { .. }
+            | ProblemSpec::Poisson { .. }
+            | ProblemSpec::Diffusion { .. }
+            | ProblemSpec::ReactionDiffusion { .. }
+    );
+    let scheme = methods::scheme(spec, Points { shape, sampling, count, metric, has_slopes }, errors);
     (scheme, problems::plan(spec, shape, (metric, solver, count), errors))
 }
 
