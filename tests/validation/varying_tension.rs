@@ -2,7 +2,7 @@
 
 use super::linear_theory::drop_mode::{Drop, Elastic, Fluid, reflection_of_square_box};
 use crate::support::{build, pool};
-use meniscus::simulation::{OutputPlan, Report, Simulation};
+use meniscus::simulation::{Divergence, OutputPlan, Report, Simulation, StepError};
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 
@@ -185,4 +185,40 @@ fn a_surfactant_makes_a_drop_softer() {
     let drift = checks.iter().find(|check| check.name == "surfactant_drift").unwrap();
     assert!(drift.value.unwrap() < 1e-12 && drift.holds == Some(true));
     assert!(uneven > 0.02, "{uneven}");
+}
+
+/// A step far beyond the limit of diffusion makes coverages without a meaning; the run ends and says which.
+#[test]
+fn coverages_without_a_meaning_end_a_run() {
+    let body = json!({
+        "kind": "droplet", "case": "static", "spacing": 0.0625, "end_time": 0.04, "time_step": 5.5e-4,
+        "surfactant": {"coverage": 0.3, "elasticity": 1e-12, "slope": [0.2, 0], "diffusivity": 10}
+    });
+    let mut simulation = build(&body, OutputPlan { every_time: None, series_every_steps: 20 });
+    let failure = loop {
+        assert!(!simulation.is_finished(), "a plain success");
+        if let Err(failure) = simulation.step() {
+            break failure;
+        }
+    };
+    let StepError::CheckFailed { check, divergence, .. } = failure else { panic!("{failure:?}") };
+    assert!(check.starts_with("coverage") && divergence == Divergence::Unsolved, "{check}");
+}
+
+/// An interface that is five times as stiff along itself as across it, in thin fluids: waves of the coverage do not grow.
+#[test]
+fn elastic_waves_do_not_grow_in_thin_fluids() {
+    let fluid = json!({"viscosity": 0.005, "sound_speed": 50});
+    let mut uneven = 0.0_f64;
+    let simulation = run(
+        &json!({
+            "kind": "droplet", "case": "custom", "spacing": 0.03125, "end_time": 0.7, "surface_tension": 10,
+            "domain": {"low": [-1.5, -1.5], "high": [1.5, 1.5]}, "fluids": {"inside": fluid, "outside": fluid},
+            "shape": {"type": "ellipse", "center": [0.013, 0.007], "semi_axes": [0.51, 0.49]},
+            "surfactant": {"coverage": 0.75, "elasticity": 0.5}
+        }),
+        |now| uneven = uneven.max(observable(now, "coverage_max") - observable(now, "coverage_min")),
+    );
+    assert!(uneven < 4e-3, "{uneven}");
+    assert!(error(&simulation.report(), "total_energy", "rise") < 1e-5);
 }

@@ -118,7 +118,8 @@ pub(super) fn of_earlier_version(given: Given) -> Preset {
 
 /// Whether a slope of the tension drives a flow along the interface.
 fn is_driven(spec: &Droplet) -> bool {
-    spec.tension_slope.is_some() || spec.surfactant.as_ref().is_some_and(|surfactant| surfactant.slope.is_some())
+    let of_coverage = spec.surfactant.as_ref().and_then(|surfactant| surfactant.slope.as_ref());
+    spec.tension_slope.iter().chain(of_coverage).any(|slope| slope.iter().any(|b| *b != 0.0))
 }
 
 /// Pressures of a scene; the spec gets what was left open. Densities by continuity have none of these parameters.

@@ -52,7 +52,7 @@ struct Validity {
 
 const VALIDITY: Validity = Validity { depth: TAU, steepness: 0.1 };
 
-/// The wave of a layer, with linear theory where it holds: equal kinematic viscosities, no force from outside, deep layers and
+/// The wave of a layer, with linear theory where it holds: equal kinematic viscosities, one tension, no force from outside, deep layers and
 /// flat waves.
 pub(super) fn standing_wave<const D: usize>(
     shape: &Shape,
@@ -68,7 +68,8 @@ pub(super) fn standing_wave<const D: usize>(
     let is_free = spec.body_force.as_ref().is_none_or(|force| *force == ForceChoice::None);
     let thinner = layer.thickness.min(lengths[1] - layer.thickness);
     let is_linear = wavenumber * thinner >= VALIDITY.depth && wavenumber * layer.amplitude <= VALIDITY.steepness;
-    let theory = (is_alike && is_free && is_linear && tension > 0.0)
+    let is_constant = spec.surfactant.is_none() && spec.tension_slope.is_none();
+    let theory = (is_alike && is_free && is_linear && is_constant && tension > 0.0)
         .then(|| CapillaryWave::new(wavenumber, [inside.density, outside.density], kinematic[0], tension));
     Some(StandingWave { wavenumber, crest: layer.crest, amplitude: layer.amplitude, theory })
 }

@@ -27,6 +27,8 @@ pub(super) struct SceneNumbers {
     /// Curvature of a ball of that radius, or of one in the shortest side of the box.
     curvature: f64,
     pub tension: f64,
+    /// Largest tension at the start.
+    largest_tension: f64,
     /// Size of a constant body force.
     pub gravity: f64,
     /// Size of the velocity at the start.
@@ -38,13 +40,13 @@ pub(super) struct SceneNumbers {
 impl SceneNumbers {
     pub fn new<const D: usize>(
         shape: Option<&Shape>,
-        tension: f64,
+        [tension, largest_tension]: [f64; 2],
         [gravity, start_speed]: [f64; 2],
         lengths: &Vector<D>,
     ) -> Self {
         let radius = shape.and_then(smallest_radius::<D>);
         let curvature = (D - 1) as f64 / radius.unwrap_or(0.5 * lengths.min());
-        Self { radius, curvature, tension, gravity, start_speed, length: lengths.max() }
+        Self { radius, curvature, tension, largest_tension, gravity, start_speed, length: lengths.max() }
     }
 
     /// The largest speed that a scene is expected to reach, that of the start included.
@@ -55,7 +57,7 @@ impl SceneNumbers {
     /// The largest speed about the velocity of the start that a scene is expected to reach, 0.3 √(2τκ/ρ) + √(2gL).
     pub fn expected_inner_speed(&self, spec: &Droplet) -> f64 {
         let density = spec.fluids.inside.density.min(spec.fluids.outside.density);
-        TUNING.capillary * (2.0 * self.tension * self.curvature / density).sqrt() + self.falling_speed()
+        TUNING.capillary * (2.0 * self.largest_tension * self.curvature / density).sqrt() + self.falling_speed()
     }
 
     fn falling_speed(&self) -> f64 {
@@ -64,7 +66,7 @@ impl SceneNumbers {
 
     /// The least speed of sound of a fluid of the scene.
     pub fn least_sound_speed(&self, fluid: &FluidSpec) -> f64 {
-        least_sound_speed(fluid, self.radius, self.tension, self.gravity * self.length)
+        least_sound_speed(fluid, self.radius, self.largest_tension, self.gravity * self.length)
     }
 
     /// A warning for each fluid that is softer than c² = 100 max(τ/(ρR), gL).

@@ -11,7 +11,7 @@ use super::spec::{
     TensionWord,
 };
 use super::start_lattice::StartLattice;
-use super::varying_tension::{StartBox, tension_law};
+use super::varying_tension::{StartBox, largest_tension, tension_law};
 use super::vectors::vector;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
@@ -176,12 +176,13 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     };
     let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, &mut errors));
     let speeds = [gravity, velocity.norm()];
-    let numbers = SceneNumbers::new(shape.as_ref().map(|(shape, _)| shape), tension, speeds, &lengths);
+    let start = StartBox { shape: shape.as_ref().map(|(shape, _)| shape), low, lengths };
+    let tensions = [tension, tension * largest_tension(&spec, &start)];
+    let numbers = SceneNumbers::new(start.shape, tensions, speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
     let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
     let mut config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
     config.start_velocity = velocity;
-    let start = StartBox { shape: shape.as_ref().map(|(shape, _)| shape), low, lengths };
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
     config.wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
@@ -377,12 +378,11 @@ impl<const D: usize> Scene for DropletScene<D> {
         let support = self.config.kernel.support() * self.config.smoothing_length / self.config.spacing;
         let ball = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
         let pairs = particles * ball * support.powi(D as i32) * evaluations;
-        let exchanges = self.surfactant_pairs() * evaluations;
         let mut work = vec![
             PhaseWork::every_step("sph/momentum", self.momentum_work(2.0 * pairs, particles * evaluations)),
             PhaseWork::every_step("sph/gather", particles * evaluations),
             PhaseWork::every_step("sph/advance", particles * evaluations),
-            PhaseWork::every_step("sph/tension", particles * evaluations + EXCHANGE * exchanges),
+            PhaseWork::every_step("sph/tension", (particles + EXCHANGE * self.surfactant_pairs()) * evaluations),
             PhaseWork::every_step("neighbors", particles * steps_done),
         ];
         if self.config.density == DensityMethod::Summation {

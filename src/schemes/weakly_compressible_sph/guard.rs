@@ -138,6 +138,10 @@ impl<const D: usize> Guard<D> {
     /// Work of surface tension since the drop came to rest, beyond that of the shrinking interface, in a capillary time
     /// √(ρR³/τ) by the surface energy at the start; NaN in motion, and for the first capillary time of rest.
     fn creep(&mut self, system: &SphSystem<D>, contents: &Contents<D>, time: f64) -> f64 {
+        if system.varying.is_some() {
+            // A slope works, and a surfactant spreads.
+            return f64::NAN;
+        }
         let tension = system.config.tension;
         let scale = self.budget.start_surface.abs();
         let radius = (D - 1) as f64 / ball_curvature::<D>(system.droplets.initial_measure);

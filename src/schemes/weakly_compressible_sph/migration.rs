@@ -16,75 +16,104 @@ use crate::schemes::measured_errors::entry;
 use crate::simulation::section::known;
 use crate::simulation::{ErrorEntry, LoadError, Section};
 
-/// The way of a drop's center over the last fifth of a run.
+/// Relative difference of the drift over the last two fifths of a run up to which it is steady.
+const STEADY: f64 = 0.05;
+
+/// The way of a drop's center over a part of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Migration<const D: usize> {
-    /// Time of the first state, NaN before; times and centers of the last; the way between.
+struct Part<const D: usize> {
+    /// Times of the first and the last state; NaN before.
     since: f64,
-    time: f64,
-    center: Vector<D>,
+    until: f64,
     way: Vector<D>,
 }
 
+/// The ways of a drop's center over the last two fifths of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Migration<const D: usize> {
+    /// End of the run that the fifths are of.
+    end: f64,
+    /// The center of the last state.
+    center: Vector<D>,
+    parts: [Part<D>; 2],
+}
+
 impl<const D: usize> Migration<D> {
-    /// Nothing measured yet.
-    pub fn none() -> Self {
-        let (center, way) = (Vector::<D>::zeros(), Vector::<D>::zeros());
-        Self { since: f64::NAN, time: f64::NAN, center, way }
+    /// Nothing measured yet of a run to an end.
+    pub fn new(end: f64) -> Self {
+        let part = Part { since: f64::NAN, until: f64::NAN, way: Vector::<D>::zeros() };
+        Self { end, center: Vector::<D>::zeros(), parts: [part; 2] }
     }
 
-    /// Takes the center at a time of a run to an end.
-    pub fn take(&mut self, system: &SphSystem<D>, center: &Vector<D>, time: f64, end: f64) {
-        if time < 0.8 * end || center.iter().any(|c| !c.is_finite()) {
+    /// Takes the center at a time.
+    pub fn take(&mut self, system: &SphSystem<D>, center: &Vector<D>, time: f64) {
+        if time < 0.6 * self.end || center.iter().any(|c| !c.is_finite()) {
             return;
         }
-        if self.since.is_nan() {
-            self.since = time;
-        } else {
-            self.way += system.domain.displacement(&self.center, center);
+        let is_known = !self.parts[0].since.is_nan() || !self.parts[1].since.is_nan();
+        let way = if is_known { system.domain.displacement(&self.center, center) } else { Vector::<D>::zeros() };
+        let last = self.parts[0].until;
+        let part = &mut self.parts[usize::from(time > 0.8 * self.end)];
+        if part.since.is_nan() {
+            // The second part begins where the first one ends.
+            part.since = if last.is_nan() { time } else { last };
         }
-        (self.time, self.center) = (time, *center);
+        part.way += way;
+        part.until = time;
+        self.center = *center;
     }
 
-    /// The relative error of the drift against theory, where it holds: a single drop in a slope without other forces, in fluids
-    /// that started at rest.
+    /// The relative error of the drift against theory, where it holds: of a single circle or sphere in a slope without other forces,
+    /// in viscous fluids that started at rest, once it is steady.
     pub fn error(&self, system: &SphSystem<D>, measure: f64) -> Option<ErrorEntry> {
         let config = &system.config;
-        let Some(TensionLaw::Slope { slope, .. }) = config.tension_law else { return None };
+        let Some(TensionLaw::Slope { slope, is_ball: true, .. }) = config.tension_law else { return None };
         let is_alone = system.droplets.number() == 1 && !system.droplets.has_layer();
         let is_free = config.body_force.is_none() && config.start_velocity == Vector::<D>::zeros();
-        if !(is_alone && is_free && self.time > self.since) {
+        let [before, last] = self.parts.map(|Part { since, until, way }| way / (until - since));
+        let is_steady = (last - before).norm() <= STEADY * last.norm();
+        let drift = drift_by_slope(config, ball_curvature::<D>(measure));
+        if !(is_alone && is_free && is_steady && drift.is_finite()) {
             return None;
         }
-        let expected =
-            slope * (-drift_by_slope(config, ball_curvature::<D>(measure)) * (1.0 - share_of_box(system, measure)));
-        let measured = self.way / (self.time - self.since);
-        let error = (measured - expected).norm() / expected.norm();
+        let expected = slope * (-drift * (1.0 - share_of_box(system, measure)));
+        let error = (last - expected).norm() / expected.norm();
         let reference =
             "Young, Goldstein and Block 1959 (in the plane likewise), by 1 minus the drop's share of the periodic box";
-        Some(entry("migration", "relative", error, self.time, reference))
+        Some(entry("migration", "relative", error, self.parts[1].until, reference))
     }
 
     /// Saves what later reports depend on.
     pub fn save(&self, section: &mut Section) {
-        section.put_optional("since", known(self.since));
-        section.put_optional("time", known(self.time));
+        section.put_real("end", self.end);
         section.put_vectors("center", &[self.center]);
-        section.put_vectors("way", &[self.way]);
+        for (name, part) in ["before", "last"].into_iter().zip(&self.parts) {
+            section.put_section(name, |section| {
+                section.put_optional("since", known(part.since));
+                section.put_optional("until", known(part.until));
+                section.put_vectors("way", &[part.way]);
+            });
+        }
     }
 
-    /// The drift of a state that was saved.
+    /// The drift of a state that was saved. A run to another end measures its own fifths.
     ///
     /// # Errors
     /// [`LoadError`].
-    pub fn load(section: &Section) -> Result<Self, LoadError> {
-        let vector = |name: &str| Ok::<_, LoadError>(Vector::<D>::from_column_slice(section.reals_of(name, D)?));
-        Ok(Self {
-            since: section.optional("since")?.unwrap_or(f64::NAN),
-            time: section.optional("time")?.unwrap_or(f64::NAN),
-            center: vector("center")?,
-            way: vector("way")?,
-        })
+    pub fn load(&self, section: &Section) -> Result<Self, LoadError> {
+        let part = |section: &Section| {
+            Ok::<_, LoadError>(Part {
+                since: section.optional("since")?.unwrap_or(f64::NAN),
+                until: section.optional("until")?.unwrap_or(f64::NAN),
+                way: Vector::<D>::from_column_slice(section.reals_of("way", D)?),
+            })
+        };
+        let saved = Self {
+            end: section.real("end")?,
+            center: Vector::<D>::from_column_slice(section.reals_of("center", D)?),
+            parts: [section.section("before", part)?, section.section("last", part)?],
+        };
+        Ok(if saved.end.to_bits() == self.end.to_bits() { saved } else { Self::new(self.end) })
     }
 }
 

@@ -28,7 +28,7 @@ quantities! {
         PRESSURE_OUTSIDE = "pressure_outside", "mass/(length*time^2)", "Mean pressure well outside the inner fluid.";
         PRESSURE_EOS_JUMP = "pressure_eos_jump", "mass/(length*time^2)", "Jump of the pressure by the equation of state alone.";
         PRESSURE_JUMP_MEASURED = "pressure_jump_measured", "mass/(length*time^2)", "Jump of the pressure as particles have it: by the equation of state, and what the force of surface tension takes over summed over the particles.";
-        PRESSURE_BALANCED = "pressure_balanced", "mass/(length*time^2)", "Jump tau kappa_0 that the balanced force takes out of the pressure.";
+        PRESSURE_BALANCED = "pressure_balanced", "mass/(length*time^2)", "Jump tau kappa_0, with the mean tension of the droplet, that the balanced force takes out of the pressure.";
         PRESSURE_INSIDE_COUNT = "pressure_inside_count", "particles", "Particles over which the pressure inside is a mean.";
         WAVE_AMPLITUDE = "wave_amplitude", "length", "Amplitude of the wave on the sides of a layer.";
         TENSION_MIN = "tension_min", "", "Least surface tension on the interface, by that of the scene.";
@@ -44,9 +44,9 @@ quantities! {
         SPEED_MAX = "speed_max", "length/time", "Largest speed of a particle.";
         PERIMETER = "perimeter", "length", "Length of the interface, as the sum of V delta over the particles.";
         SURFACE_AREA = "surface_area", "length^2", "Area of the interface, as the sum of V delta over the particles.";
-        SURFACE_ENERGY = "surface_energy", "mass*length^2/time^2", "Surface tension times perimeter or surface area.";
+        SURFACE_ENERGY = "surface_energy", "mass*length^2/time^2", "Energy of the interface: surface tension times perimeter or surface area, its integral where a slope is given, and that of the energy by area of a covered interface.";
         ELASTIC_ENERGY = "elastic_energy", "mass*length^2/time^2", "Energy of compression of both fluids.";
-        WORK = "work", "mass*length^2/time^2", "Work of the body force since the start.";
+        WORK = "work", "mass*length^2/time^2", "Work of the body force, and of what keeps up a slope of the tension, since the start.";
         ELONGATION = "elongation", "", "(a - b)/(a + b) of the largest and the least eigenvalue of the central second moments.";
         ELONGATION_ANGLE = "elongation_angle", "radians", "Angle of the longest axis with x, from -pi/2 to pi/2, in the plane.";
         CIRCULARITY = "circularity", "", "Perimeter (in space, area) of the ball of the same area (volume) by that of the interface.";

@@ -69,7 +69,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let pace = Pace::new(time_step, end_time, Clock { step: 0, time: 0.0 });
         let wave = system.config.wave.clone().map(WaveRecord::new);
         let has_surfactant = matches!(system.config.tension_law, Some(TensionLaw::Surfactant(_)));
-        let tension = system.varying.as_ref().map(|_| TensionRecord::new(has_surfactant));
+        let tension = system.varying.as_ref().map(|_| TensionRecord::new(has_surfactant, end_time));
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
@@ -163,7 +163,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             wave.take(&self.system, time, is_measured);
         }
         if let (Some(record), Some(varying)) = (&mut self.tension, &self.system.varying) {
-            record.look(&self.system, varying);
+            record.take(&self.system, varying);
         }
         if is_measured {
             self.summary.largest_speed = self.summary.largest_speed.max(self.system.flow.largest_relative_speed());
@@ -171,7 +171,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             self.guard.measure(&self.system, &contents, measured, clock)?;
             let center = Vector::<D>::from_fn(|d, _| self.row_value(["center_x", "center_y", "center_z"][d]));
             if let Some(record) = &mut self.tension {
-                self.course.findings.extend(record.measure(&self.system, (&center, self.end_time), clock)?);
+                self.course.findings.extend(record.measure(&self.system, &center, clock)?);
             }
             let Fastest { speed, sound_speed, .. } = fastest(&self.system);
             self.course.findings.extend(self.guard.new_doubts(&self.system, speed / sound_speed, clock));
@@ -241,6 +241,9 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         check_finite_vectors("velocity", &system.flow.velocity, next)?;
         check_finite("density", &system.flow.density, next)?;
         first_broken(system.columns.find_broken(&system.particles), next)?;
+        if let (Some(record), Some(varying)) = (&mut self.tension, &system.varying) {
+            record.check_step(system, varying, next)?;
+        }
         let largest_speed = system.flow.largest_speed();
         let Fastest { particle, speed, sound_speed } = fastest(system);
         self.max_cfl = self.max_cfl.max(largest_speed * self.time_of_part() / system.config.spacing);

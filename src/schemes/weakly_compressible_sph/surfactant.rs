@@ -9,8 +9,8 @@
 //! whatever the arrangement, and is near M across the interface, near −(q/2d) A Δ(M/A) along it, where q is the second moment of
 //! w and d = D − 1.
 //!
-//! - **Mixing**: M ← M − α L² M in a repair time. Particles at other distances from the interface move otherwise than it; mixing makes
-//!   them share what they carry. Along the interface it is of fourth order in R.
+//! - **Mixing**: M ← M − α L³ M in a repair time. Particles at other distances from the interface move otherwise than it; mixing makes
+//!   them share what they carry. Along the interface it is of sixth order in R.
 //! - **Diffusion**: M ← M − Δt D_s (2d/q) L M, each pair with its mean of q s.
 //!
 //! The coverage at a foot point is (2S − S²)[x] of S[x] = Σ w M/Σ w A; its gradient along the interface is that of a linear fit with
@@ -38,13 +38,15 @@ struct Tuning {
     /// Width of the δ that gives particles their shares, by ε. Particles farther out move less like the interface: with 1 the decay of
     /// oscillations at 8 particles a radius is 5 % worse (measured; less than a half makes shares uneven).
     width: f64,
-    /// Share of a difference across the interface that is mixed in a repair time; 0.005 to 0.1 give the same (measured).
+    /// Share of a difference across the interface that is mixed in a repair time. Less lets elastic waves of five spacings grow at
+    /// low viscosities. Frequencies and decays do not depend on it (measured; docs/results/droplet-notes.md).
     mixing: f64,
-    /// Of R²/D_s: the longest step of diffusion. Twice of it is unstable (the weights' second moment is 0.07 R² by dimension).
+    /// Of R²/D_s: the longest step of diffusion. In the plane four times of it holds and five times does not (measured); .07 is where the
+    /// second moment, 0.07 R² by dimension, makes the highest waves unstable if L has no eigenvalue above 1.
     step: f64,
 }
 
-const TUNING: Tuning = Tuning { radius_h: 3.0, width: 0.5, mixing: 0.02, step: 0.015 };
+const TUNING: Tuning = Tuning { radius_h: 3.0, width: 0.5, mixing: 0.9, step: 0.025 };
 
 /// The longest stable step of a diffusivity along the interface.
 pub(super) fn longest_step(diffusivity: f64, spacing: f64) -> f64 {
@@ -113,6 +115,7 @@ pub(super) struct Surfactant<const D: usize> {
     first: Vec<f64>,
     second: Vec<f64>,
     coverage: Vec<f64>,
+    gradients: Vec<Vector<D>>,
 }
 
 /// Scales of a [`Surfactant`].
@@ -146,6 +149,7 @@ impl<const D: usize> Surfactant<D> {
             first: Vec::new(),
             second: Vec::new(),
             coverage: Vec::new(),
+            gradients: Vec::new(),
         }
     }
 
@@ -223,8 +227,9 @@ impl<const D: usize> Surfactant<D> {
         let of_sums = |a: &[f64; 2], b: &[f64; 2]| 2.0 / (a[0] + b[0]);
         self.flow_out(&first, &mut second, of_sums);
         self.flow_out(&second, &mut first, of_sums);
+        self.flow_out(&first, &mut second, of_sums);
         let share = 1.0 - (1.0 - TUNING.mixing).powf(elapsed / self.repair_time);
-        for (member, change) in self.members.iter_mut().zip(&first) {
+        for (member, change) in self.members.iter_mut().zip(&second) {
             member.amount -= share * change;
         }
         if self.config.diffusivity > 0.0 {
@@ -253,7 +258,7 @@ impl<const D: usize> Surfactant<D> {
             };
             pairs.map(flux).sum()
         };
-        for_each_member(self.members.len(), out, value);
+        for_each_member(self.members.len(), 0.0, out, value);
     }
 
     /// The neighbors of a member.
@@ -266,11 +271,11 @@ impl<const D: usize> Surfactant<D> {
     /// has a share.
     pub fn find_coverage(&mut self, mut take: impl FnMut(usize, f64, f64, Vector<D>)) {
         let (mut first, mut second) = (std::mem::take(&mut self.first), std::mem::take(&mut self.second));
-        for_each_member(self.members.len(), &mut first, |i| {
+        for_each_member(self.members.len(), 0.0, &mut first, |i| {
             let amounts = self.of(i).iter().map(|n| n.weight * self.members[n.member as usize].amount);
             amounts.sum::<f64>() / self.sums[i][0]
         });
-        for_each_member(self.members.len(), &mut second, |i| {
+        for_each_member(self.members.len(), 0.0, &mut second, |i| {
             // A member without any area next to it has no mean, and no weight in that of others.
             let shares =
                 self.of(i).iter().map(|n| (n.weight * self.members[n.member as usize].area, n.member as usize));
@@ -279,9 +284,13 @@ impl<const D: usize> Surfactant<D> {
         });
         std::mem::swap(&mut self.coverage, &mut second);
         (self.first, self.second) = (first, second);
-        for (i, member) in self.members.iter().enumerate().filter(|(_, member)| member.wide_area > 0.0) {
-            take(member.particle, member.wide_area, self.coverage[i], self.gradient(i));
+        let mut gradients = std::mem::take(&mut self.gradients);
+        for_each_member(self.members.len(), Vector::<D>::zeros(), &mut gradients, |i| self.gradient(i));
+        let values = self.members.iter().zip(&self.coverage).zip(&gradients);
+        for ((member, coverage), gradient) in values.filter(|((member, _), _)| member.wide_area > 0.0) {
+            take(member.particle, member.wide_area, *coverage, *gradient);
         }
+        self.gradients = gradients;
     }
 
     /// The gradient of the coverage along the interface at a member, by a linear fit.
@@ -327,9 +336,9 @@ fn weight(r: f64) -> f64 {
 }
 
 /// Sets `values` to a function of the members.
-fn for_each_member(count: usize, values: &mut Vec<f64>, value: impl Fn(usize) -> f64 + Sync) {
+fn for_each_member<T: Copy + Send>(count: usize, none: T, values: &mut Vec<T>, value: impl Fn(usize) -> T + Sync) {
     values.clear();
-    values.resize(count, 0.0);
+    values.resize(count, none);
     values.par_chunks_mut(BLOCK).enumerate().for_each(|(block, values)| {
         for (k, slot) in values.iter_mut().enumerate() {
             *slot = value(block * BLOCK + k);

@@ -22,7 +22,7 @@ pub enum EquationOfState {
     Langmuir,
 }
 
-/// Coverage up to which the logarithm is followed. Runs end before (see the check of the least tension).
+/// Coverage up to which the logarithm is followed. Runs end before (check `coverage_most`).
 const FULL: f64 = 1.0 - 1e-9;
 
 /// An insoluble surfactant on the interface.
@@ -80,6 +80,8 @@ pub enum TensionLaw<const D: usize> {
         slope: Vector<D>,
         /// Largest τ/τ₀ on the drop at the start.
         largest: f64,
+        /// Whether the drop is a circle or a sphere at the start, for which theory knows the drift.
+        is_ball: bool,
     },
     /// A surfactant.
     Surfactant(SurfactantConfig<D>),

@@ -18,13 +18,18 @@ struct Limits {
     drift: f64,
     /// Fall of the tension below that of the clean interface: the law does not hold up to nothing, and a drop without tension breaks.
     fall: f64,
+    /// Largest coverage: an interface that is full has no law, and Langmuir's tension falls without bound.
+    coverage: f64,
+    /// Coverage below nothing: the filter of the coverage may overshoot next to a sharp edge of it.
+    below_nothing: f64,
     /// Nearness of the band to the jump of a slope at a side of the box.
     jump: f64,
     /// Share of the surfactant on particles that left the interface which is a doubt.
     left_doubt: f64,
 }
 
-const LIMITS: Limits = Limits { drift: 1e-10, fall: 0.95, jump: 1.0, left_doubt: 1e-3 };
+const LIMITS: Limits =
+    Limits { drift: 1e-10, fall: 0.95, coverage: 0.99, below_nothing: 0.05, jump: 1.0, left_doubt: 1e-3 };
 
 /// The numbers of the last measured state.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,12 +47,12 @@ pub(super) struct TensionRecord<const D: usize> {
     has_surfactant: bool,
     migration: Migration<D>,
     /// Whether the doubt about what left the interface was issued.
-    is_issued: bool,
+    is_left_issued: bool,
 }
 
 impl<const D: usize> TensionRecord<D> {
-    /// Nothing measured yet.
-    pub fn new(has_surfactant: bool) -> Self {
+    /// Nothing measured yet of a run to an end.
+    pub fn new(has_surfactant: bool, end: f64) -> Self {
         Self {
             start: f64::NAN,
             total: f64::NAN,
@@ -56,68 +61,98 @@ impl<const D: usize> TensionRecord<D> {
             tension: [f64::NAN; 2],
             nearness_to_jump: f64::NAN,
             has_surfactant,
-            migration: Migration::none(),
-            is_issued: false,
+            migration: Migration::new(end),
+            is_left_issued: false,
         }
     }
 
     /// Takes what the series shows of a state.
-    pub fn look(&mut self, system: &SphSystem<D>, varying: &VaryingTension<D>) {
-        self.tension = varying.tension_range();
-        self.nearness_to_jump = varying.nearness_to_jump(&system.particles, &system.columns);
-        if let (Some(Amounts { total, off_interface }), Some(coverage)) =
-            (varying.amounts(&system.particles), varying.coverage_range())
-        {
+    pub fn take(&mut self, system: &SphSystem<D>, varying: &VaryingTension<D>) {
+        self.find_ranges(system, varying);
+        if let Some(Amounts { total, off_interface }) = varying.amounts(&system.particles) {
             if self.start.is_nan() {
                 self.start = total;
             }
-            (self.total, self.off_interface, self.coverage) = (total, off_interface / total, coverage);
+            self.total = total;
+            self.off_interface = if total == 0.0 { 0.0 } else { off_interface / total };
         }
     }
 
-    /// Watches the state that was looked at, of a run to an end, with the center of what is inside.
+    /// Watches the state that was taken, with the center of what is inside.
     ///
     /// # Errors
     /// [`StepError::CheckFailed`] where an invariant is broken.
     pub fn measure(
         &mut self,
         system: &SphSystem<D>,
-        (center, end): (&Vector<D>, f64),
+        center: &Vector<D>,
         Clock { step, time }: Clock,
     ) -> Result<Option<Finding>, StepError> {
-        self.migration.take(system, center, time, end);
-        if let Some(Watch { name, value, limit, divergence, .. }) = self.watches().into_iter().find(Watch::is_broken) {
-            let limit = limit.unwrap_or(f64::NAN);
-            return Err(StepError::CheckFailed { check: name, divergence, value, limit, step, time });
-        }
-        if self.is_issued || self.off_interface.is_nan() || self.off_interface <= LIMITS.left_doubt {
+        self.migration.take(system, center, time);
+        self.check(step, time)?;
+        if self.is_left_issued || self.off_interface.is_nan() || self.off_interface <= LIMITS.left_doubt {
             return Ok(None);
         }
-        self.is_issued = true;
+        self.is_left_issued = true;
         let message = format!("{:.2} % of the surfactant are far from any interface", 100.0 * self.off_interface);
         let doubt = Finding::warning("surfactant_left", message, (step, time));
         Ok(Some(doubt.with_advice("it stays on the particles that carried it where drops merge or fragments vanish")))
     }
 
+    /// # Errors
+    /// [`StepError::CheckFailed`] where an invariant is broken.
+    fn check(&self, step: u64, time: f64) -> Result<(), StepError> {
+        let broken = self.watches().into_iter().find(Watch::is_broken);
+        broken.map_or(Ok(()), |Watch { name, value, limit, divergence, .. }| {
+            let limit = limit.unwrap_or(f64::NAN);
+            Err(StepError::CheckFailed { check: name, divergence, value, limit, step, time })
+        })
+    }
+
+    /// Watches the state after a step.
+    ///
+    /// # Errors
+    /// [`StepError::CheckFailed`] where an invariant is broken.
+    pub fn check_step(
+        &mut self,
+        system: &SphSystem<D>,
+        varying: &VaryingTension<D>,
+        Clock { step, time }: Clock,
+    ) -> Result<(), StepError> {
+        self.find_ranges(system, varying);
+        self.check(step, time)
+    }
+
+    fn find_ranges(&mut self, system: &SphSystem<D>, varying: &VaryingTension<D>) {
+        self.tension = varying.tension_range();
+        self.nearness_to_jump = varying.nearness_to_jump(&system.particles, &system.columns);
+        self.coverage = varying.coverage_range().unwrap_or([f64::NAN; 2]);
+    }
+
     fn watches(&self) -> Vec<Watch> {
         let watch = |name, value, limit, divergence| Watch { name, value, limit, divergence, is_lasting: true };
         let fall = watch("tension_fall", 1.0 - self.tension[0], Some(LIMITS.fall), Divergence::Unsolved);
-        match self.has_surfactant {
-            true => {
-                let drift = (self.total / self.start - 1.0).abs();
-                vec![fall, watch("surfactant_drift", drift, Some(LIMITS.drift), Divergence::Unsolved)]
-            }
-            false => {
-                let jump = self.nearness_to_jump;
-                vec![fall, watch("nearness_to_tension_jump", jump, Some(LIMITS.jump), Divergence::Escaped)]
-            }
+        if !self.has_surfactant {
+            let jump = self.nearness_to_jump;
+            return vec![fall, watch("nearness_to_tension_jump", jump, Some(LIMITS.jump), Divergence::Escaped)];
         }
+        let [least, most] = self.coverage;
+        vec![
+            watch("coverage_most", most, Some(LIMITS.coverage), Divergence::Unsolved),
+            watch("coverage_below_nothing", (-least).max(0.0), Some(LIMITS.below_nothing), Divergence::Unsolved),
+            fall,
+            watch("surfactant_drift", self.drift(), Some(LIMITS.drift), Divergence::Unsolved),
+        ]
+    }
+
+    /// Relative change of the amount of surfactant since the start; 0 where there was none.
+    fn drift(&self) -> f64 {
+        if self.start == 0.0 && self.total == 0.0 { 0.0 } else { (self.total / self.start - 1.0).abs() }
     }
 
     /// Errors against theory, and what was lost or gained of the surfactant, at a time.
     pub fn errors(&self, system: &SphSystem<D>, measure: f64, time: f64) -> Vec<ErrorEntry> {
-        let drift = self.total / self.start - 1.0;
-        let drift = self.has_surfactant.then(|| entry("surfactant", "relative", drift.abs(), time, "conservation"));
+        let drift = self.has_surfactant.then(|| entry("surfactant", "relative", self.drift(), time, "conservation"));
         self.migration.error(system, measure).into_iter().chain(drift).collect()
     }
 
@@ -146,7 +181,7 @@ impl<const D: usize> TensionRecord<D> {
             section.put_optional(name, known(value));
         }
         section.put_section("migration", |section| self.migration.save(section));
-        section.put_count("is_issued", u64::from(self.is_issued));
+        section.put_count("is_issued", u64::from(self.is_left_issued));
     }
 
     fn names(&self) -> [(&'static str, f64); 8] {
@@ -176,8 +211,8 @@ impl<const D: usize> TensionRecord<D> {
             tension: [value("least_tension")?, value("largest_tension")?],
             nearness_to_jump: value("nearness_to_jump")?,
             has_surfactant: self.has_surfactant,
-            migration: section.section("migration", Migration::load)?,
-            is_issued: section.count("is_issued")? == 1,
+            migration: section.section("migration", |section| self.migration.load(section))?,
+            is_left_issued: section.count("is_issued")? == 1,
         })
     }
 }

@@ -219,9 +219,9 @@ impl<const D: usize> VaryingTension<D> {
     }
 }
 
-/// Least and largest value.
+/// Least and largest value; NaN of none.
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(value), most.max(value)])
+    values.fold([f64::NAN; 2], |[least, most], value| [least.min(value), most.max(value)])
 }
 
 impl<const D: usize> TensionField<D> {
@@ -236,6 +236,8 @@ impl<const D: usize> TensionField<D> {
     fn find_means(&mut self, droplets: &Droplets<D>) {
         self.sums.clear();
         self.sums.resize(droplets.groups(), [0.0; 2]);
+        // A particle whose neighbors have no share of the interface knows no tension.
+        self.known.retain(|(i, _)| !self.tension[*i].is_nan());
         for (i, area) in &self.known {
             let [all, sum] = &mut self.sums[droplets.group(*i)];
             *all += area;
