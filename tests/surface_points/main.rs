@@ -6,6 +6,7 @@
 mod support;
 
 mod problems;
+mod scattered;
 
 use meniscus::geometry::{Vector, fibonacci};
 use meniscus::parallel::Interrupt;
