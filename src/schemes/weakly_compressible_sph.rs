@@ -74,6 +74,7 @@ pub use pacing::measurement_interval;
 pub use simulation::WeaklyCompressibleSph;
 pub use species::{Fluids, Species};
 pub use standing_wave::StandingWave;
+pub use surfactant::RADIUS_H as EXCHANGE_RADIUS_H;
 pub use system::{Drop, SphSystem};
 pub use tension_law::{EquationOfState, SurfactantConfig, TensionLaw};
 

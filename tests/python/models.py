@@ -108,7 +108,7 @@ def main(target):
                         points, triangles = READERS[Path(path).suffix](read(path))
                         text = json.dumps([points.astype(float).tolist(), triangles.tolist()])
                         (target / f"{name}.json").write_text(text)
-            except (OSError, subprocess.CalledProcessError, KeyError, ValueError) as error:
+            except (OSError, subprocess.CalledProcessError, KeyError, ValueError, zipfile.BadZipFile, xml.ParseError) as error:
                 print(f"models: {', '.join(models)} of {package} are not there: {error}", file=sys.stderr)
 
 

@@ -1,11 +1,12 @@
 //! Drops at rest, in oscillation and in collision: budgets that close, checks that end bad runs, steps without units.
 
 use super::linear_theory::drop_mode::{Fluid, confined_drop_mode, reflection_of_square_box};
+use super::reading::{error, observable, with};
 use crate::support::{build, pool, scene as scene_of};
 use meniscus::parallel::Interrupt;
 use meniscus::scene::{self, BuildContext, Cloud, Clouds};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::{CpuClock, Divergence, OutputPlan, Report, Simulation, StepError};
+use meniscus::simulation::{CpuClock, Divergence, OutputPlan, Simulation, StepError};
 use serde_json::{Value, json};
 
 /// A drop of radius 0.5 off the center, 8 particles to a radius.
@@ -23,20 +24,6 @@ fn oscillating(more: &Value) -> Value {
         "domain": {"low": [-1.2, -1.2], "high": [1.2, 1.2]}, "fluids": {"inside": fluid, "outside": fluid}
     });
     with(&body, more)
-}
-
-fn with(body: &Value, more: &Value) -> Value {
-    let mut body = body.clone();
-    body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-    body
-}
-
-fn observable(simulation: &dyn Simulation, name: &str) -> f64 {
-    simulation.observables().iter().find(|(quantity, _)| quantity.name == name).unwrap().1
-}
-
-fn error(report: &Report, quantity: &str, norm: &str) -> f64 {
-    report.errors.iter().find(|entry| entry.quantity == quantity && entry.norm == norm).unwrap().value
 }
 
 /// Runs to the end, or to the step that fails; `look` sees every step.

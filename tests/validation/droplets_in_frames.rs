@@ -1,25 +1,12 @@
 //! Waves on layers, drops in moving frames, pressures as measured, and scenes by dimensionless numbers.
 
+use super::reading::{error, observable, with};
 use crate::support::{build, pool, scene as scene_of};
 use meniscus::scene;
 use meniscus::scenes::SCENES;
-use meniscus::simulation::{OutputPlan, Report, Simulation};
+use meniscus::simulation::{OutputPlan, Simulation};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
-
-fn observable(simulation: &dyn Simulation, name: &str) -> f64 {
-    simulation.observables().iter().find(|(quantity, _)| quantity.name == name).unwrap().1
-}
-
-fn error(report: &Report, quantity: &str, norm: &str) -> f64 {
-    report.errors.iter().find(|entry| entry.quantity == quantity && entry.norm == norm).unwrap().value
-}
-
-fn with(body: &Value, more: &Value) -> Value {
-    let mut body = body.clone();
-    body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-    body
-}
 
 fn run(body: &Value) -> Box<dyn Simulation> {
     pool(2).install(|| {

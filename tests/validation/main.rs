@@ -7,6 +7,7 @@ mod droplets_in_balance;
 mod droplets_in_frames;
 mod fronts;
 mod linear_theory;
+mod reading;
 mod ring;
 mod hard_cases;
 mod surfaces;

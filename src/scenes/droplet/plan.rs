@@ -465,13 +465,14 @@ const EXCHANGE: f64 = 12.0;
 const PAIR_BYTES: f64 = 16.0;
 
 impl<const D: usize> DropletScene<D> {
-    /// Pairs of particles that exchange a surfactant: those of a band of 4 ε with feet within 3 h of each other.
+    /// Pairs of particles that exchange a surfactant: those of a band of 4 ε with feet within the radius of the exchange.
     fn surfactant_pairs(&self) -> f64 {
         if !matches!(self.config.tension_law, Some(TensionLaw::Surfactant(_))) {
             return 0.0;
         }
         let width = 4.0 * self.config.smoothing_length;
-        let patch = if D == 2 { 6.0 } else { 9.0 * std::f64::consts::PI };
+        let radius = weakly_compressible_sph::EXCHANGE_RADIUS_H;
+        let patch = if D == 2 { 2.0 * radius } else { std::f64::consts::PI * radius * radius };
         self.near(width) * width / self.spec.spacing * patch
     }
 

@@ -115,11 +115,14 @@ crate::words! {
     }
 }
 
+/// Largest coverage at the start.
+pub const MOST_COVERAGE: f64 = 0.95;
+
 crate::group! {
     /// An insoluble surfactant on the interface.
     pub struct SurfactantSpec {
         /// share of the interface that is covered at the start
-        coverage: f64 = 0.3, in Interval::at_least(0.0).and_at_most(0.95);
+        coverage: f64 = 0.3, in Interval::at_least(0.0).and_at_most(MOST_COVERAGE);
         /// change of the coverage at the start by length, from the middle of the box; 0 when not given
         slope: Option<Coordinates>;
         /// how the tension follows from the coverage

@@ -1,6 +1,6 @@
 //! Surface tensions that vary: by a slope in space, or by a surfactant.
 
-use super::spec::{Droplet, EquationWord, IntegratorWord, Shifting, SurfactantSpec, TensionWord};
+use super::spec::{Droplet, EquationWord, IntegratorWord, MOST_COVERAGE, Shifting, SurfactantSpec, TensionWord};
 use super::vectors::vector;
 use crate::geometry::Vector;
 use crate::scenes::shapes::{PlainShape, Shape};
@@ -13,8 +13,6 @@ use serde_json::json;
 const LEAST_TENSION: f64 = 0.1;
 /// Relative rounding of a bound that was told and given back.
 const SLACK: f64 = 1e-9;
-/// Largest coverage at the start.
-const MOST_COVERAGE: f64 = 0.95;
 
 /// The drop in its box at the start.
 pub(super) struct StartBox<'a, const D: usize> {

@@ -100,7 +100,7 @@ impl<const D: usize> Guard<D> {
         (crowded, measure): (f64, f64),
         Clock { step, time }: Clock,
     ) -> Result<(), StepError> {
-        let scale = self.budget.start_surface.abs();
+        let scale = system.config.tension * self.budget.start_interface;
         let lost = system.strays.lost.unsigned_abs() as f64 / self.start_particles.max(1) as f64;
         if self.budget.start_measure.is_nan() {
             self.budget.start_measure = measure;
@@ -143,7 +143,7 @@ impl<const D: usize> Guard<D> {
             return f64::NAN;
         }
         let tension = system.config.tension;
-        let scale = self.budget.start_surface.abs();
+        let scale = tension * self.budget.start_interface;
         let radius = (D - 1) as f64 / ball_curvature::<D>(system.droplets.initial_measure);
         let capillary = (system.config.fluids.inside.density * radius.powi(3) / tension).sqrt();
         let kinetic = contents.inner_kinetic();

@@ -31,26 +31,27 @@ use rayon::prelude::{
     IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator, ParallelSlice, ParallelSliceMut,
 };
 
+/// Radius R of the weights, in h. With 2.25 a drop of 8 particles a radius at a Laplace number of 8e5 gains energy (measured).
+pub const RADIUS_H: f64 = 3.0;
+
 /// Constants of the transport.
 struct Tuning {
-    /// Radius R of the weights, in h. With 2.25 a drop of 8 particles a radius at a Laplace number of 8e5 gains energy (measured).
-    radius_h: f64,
     /// Width of the δ that gives particles their shares, by ε. Particles farther out move less like the interface: with 1 the decay of
     /// oscillations at 8 particles a radius is 5 % worse (measured; less than a half makes shares uneven).
     width: f64,
     /// Share of a difference across the interface that is mixed in a repair time. Less lets elastic waves of five spacings grow at
     /// low viscosities. Frequencies and decays do not depend on it (measured; docs/results/droplet-notes.md).
     mixing: f64,
-    /// Of R²/D_s: the longest step of diffusion. In the plane four times of it holds and five times does not (measured); .07 is where the
-    /// second moment, 0.07 R² by dimension, makes the highest waves unstable if L has no eigenvalue above 1.
+    /// The longest step of diffusion, in R²/D_s. In the plane .0675 holds and .075 does not (measured). q/d is about .07 R²: there
+    /// waves of the eigenvalue 1 of L become unstable.
     step: f64,
 }
 
-const TUNING: Tuning = Tuning { radius_h: 3.0, width: 0.5, mixing: 0.9, step: 0.025 };
+const TUNING: Tuning = Tuning { width: 0.5, mixing: 0.9, step: 0.025 };
 
 /// The longest stable step of a diffusivity along the interface.
 pub(super) fn longest_step(diffusivity: f64, spacing: f64) -> f64 {
-    let radius = TUNING.radius_h * spacing;
+    let radius = RADIUS_H * spacing;
     TUNING.step * radius * radius / diffusivity
 }
 
@@ -178,7 +179,7 @@ impl<const D: usize> Surfactant<D> {
     }
 
     fn find_neighbors(&mut self) {
-        let radius = TUNING.radius_h * self.spacing;
+        let radius = RADIUS_H * self.spacing;
         self.cells.rebuild(self.members.iter().map(|member| member.foot), 0.5 * radius);
         let Self { cells, members, sums, blocks, .. } = self;
         sums.clear();
@@ -311,6 +312,11 @@ impl<const D: usize> Surfactant<D> {
         }
         // Too few members next to each other have no gradient.
         moments.try_inverse().map_or_else(Vector::<D>::zeros, |inverse| inverse * sums)
+    }
+
+    /// The amounts of all particles.
+    pub fn all_amounts<'a>(&self, particles: &'a Particles<D>) -> &'a [f64] {
+        particles.scalar(self.amount)
     }
 
     /// What there is of the surfactant.

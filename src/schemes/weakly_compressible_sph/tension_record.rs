@@ -8,6 +8,7 @@ use super::system::SphSystem;
 use super::varying_tension::VaryingTension;
 use crate::geometry::Vector;
 use crate::schemes::measured_errors::entry;
+use crate::simulation::course::check_finite;
 use crate::simulation::section::known;
 use crate::simulation::{Check, Divergence, ErrorEntry, Finding, LoadError, Observables, Section, StepError};
 use crate::time::Clock;
@@ -22,14 +23,23 @@ struct Limits {
     coverage: f64,
     /// Coverage below nothing: the filter of the coverage may overshoot next to a sharp edge of it.
     below_nothing: f64,
+    /// Part of the interface that knows no tension, and so feels none.
+    unknown: f64,
     /// Nearness of the band to the jump of a slope at a side of the box.
     jump: f64,
     /// Share of the surfactant on particles that left the interface which is a doubt.
     left_doubt: f64,
 }
 
-const LIMITS: Limits =
-    Limits { drift: 1e-10, fall: 0.95, coverage: 0.99, below_nothing: 0.05, jump: 1.0, left_doubt: 1e-3 };
+const LIMITS: Limits = Limits {
+    drift: 1e-10,
+    fall: 0.95,
+    coverage: 0.99,
+    below_nothing: 0.05,
+    unknown: 1e-3,
+    jump: 1.0,
+    left_doubt: 1e-3,
+};
 
 /// The numbers of the last measured state.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +54,7 @@ pub(super) struct TensionRecord<const D: usize> {
     /// Least and largest tension by τ₀.
     tension: [f64; 2],
     nearness_to_jump: f64,
+    unknown_share: f64,
     has_surfactant: bool,
     migration: Migration<D>,
     /// Whether the doubt about what left the interface was issued.
@@ -60,6 +71,7 @@ impl<const D: usize> TensionRecord<D> {
             coverage: [f64::NAN; 2],
             tension: [f64::NAN; 2],
             nearness_to_jump: f64::NAN,
+            unknown_share: f64::NAN,
             has_surfactant,
             migration: Migration::new(end),
             is_left_issued: false,
@@ -119,12 +131,14 @@ impl<const D: usize> TensionRecord<D> {
         varying: &VaryingTension<D>,
         Clock { step, time }: Clock,
     ) -> Result<(), StepError> {
+        check_finite("surfactant", varying.all_amounts(&system.particles), Clock { step, time })?;
         self.find_ranges(system, varying);
         self.check(step, time)
     }
 
     fn find_ranges(&mut self, system: &SphSystem<D>, varying: &VaryingTension<D>) {
         self.tension = varying.tension_range();
+        self.unknown_share = varying.field.unknown_share;
         self.nearness_to_jump = varying.nearness_to_jump(&system.particles, &system.columns);
         self.coverage = varying.coverage_range().unwrap_or([f64::NAN; 2]);
     }
@@ -138,6 +152,7 @@ impl<const D: usize> TensionRecord<D> {
         }
         let [least, most] = self.coverage;
         vec![
+            watch("tension_unknown", self.unknown_share, Some(LIMITS.unknown), Divergence::Unresolved),
             watch("coverage_most", most, Some(LIMITS.coverage), Divergence::Unsolved),
             watch("coverage_below_nothing", (-least).max(0.0), Some(LIMITS.below_nothing), Divergence::Unsolved),
             fall,
@@ -184,7 +199,7 @@ impl<const D: usize> TensionRecord<D> {
         section.put_count("is_issued", u64::from(self.is_left_issued));
     }
 
-    fn names(&self) -> [(&'static str, f64); 8] {
+    fn names(&self) -> [(&'static str, f64); 9] {
         [
             ("start", self.start),
             ("total", self.total),
@@ -194,6 +209,7 @@ impl<const D: usize> TensionRecord<D> {
             ("least_tension", self.tension[0]),
             ("largest_tension", self.tension[1]),
             ("nearness_to_jump", self.nearness_to_jump),
+            ("unknown_share", self.unknown_share),
         ]
     }
 
@@ -210,6 +226,7 @@ impl<const D: usize> TensionRecord<D> {
             coverage: [value("least_coverage")?, value("largest_coverage")?],
             tension: [value("least_tension")?, value("largest_tension")?],
             nearness_to_jump: value("nearness_to_jump")?,
+            unknown_share: value("unknown_share")?,
             has_surfactant: self.has_surfactant,
             migration: section.section("migration", |section| self.migration.load(section))?,
             is_left_issued: section.count("is_issued")? == 1,

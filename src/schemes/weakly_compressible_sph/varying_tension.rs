@@ -24,6 +24,8 @@ pub(super) struct TensionField<const D: usize> {
     pub means: Vec<f64>,
     /// Particles whose values are known, and their shares of the interface.
     pub known: Vec<(usize, f64)>,
+    /// Part of the interface whose particles know no tension, by all of it.
+    pub unknown_share: f64,
     sums: Vec<[f64; 2]>,
 }
 
@@ -174,6 +176,14 @@ impl<const D: usize> VaryingTension<D> {
         }
     }
 
+    /// The amounts of a surfactant on all particles; none without one.
+    pub fn all_amounts<'a>(&self, particles: &'a Particles<D>) -> &'a [f64] {
+        match &self.source {
+            Source::Slope(_) => &[],
+            Source::Surfactant(surfactant) => surfactant.all_amounts(particles),
+        }
+    }
+
     /// What there is of a surfactant.
     pub fn amounts(&self, particles: &Particles<D>) -> Option<Amounts> {
         match &self.source {
@@ -237,7 +247,10 @@ impl<const D: usize> TensionField<D> {
         self.sums.clear();
         self.sums.resize(droplets.groups(), [0.0; 2]);
         // A particle whose neighbors have no share of the interface knows no tension.
+        let area = |known: &[(usize, f64)]| known.iter().map(|(_, area)| area).sum::<f64>();
+        let whole = area(&self.known);
         self.known.retain(|(i, _)| !self.tension[*i].is_nan());
+        self.unknown_share = 1.0 - area(&self.known) / whole;
         for (i, area) in &self.known {
             let [all, sum] = &mut self.sums[droplets.group(*i)];
             *all += area;
