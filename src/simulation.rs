@@ -49,11 +49,34 @@ pub trait Simulation: Send {
         self.clock().step >= self.end().step
     }
 
-    /// Makes exactly one step.
+    /// Makes exactly one step, without the measurements that are due after it.
     ///
     /// # Errors
     /// [`StepError`]; the simulation is then of no further use.
-    fn step(&mut self) -> Result<(), StepError>;
+    fn advance(&mut self) -> Result<(), StepError>;
+
+    /// Whether this state is to be measured against an exact answer before anything looks at it.
+    fn is_measurement_due(&self) -> bool {
+        false
+    }
+
+    /// Takes the measurements that are due. Nothing that the next step reads changes, so that a dropped measurement can be
+    /// taken again.
+    ///
+    /// # Errors
+    /// [`StepError`]; when it is interrupted, the simulation is as before.
+    fn measure(&mut self) -> Result<(), StepError> {
+        Ok(())
+    }
+
+    /// Makes one step and takes the measurements that are due after it.
+    ///
+    /// # Errors
+    /// As [`Self::advance`] and [`Self::measure`].
+    fn step(&mut self) -> Result<(), StepError> {
+        self.advance()?;
+        if self.is_measurement_due() { self.measure() } else { Ok(()) }
+    }
 
     /// The declared scalars of this state: a row of the series.
     fn observables(&self) -> Observables;

@@ -65,6 +65,14 @@ struct Token {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Client(pub String);
 
+impl Client {
+    /// The name as owner of what the client makes; None while the service has no tokens.
+    #[must_use]
+    pub fn owner(&self) -> Option<String> {
+        Some(self.0.clone()).filter(|name| !name.is_empty())
+    }
+}
+
 /// Why a request is not allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum AccessError {

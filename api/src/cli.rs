@@ -10,6 +10,8 @@ use clap::{Parser, Subcommand};
 use meniscus_jobs::inspection::{look, sandbox};
 use meniscus_jobs::service::backup;
 use meniscus_jobs::service::fsck;
+use meniscus_jobs::spec::records::Verdict;
+use meniscus_jobs::spec::requests::NOT_STARTED_CODE;
 use meniscus_jobs::spec::uploads::Purpose;
 use meniscus_jobs::system::digest;
 use meniscus_jobs::system::process;
@@ -177,7 +179,15 @@ pub fn main() -> ExitCode {
         Command::Token { name, scopes } => make_token(&name, &scopes),
         Command::Inspect { purpose, file } => inspect(&purpose, &file),
         Command::Calibrate { scratch, threads } => calibrate(&scratch, threads),
-        Command::Worker { attempt } => worker::process::run(&attempt).map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS),
+        Command::Worker { attempt } => match worker::process::run(&attempt) {
+            Ok(Verdict::Unstarted { .. }) => ExitCode::from(NOT_STARTED_CODE),
+            Ok(_) => ExitCode::SUCCESS,
+            Err(error) if process::is_shortage(&error) => {
+                fail(&error);
+                ExitCode::from(NOT_STARTED_CODE)
+            }
+            Err(error) => fail(&error),
+        },
     }
 }
 
@@ -187,7 +197,10 @@ fn check_data(data: &Path) -> Result<ExitCode, fsck::FsckError> {
     for finding in &findings.wrong {
         writeln!(output, "{finding}")?;
     }
-    let fsck::Findings { jobs, files, wrong } = findings;
+    for place in &findings.set_aside {
+        writeln!(output, "{place}: it belongs to no job and no upload and was set aside; delete it when you do not need it")?;
+    }
+    let fsck::Findings { jobs, files, wrong, .. } = findings;
     writeln!(output, "{jobs} jobs and {files} files checked, {} errors", wrong.len())?;
     Ok(if wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

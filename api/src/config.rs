@@ -52,6 +52,10 @@ pub struct Choices {
     /// Seconds without a heartbeat after which a worker is killed, 30 by default.
     #[arg(long)]
     pub lease_s: Option<u64>,
+    /// Bring jobs and uploads that a lost or older database does not know back from their own files.
+    #[arg(long)]
+    #[serde(skip)]
+    pub adopt: bool,
     /// Do not measure an unknown machine with a few short runs at the start.
     #[arg(long)]
     #[serde(default)]
@@ -83,6 +87,8 @@ pub struct Config {
     pub disk_reserve_bytes: u64,
     /// Time without a heartbeat after which a worker is killed.
     pub lease: Duration,
+    /// Whether what a lost database does not know is brought back.
+    pub adopt: bool,
     /// Whether an unknown machine is measured at the start of the service.
     pub calibrate: bool,
 }
@@ -139,6 +145,7 @@ impl Choices {
             upload_bytes: self.upload_bytes.or(other.upload_bytes),
             disk_reserve_bytes: self.disk_reserve_bytes.or(other.disk_reserve_bytes),
             lease_s: self.lease_s.or(other.lease_s),
+            adopt: self.adopt,
             no_calibration: self.no_calibration || other.no_calibration,
         }
     }
@@ -172,6 +179,7 @@ impl Config {
             upload_bytes: choices.upload_bytes.unwrap_or(UPLOAD_BYTES),
             disk_reserve_bytes: choices.disk_reserve_bytes.unwrap_or(DISK_RESERVE_BYTES),
             lease: Duration::from_secs(choices.lease_s.unwrap_or(30).max(3)),
+            adopt: choices.adopt,
             calibrate: !choices.no_calibration,
         })
     }

@@ -19,6 +19,8 @@ pub struct Creation {
     pub keyed: Option<IdempotencyKey>,
     /// What was created under the key before.
     pub known: Option<Made>,
+    /// Owner of what is made.
+    pub owner: Option<String>,
     budget: Option<Budget>,
 }
 
@@ -42,7 +44,7 @@ impl Creation {
             None => None,
         };
         let budget = if known.is_some() { None } else { spend(state, &client)? };
-        Ok(Self { body, keyed, known, budget })
+        Ok(Self { body, keyed, known, owner: client.owner(), budget })
     }
 
     /// The body as JSON.

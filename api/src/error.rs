@@ -118,6 +118,8 @@ pub enum ApiError {
     RangeNotSatisfiable(u64),
     /// The service is starting or stopping.
     NotReady,
+    /// The data directory cannot be written.
+    Unwritable,
     /// A defect or a failing disk. The text goes to the log, never to the client.
     Internal(String),
 }
@@ -150,6 +152,7 @@ impl ApiError {
             Self::QuotaReached { .. } => &problems::QUOTA,
             Self::RangeNotSatisfiable(_) => &problems::RANGE,
             Self::NotReady => &problems::NOT_READY,
+            Self::Unwritable => &problems::UNWRITABLE,
             Self::Internal(_) => &problems::INTERNAL,
         }
     }
@@ -179,6 +182,7 @@ impl ApiError {
                 format!("{unfinished} jobs are unfinished, {most} are allowed. Wait until jobs end, or cancel some.")
             }
             Self::RangeNotSatisfiable(size) => format!("The file has {size} bytes."),
+            Self::Unwritable => "Existing jobs and files can be read. The log of the service has the cause.".to_owned(),
             Self::BadRequest | Self::Busy | Self::MethodNotAllowed | Self::NotReady | Self::Internal(_) => return None,
         })
     }

@@ -125,6 +125,7 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
         time: None,
         reserve_bytes: 0,
         usage: Usage::default(),
+        submission: None,
     };
     let keep = resolved.options.checkpoint.keep as usize;
     let mut sink = Screen::new(out.clone(), keep);
@@ -152,6 +153,7 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
             stopped(&format!("the run paused after a checkpoint{reason}; `meniscus resume` continues it"))
         }
         Verdict::Canceled => stopped("the run was canceled"),
+        Verdict::Unstarted { cause } => stopped(&format!("the system did not grant what the run needs: {cause}")),
     }
 }
 
@@ -207,7 +209,7 @@ impl RecordSink for Screen {
             }
             Record::Warning { message, .. } => self.say(message)?,
             Record::Finding(finding) => self.say(&finding.to_string())?,
-            Record::Started { .. } | Record::File(_) | Record::Verdict(_) => {}
+            Record::Started { .. } | Record::Phase { .. } | Record::File(_) | Record::Verdict(_) => {}
         }
         Ok(())
     }

@@ -102,6 +102,9 @@ problem_types! {
     NOT_READY = "not-ready", SERVICE_UNAVAILABLE, "The service is starting or stopping",
         "After a start the service recovers its jobs before it accepts requests. Try again after the seconds in the \
          Retry-After header. GET /readyz answers 200 as soon as the service is ready.";
+    UNWRITABLE = "unwritable", SERVICE_UNAVAILABLE, "The service cannot write its data directory",
+        "The disk is full, read-only or failing. Nothing new can be promised until it can be written again; what is there can \
+         be read.";
     INTERNAL = "internal", INTERNAL_SERVER_ERROR, "The service failed",
         "An error of the service or of its disk, not of the request. The operator finds the cause in the log under the \
          id in the X-Request-Id header.";

@@ -5,17 +5,20 @@ use crate::config::Config;
 use crate::router;
 use crate::state::{AppState, Handles, ServicePhase};
 use crate::telemetry;
+use meniscus_jobs::service::data_directory::{DataDirectory, DataDirectoryError};
 use meniscus_jobs::service::executor::local::LocalExecutor;
+use meniscus_jobs::service::found_folders::{self, DatabaseLost};
 use meniscus_jobs::service::inspector;
-use meniscus_jobs::service::store::{Store, StoreError};
+use meniscus_jobs::service::store::{self, Store, StoreError};
 use meniscus_jobs::service::supervisor::Supervisor;
-use meniscus_jobs::system::lock::{DirectoryLock, LockError};
 use metrics_exporter_prometheus::PrometheusHandle;
 use std::future::IntoFuture;
 use std::io::{self, Write};
+use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
@@ -23,19 +26,47 @@ use tokio::sync::watch;
 /// Why the service could not run.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// The data directory is in use.
+    /// The data directory cannot be used.
     #[error(transparent)]
-    Lock(#[from] LockError),
+    Directory(#[from] DataDirectoryError),
+    /// The database was lost or is older than the files beside it.
+    #[error(transparent)]
+    Lost(#[from] DatabaseLost),
     /// The store cannot be opened.
-    #[error(transparent)]
-    Store(#[from] StoreError),
+    #[error("{}: {error}", path.display())]
+    Store {
+        /// Path of the database.
+        path: PathBuf,
+        /// What is wrong with it.
+        error: StoreError,
+    },
+    /// The address cannot be used.
+    #[error("{address} cannot be used: {error}; {}", advice(error))]
+    Bind {
+        /// The address.
+        address: SocketAddr,
+        /// What the system said.
+        error: io::Error,
+    },
     /// A call of the operating system failed, such as binding the address.
     #[error("{0}")]
     Io(#[from] io::Error),
 }
 
+/// What helps where an address cannot be used.
+fn advice(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::AddrInUse => "another program listens there: stop it, or give --bind another port (port 0 picks a free one)",
+        io::ErrorKind::PermissionDenied => "ports below 1024 need a privilege: give --bind a higher port",
+        io::ErrorKind::AddrNotAvailable => "this machine does not have the address: give --bind one of its own",
+        _ => "give --bind another address",
+    }
+}
+
 /// Time between two checks of the store's log.
 const LOG_INTERVAL: Duration = Duration::from_millis(250);
+/// Time between two tries whether the store can be written.
+const WRITE_INTERVAL: Duration = Duration::from_secs(2);
 /// Time that open answers have to end after the supervisor has ended.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
@@ -44,18 +75,19 @@ const LAST_ANSWERS: Duration = Duration::from_secs(1);
 /// # Errors
 /// [`ServeError`].
 pub async fn serve(config: Config) -> Result<(), ServeError> {
-    std::fs::create_dir_all(&config.data)?;
-    // Workers get paths that do not depend on a current directory.
-    let config = Config { data: std::fs::canonicalize(&config.data)?, ..config };
-    let _lock = DirectoryLock::take(&config.data)?;
+    let directory = DataDirectory::open(&config.data)?;
+    let config = Config { data: directory.path().to_owned(), ..config };
+    let bind = config.bind;
+    let listener =
+        TcpListener::bind(bind).await.map_err(|error| ServeError::Bind { address: bind, error })?;
+    let store = Arc::new(open_store(&directory, config.adopt)?);
     let (stop, stopping) = watch::channel(false);
-    let (state, supervisor) = build(config, stopping)?;
+    let (state, supervisor) = build(config, &store, stopping)?;
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
-    let listener = TcpListener::bind(state.config.bind).await?;
     announce(&listener.local_addr()?.to_string())?;
     let supervision = start_supervision(supervisor, state.phase.clone())?;
-    tidy_up(&state.store, state.metrics.clone())?;
+    tidy_up(&state.store, state.metrics.clone(), state.phase.clone())?;
     if state.config.calibrate {
         calibration::start_where_needed(&state.store, state.config.threads)?;
     }
@@ -72,7 +104,6 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
     tracing::info!("stopping: running jobs write a checkpoint and return to the queue");
     state.phase.set_draining();
     state.supervisor.shut_down();
-    // The store closes when nothing holds it any more.
     drop(state);
     let joined = tokio::task::spawn_blocking(move || supervision.join()).await;
     if !matches!(joined, Ok(Ok(()))) {
@@ -81,12 +112,40 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
     let _ = stop.send(true);
     // Clients that still read are cut off after a moment.
     let _ = tokio::time::timeout(LAST_ANSWERS, answers).await;
+    store.close();
     Ok(())
 }
 
-/// Opens the store and makes everything that handlers need, and the supervisor, which does not run yet.
-fn build(config: Config, stopping: watch::Receiver<bool>) -> Result<(AppState, Supervisor), ServeError> {
-    let store = Arc::new(Store::open(&config.data)?);
+/// Opens the store, if it knows everything that is on the disk. With `adopt`, what it does not know comes back into it.
+fn open_store(directory: &DataDirectory, adopt: bool) -> Result<Store, ServeError> {
+    let path = directory.path().join(store::FILE_NAME);
+    let failed = |error: StoreError| ServeError::Store { path: path.clone(), error };
+    let is_missing = !path.is_file();
+    // A lost database must not be replaced by an empty one before this is seen.
+    if is_missing && !adopt {
+        let found = found_folders::compare(directory.path(), None).map_err(failed)?;
+        if !found.is_nothing_lost() {
+            return Err(found.lost(directory.path(), true).into());
+        }
+    }
+    let store = Store::open(directory.path()).map_err(failed)?;
+    let found = found_folders::compare(directory.path(), Some(&store)).map_err(failed)?;
+    if !found.is_nothing_lost() && !adopt {
+        store.close();
+        return Err(found.lost(directory.path(), false).into());
+    }
+    found_folders::adopt(&store, &found).map_err(failed)?;
+    found_folders::set_aside(directory.path(), &found.orphans)?;
+    Ok(store)
+}
+
+/// Makes everything that handlers need, and the supervisor, which does not run yet.
+fn build(
+    config: Config,
+    store: &Arc<Store>,
+    stopping: watch::Receiver<bool>,
+) -> Result<(AppState, Supervisor), ServeError> {
+    let store = Arc::clone(store);
     // The running program, even if an upgrade has replaced its file: all workers of a service are of one build.
     let executor = Box::new(LocalExecutor::new("/proc/self/exe".into()));
     let supervisor = Supervisor::new(Arc::clone(&store), executor, config.settings());
@@ -108,13 +167,18 @@ fn start_supervision(mut supervisor: Supervisor, phase: ServicePhase) -> io::Res
     })
 }
 
-/// Trims the store's log and the samples of histograms as long as the store exists, on a thread of its own.
-fn tidy_up(store: &Arc<Store>, metrics: PrometheusHandle) -> io::Result<()> {
+/// Trims the store's log and the samples of histograms, and tries whether the store can be written, as long as the store
+/// exists, on a thread of its own.
+fn tidy_up(store: &Arc<Store>, metrics: PrometheusHandle, phase: ServicePhase) -> io::Result<()> {
     let mut changes = store.watch();
     let store = Arc::downgrade(store);
+    let mut tried = Instant::now();
     std::thread::Builder::new().name("tidy-up".to_owned()).spawn(move || {
         loop {
             std::thread::sleep(LOG_INTERVAL);
+            if phase.is_draining() {
+                return;
+            }
             let Some(store) = store.upgrade() else { return };
             metrics.run_upkeep();
             let is_idle = !changes.has_changed().unwrap_or(true);
@@ -122,9 +186,27 @@ fn tidy_up(store: &Arc<Store>, metrics: PrometheusHandle) -> io::Result<()> {
             if let Err(error) = store.trim_log(is_idle) {
                 tracing::warn!(%error, "the store's log could not be trimmed");
             }
+            let interval = if phase.is_writable() { WRITE_INTERVAL } else { LOG_INTERVAL };
+            if tried.elapsed() >= interval {
+                tried = Instant::now();
+                try_writing(&store, &phase);
+            }
         }
     })?;
     Ok(())
+}
+
+/// Tries whether the store can be written; a service that cannot keep what it promises is not ready.
+fn try_writing(store: &Store, phase: &ServicePhase) {
+    let tried = store.try_writing();
+    match &tried {
+        Err(error) if phase.is_writable() => {
+            tracing::error!(%error, "the data directory cannot be written; the service is not ready");
+        }
+        Ok(()) if !phase.is_writable() => tracing::info!("the data directory can be written again"),
+        _ => {}
+    }
+    phase.set_writable(tried.is_ok());
 }
 
 /// Writes the address of the service as the first line on standard output.

@@ -37,10 +37,11 @@ pub struct AppState {
     pub stopping: watch::Receiver<bool>,
 }
 
-/// Whether the service has recovered its jobs, and whether it is shutting down.
+/// Whether the service has recovered its jobs, can write its data directory, and is shutting down.
 #[derive(Debug, Clone, Default)]
 pub struct ServicePhase {
     ready: Arc<AtomicBool>,
+    unwritable: Arc<AtomicBool>,
     draining: Arc<AtomicBool>,
 }
 
@@ -55,6 +56,17 @@ impl ServicePhase {
     #[must_use]
     pub fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Acquire)
+    }
+
+    /// Whether the data directory could be written when it was last tried.
+    #[must_use]
+    pub fn is_writable(&self) -> bool {
+        !self.unwritable.load(Ordering::Acquire)
+    }
+
+    /// Notes whether the data directory can be written.
+    pub fn set_writable(&self, is_writable: bool) {
+        self.unwritable.store(!is_writable, Ordering::Release);
     }
 
     /// Marks the end of recovery.

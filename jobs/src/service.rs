@@ -1,7 +1,9 @@
 //! The service: store, supervisor, executors, uploads, studies, upkeep of the data directory.
 
 pub mod backup;
+pub mod data_directory;
 pub mod executor;
+pub mod found_folders;
 pub mod fsck;
 pub mod inspector;
 pub mod store;

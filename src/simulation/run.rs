@@ -7,7 +7,7 @@ use super::{Simulation, StepError};
 pub enum Request {
     /// The run goes on.
     Continue,
-    /// End the loop here, after this whole step.
+    /// End the loop here, after this whole step, also where it is the last one.
     Stop,
 }
 
@@ -18,6 +18,14 @@ pub trait Observer {
     /// # Errors
     /// Whatever keeps the observer from its work, such as a full disk.
     fn observe(&mut self, simulation: &dyn Simulation) -> Result<Request, ObserverError>;
+
+    /// Called with a state that is about to be measured, which may take long.
+    ///
+    /// # Errors
+    /// As [`Self::observe`].
+    fn before_measurement(&mut self, _simulation: &dyn Simulation) -> Result<Request, ObserverError> {
+        Ok(Request::Continue)
+    }
 
     /// Called with noteworthy physics of the last step.
     ///
@@ -57,16 +65,22 @@ pub enum Ending {
 /// [`RunError`].
 pub fn run(simulation: &mut dyn Simulation, observer: &mut dyn Observer) -> Result<Ending, RunError> {
     loop {
+        if simulation.is_measurement_due() {
+            if observer.before_measurement(simulation).map_err(RunError::Observer)? == Request::Stop {
+                return Ok(Ending::Stopped);
+            }
+            simulation.measure()?;
+        }
         for finding in simulation.take_findings() {
             observer.notice(&finding).map_err(RunError::Observer)?;
         }
         let request = observer.observe(simulation).map_err(RunError::Observer)?;
-        if simulation.is_finished() {
-            return Ok(Ending::Finished);
-        }
         if request == Request::Stop {
             return Ok(Ending::Stopped);
         }
-        simulation.step()?;
+        if simulation.is_finished() {
+            return Ok(Ending::Finished);
+        }
+        simulation.advance()?;
     }
 }

@@ -34,6 +34,7 @@ quick!(
     cuts_in_a_download,
     one_key_one_job,
     cancels,
+    requests_at_random_moments,
     mutated_scenes,
     mutated_bodies_of_studies,
     mutated_structures,

@@ -10,6 +10,7 @@ mod jobs;
 mod access;
 mod clients;
 mod contract;
+mod data_directory;
 mod estimates;
 mod readers;
 mod requests;

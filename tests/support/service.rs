@@ -30,6 +30,8 @@ pub struct Service {
     arguments: Vec<String>,
     variables: Vec<(String, String)>,
     agent: ureq::Agent,
+    /// What the service writes to its standard error, over all its starts.
+    log: tempfile::NamedTempFile,
 }
 
 pub struct Answer {
@@ -62,16 +64,19 @@ impl Answer {
     }
 }
 
-fn launch(data: &Path, arguments: &[String], variables: &[(String, String)]) -> (Child, String) {
+fn launch(
+    data: &Path,
+    arguments: &[String],
+    variables: &[(String, String)],
+    log: &tempfile::NamedTempFile,
+) -> (Child, String) {
     let mut child = Command::new(program())
         .envs(variables.iter().cloned())
         .args(["serve", "--bind", "127.0.0.1:0", "--no-calibration", "--data"])
         .arg(data)
         .args(arguments)
         .stdout(Stdio::piped())
-        .stderr(Stdio::from(
-            std::fs::OpenOptions::new().create(true).append(true).open(data.join("service.log")).unwrap(),
-        ))
+        .stderr(Stdio::from(std::fs::OpenOptions::new().append(true).open(log.path()).unwrap()))
         .spawn()
         .unwrap();
     let mut line = String::new();
@@ -90,9 +95,10 @@ impl Service {
         let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
         let variables: Vec<(String, String)> =
             variables.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-        let (child, url) = launch(data, &arguments, &variables);
+        let log = tempfile::NamedTempFile::new().unwrap();
+        let (child, url) = launch(data, &arguments, &variables, &log);
         let agent = ureq::Agent::config_builder().http_status_as_error(false).max_redirects(0).build().into();
-        let service = Self { child, url, data: data.to_owned(), arguments, variables, agent };
+        let service = Self { child, url, data: data.to_owned(), arguments, variables, agent, log };
         service.wait_ready();
         service
     }
@@ -101,6 +107,11 @@ impl Service {
         eventually("the service is ready", Duration::from_secs(20), || {
             (self.get("/readyz").status == 200).then_some(())
         });
+    }
+
+    /// What the service has written to its standard error so far.
+    pub fn log_text(&self) -> String {
+        std::fs::read_to_string(self.log.path()).unwrap()
     }
 
     pub fn pid(&self) -> u32 {
@@ -113,8 +124,26 @@ impl Service {
         self.child.wait().unwrap();
     }
 
+    /// Starts it again with other arguments.
+    pub fn restart_with(&mut self, arguments: &[&str]) {
+        self.arguments = arguments.iter().map(|argument| (*argument).to_owned()).collect();
+        self.restart();
+    }
+
+    /// A start that is refused: what it says.
+    pub fn refused_start(&self) -> String {
+        let output = Command::new(program())
+            .args(["serve", "--bind", "127.0.0.1:0", "--no-calibration", "--data"])
+            .arg(&self.data)
+            .args(&self.arguments)
+            .output()
+            .unwrap();
+        assert!(!output.status.success() && output.stdout.is_empty(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    }
+
     pub fn restart(&mut self) {
-        (self.child, self.url) = launch(&self.data, &self.arguments, &self.variables);
+        (self.child, self.url) = launch(&self.data, &self.arguments, &self.variables, &self.log);
         self.wait_ready();
     }
 

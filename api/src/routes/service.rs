@@ -44,9 +44,13 @@ pub async fn health() -> Json<StatusView> {
     Json(StatusView { status: "ok" })
 }
 
-/// The service has recovered its jobs and accepts requests.
+/// The service has recovered its jobs, can write its data directory and accepts requests.
 #[utoipa::path(get, path = "/readyz", operation_id = "service_readiness", tag = "service",
     responses((status = 200, body = StatusView), (status = 503, body = Problem)))]
 pub async fn ready(State(state): State<AppState>) -> Result<Json<StatusView>, ApiError> {
-    if state.phase.is_ready() { Ok(Json(StatusView { status: "ok" })) } else { Err(ApiError::NotReady) }
+    match state.phase.is_ready() {
+        true if !state.phase.is_writable() => Err(ApiError::Unwritable),
+        true => Ok(Json(StatusView { status: "ok" })),
+        false => Err(ApiError::NotReady),
+    }
 }

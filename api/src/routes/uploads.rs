@@ -67,6 +67,7 @@ pub async fn submit(
     let size_bytes = receive(body, &path, &allowance).await?;
     unfinished.directory = None;
     let name = query.name.map(|name| name.chars().take(LONGEST_NAME).collect());
+    let owner = client.owner();
     let work = move |store: &Store| -> Result<Made, ApiError> {
         let (sha256, _) = match artifacts::finish(&path).and_then(|()| digest::of_file(&path)) {
             Ok(found) => found,
@@ -78,7 +79,7 @@ pub async fn submit(
         let target = parts.uri.path_and_query().map_or("", |target| target.as_str());
         let keyed =
             key.map(|key| idempotency::keyed_request(client, key, &[b"POST", target.as_bytes(), sha256.as_bytes()]));
-        let upload = NewUpload { id, purpose: query.r#as, name, size_bytes, sha256 };
+        let upload = NewUpload { id, purpose: query.r#as, name, size_bytes, sha256, owner };
         let answer = |row: &UploadRow| {
             let location = format!("/v1/uploads/{}", row.id);
             stored_response(StatusCode::CREATED, Some(location), &UploadView::from(row.clone()))

@@ -86,6 +86,9 @@ pub struct Counters {
     /// Findings so far.
     #[serde(default)]
     pub findings: Vec<Finding>,
+    /// Whether frame and series row of its own step were not written yet.
+    #[serde(default)]
+    pub is_before_output: bool,
 }
 
 /// Why a checkpoint could not be written or was refused.

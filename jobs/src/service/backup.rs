@@ -3,7 +3,9 @@
 //! The store is copied as one snapshot. Files that it lists never change under their names, so they can be copied
 //! after it; what a running service removes in between (an old checkpoint, a deleted job) makes the copy start over.
 
-use crate::service::store::{self, Store, StoreError};
+use crate::service::data_directory::{DataDirectory, DataDirectoryError};
+use crate::service::store::uploads::CONTENT;
+use crate::service::store::{self, START_CHECKPOINT, Store, StoreError};
 use crate::spec::attempt_files::attempt_directory;
 use crate::system::artifacts;
 use rusqlite::{Connection, OpenFlags};
@@ -26,6 +28,9 @@ pub enum BackupError {
     /// Files went away during every try.
     #[error("the data directory changed during {TRIES} copies")]
     Restless,
+    /// The copy could not be marked.
+    #[error(transparent)]
+    Directory(#[from] DataDirectoryError),
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -55,11 +60,16 @@ pub fn back_up(data: &Path, target: &Path) -> Result<(), BackupError> {
         source.execute("VACUUM INTO ?1", [snapshot.to_string_lossy()]).map_err(StoreError::from)?;
         drop(source);
         if copy_files(data, target)? {
+            drop(DataDirectory::open(target)?);
             artifacts::sync_directory(target)?;
             return Ok(());
         }
-        fs::remove_dir_all(target)?;
-        fs::create_dir_all(target)?;
+        // All of it was made here.
+        for entry in fs::read_dir(target)? {
+            let entry = entry?;
+            let path = entry.path();
+            if entry.file_type()?.is_dir() { fs::remove_dir_all(path)? } else { fs::remove_file(path)? }
+        }
     }
     Err(BackupError::Restless)
 }
@@ -67,11 +77,32 @@ pub fn back_up(data: &Path, target: &Path) -> Result<(), BackupError> {
 /// Copies what the snapshot lists; false when something listed is gone or damaged.
 fn copy_files(data: &Path, target: &Path) -> Result<bool, BackupError> {
     let copy = Store::open(target)?;
-    let source = |job: &str| data.join("jobs").join(job);
+    let is_whole = copy_listed(data, &copy);
+    copy.close();
+    is_whole
+}
+
+fn copy_listed(data: &Path, copy: &Store) -> Result<bool, BackupError> {
+    for upload in copy.uploads(None, u64::MAX >> 1)? {
+        copy_tree(&data.join(store::UPLOADS).join(&upload.id), &copy.upload_directory(&upload.id))?;
+        let content = copy.upload_directory(&upload.id).join(CONTENT);
+        if !fs::metadata(content).is_ok_and(|meta| meta.len() == upload.size_bytes) {
+            return Ok(false);
+        }
+    }
     for job in copy.list(&store::JobFilter { limit: u64::MAX >> 1, oldest_first: true, ..Default::default() })? {
         let into = copy.job_directory(&job.id);
-        // Everything the job has, so that a running attempt's records and series come along.
-        copy_tree(&source(&job.id), &into)?;
+        // Everything the job has, so that a running attempt's records and series come along; attempts that began after the
+        // snapshot are not in its database.
+        let from = data.join(store::JOBS).join(&job.id);
+        let start = from.join(START_CHECKPOINT);
+        if start.is_file() {
+            fs::create_dir_all(&into)?;
+            copy_file(&start, &into.join(START_CHECKPOINT))?;
+        }
+        for attempt in 1..=job.attempt {
+            copy_tree(&attempt_directory(&from, attempt), &attempt_directory(&into, attempt))?;
+        }
         let listed = copy.files(&job.id)?.into_iter().filter(|f| f.content.is_none());
         let listed = listed.map(|f| (f.attempt, f.path, f.size_bytes));
         let checkpoints = copy.checkpoints(&job.id)?.into_iter().map(|c| (c.attempt, c.path, c.size_bytes));
@@ -83,6 +114,11 @@ fn copy_files(data: &Path, target: &Path) -> Result<bool, BackupError> {
         }
     }
     Ok(true)
+}
+
+fn copy_file(from: &Path, to: &Path) -> io::Result<()> {
+    fs::copy(from, to)?;
+    fs::File::open(to)?.sync_all()
 }
 
 fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
@@ -97,7 +133,7 @@ fn copy_tree(from: &Path, to: &Path) -> io::Result<()> {
         let target = to.join(entry.file_name());
         let copied = match entry.file_type()? {
             kind if kind.is_dir() => copy_tree(&entry.path(), &target),
-            _ => fs::copy(entry.path(), &target).and_then(|_| fs::File::open(&target)?.sync_all()),
+            _ => copy_file(&entry.path(), &target),
         };
         match copied {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),

@@ -111,6 +111,9 @@ pub enum NotStarted {
     /// The system failed.
     #[error("{0}")]
     System(io::Error),
+    /// The job cannot be read from the store.
+    #[error("{0}")]
+    Unreadable(String),
 }
 
 impl From<io::Error> for NotStarted {

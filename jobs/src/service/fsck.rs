@@ -1,16 +1,17 @@
 //! Checks a data directory that no service is using: whether the store is intact, consistent, and in agreement with the
 //! files beside it.
 
+use crate::service::data_directory::{DataDirectory, DataDirectoryError};
+use crate::service::found_folders;
 use crate::service::store::uploads::{CLOUD, CONTENT};
 use crate::service::store::{self, JobFilter, JobRow, START_CHECKPOINT, Store, StoreError};
 use crate::spec::attempt_files::attempt_directory;
 use crate::spec::states::State;
 use crate::system::digest;
-use crate::system::lock::{DirectoryLock, LockError};
 use std::fmt;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// One thing that is wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,20 +37,22 @@ pub struct Findings {
     pub files: usize,
     /// What is wrong.
     pub wrong: Vec<Finding>,
+    /// Folders that an earlier start has set aside.
+    pub set_aside: Vec<String>,
 }
 
 /// Why the check could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FsckError {
-    /// A service uses the directory.
-    #[error("{0}; stop it first, or look over a copy (meniscus backup)")]
-    Lock(#[from] LockError),
+    /// A service uses the directory, or it is not ours.
+    #[error("{0}; stop a service that uses it, or look over a copy (meniscus backup)")]
+    Directory(#[from] DataDirectoryError),
     /// The store cannot be opened.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// There is no store.
-    #[error("there is no data directory with a store here")]
-    NoStore,
+    #[error("{} has no database {}; give --data a data directory of meniscus", .0.display(), store::FILE_NAME)]
+    NoStore(PathBuf),
     /// The system failed.
     #[error("{0}")]
     Io(#[from] io::Error),
@@ -64,10 +67,10 @@ const CHUNK: u64 = 500;
 /// [`FsckError`].
 pub fn check(data: &Path) -> Result<Findings, FsckError> {
     if !data.join(store::FILE_NAME).is_file() {
-        return Err(FsckError::NoStore);
+        return Err(FsckError::NoStore(data.to_owned()));
     }
-    let _lock = DirectoryLock::take(data)?;
-    let store = Store::open(data)?;
+    let data = DataDirectory::open_existing(data)?;
+    let store = Store::open(data.path())?;
     let mut findings = Findings::default();
     for what in store.integrity()? {
         findings.wrong.push(Finding { place: "store".to_owned(), what });
@@ -84,7 +87,8 @@ pub fn check(data: &Path) -> Result<Findings, FsckError> {
         }
     }
     of_uploads(&store, &mut findings)?;
-    of_directories(&store, &mut findings)?;
+    of_folders(&store, &mut findings)?;
+    store.close();
     Ok(findings)
 }
 
@@ -155,12 +159,16 @@ fn of_uploads(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
     }
 }
 
-/// Directories that belong to no job and no upload.
-fn of_directories(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
-    for path in store.unknown_entries()? {
-        let place = path.strip_prefix(store.directory()).unwrap_or(&path).display().to_string();
-        let what = "it is not in the database; the service leaves it where it is".to_owned();
-        findings.wrong.push(Finding { place, what });
-    }
+/// Folders that the database does not know.
+fn of_folders(store: &Store, findings: &mut Findings) -> Result<(), FsckError> {
+    let found = found_folders::compare(store.directory(), Some(store))?;
+    let lost = "the database does not know it, or not its latest attempt: it was lost or is older; `serve --adopt` brings it back";
+    let ids = found.jobs.into_iter().map(|job| job.id).chain(found.uploads.into_iter().map(|upload| upload.id));
+    findings.wrong.extend(ids.map(|place| Finding { place, what: lost.to_owned() }));
+    let place = |path: &Path| path.strip_prefix(store.directory()).unwrap_or(path).display().to_string();
+    let orphan = "it belongs to no job and no upload; the next start sets it aside";
+    findings.wrong.extend(found.orphans.iter().map(|path| Finding { place: place(path), what: orphan.to_owned() }));
+    let aside = found_folders::set_aside_so_far(store.directory())?;
+    findings.set_aside = aside.iter().map(|path| place(path)).collect();
     Ok(())
 }

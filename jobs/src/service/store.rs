@@ -3,8 +3,10 @@
 //! One connection writes, under a lock; a few others read. Every change of a job is a compare-and-set on its `rev`
 //! inside a transaction that also writes the event, so what a client saw and what the file says never differ.
 
+mod adoption;
 pub mod idempotency;
 pub mod calibration;
+mod deletion;
 pub mod statistics;
 pub mod events;
 pub mod ids;
@@ -15,6 +17,7 @@ pub mod migrations;
 pub mod retention;
 pub mod rows;
 pub mod finish_attempt;
+pub mod service_clock;
 pub mod studies;
 mod study_limits;
 pub mod submission;
@@ -34,9 +37,9 @@ pub use uploads::{NewUpload, UploadRow};
 use crate::spec::body::{Origin, RestartSource, resolved_scene};
 use crate::spec::states::State;
 use ids::RisingIds;
+use service_clock::ServiceClock;
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -46,6 +49,10 @@ use ulid::Ulid;
 
 /// Name of the file in the data directory.
 pub const FILE_NAME: &str = "meniscus.sqlite";
+/// Folder of the jobs in the data directory.
+pub const JOBS: &str = "jobs";
+/// Folder of the uploads in the data directory.
+pub const UPLOADS: &str = "uploads";
 /// Size from which on the log is trimmed while there are no writers.
 const LONG_LOG_BYTES: u64 = 2 << 20;
 /// Size from which on the log is trimmed even while there are writers.
@@ -66,6 +73,8 @@ pub struct Store {
     /// Connection that trims the log.
     trimmer: Mutex<Connection>,
     ids: RisingIds,
+    /// Seconds for which services have run on this directory.
+    clock: ServiceClock,
     /// Counts changes; waiting clients watch it.
     changes: watch::Sender<u64>,
 }
@@ -88,6 +97,9 @@ pub enum StoreError {
     /// A transaction that was shared with others failed.
     #[error("the store failed: {0}")]
     GroupCommit(String),
+    /// A job could not be brought back from its files.
+    #[error("a job could not be adopted: {0}")]
+    Adoption(String),
     /// A stored value cannot be read.
     #[error("a stored value is unreadable: {0}")]
     Json(#[from] serde_json::Error),
@@ -107,12 +119,12 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
-        std::fs::create_dir_all(directory.join("jobs"))?;
-        std::fs::create_dir_all(directory.join("uploads"))?;
+        std::fs::create_dir_all(directory.join(JOBS))?;
+        std::fs::create_dir_all(directory.join(UPLOADS))?;
         let path = directory.join(FILE_NAME);
         let mut writer = connect(&path)?;
         migrations::apply(&mut writer)?;
-        let ids = RisingIds::above(&writer)?;
+        let (ids, clock) = (RisingIds::above(&writer)?, ServiceClock::open(&writer)?);
         let (writer, changes) = (Arc::new(Mutex::new(writer)), watch::Sender::new(0));
         let readers = (0..READERS).map(|_| connect(&path).map(Mutex::new)).collect::<Result<_, _>>()?;
         Ok(Self {
@@ -123,6 +135,7 @@ impl Store {
             next_reader: std::sync::atomic::AtomicUsize::new(0),
             trimmer: Mutex::new(connect(&path)?),
             ids,
+            clock,
             changes,
         })
     }
@@ -130,7 +143,7 @@ impl Store {
     /// The directory of a job.
     #[must_use]
     pub fn job_directory(&self, job: &str) -> PathBuf {
-        self.directory.join("jobs").join(job)
+        self.directory.join(JOBS).join(job)
     }
 
     /// The data directory.
@@ -171,6 +184,36 @@ impl Store {
 
     fn next_id(&self) -> Ulid {
         self.ids.next()
+    }
+
+    /// An id and a reading of the clock that rise together.
+    fn next_submission(&self) -> (Ulid, f64) {
+        self.ids.next_with(|| self.clock.seconds())
+    }
+
+    /// Folds the log into the file and closes it. What comes later fails.
+    pub fn close(&self) {
+        if let Err(error) = self.save_clock() {
+            tracing::warn!(%error, "the clock of the data directory could not be saved");
+        }
+        // The last connection that closes folds the log and removes it.
+        for connection in [&self.trimmer].into_iter().chain(&self.readers).chain([&*self.writer]) {
+            let mut connection = connection.lock().unwrap_or_else(PoisonError::into_inner);
+            let Ok(nothing) = Connection::open_in_memory() else { continue };
+            if let Err((_, error)) = std::mem::replace(&mut *connection, nothing).close() {
+                tracing::warn!(%error, "a connection to the store could not be closed");
+            }
+        }
+    }
+
+    /// Whether the store can be written. A change that changes nothing is made durable.
+    ///
+    /// # Errors
+    /// [`StoreError`] with what stands in the way.
+    pub fn try_writing(&self) -> Result<(), StoreError> {
+        let connection = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
+        connection.pragma_update(None, "user_version", migrations::known())?;
+        Ok(())
     }
 
     /// Revision of a job and count of its progress: they differ between any two versions of it.
@@ -256,12 +299,12 @@ impl Store {
 
     /// Deletes a job in a terminal state and its files; false where it is in another state.
     ///
-    /// The row goes first, so that a row without files never exists. A crash in between leaves files without a row; the next
-    /// start names them in the log and leaves them alone.
+    /// The row goes first, so that a row without files never exists. Files that the system does not let go are deleted later.
     ///
     /// # Errors
     /// [`StoreError`].
     pub fn delete(&self, id: &str) -> Result<bool, StoreError> {
+        let folder = job_folder(id);
         let deleted = self.write(|transaction| -> Result<bool, StoreError> {
             let state: Option<String> =
                 transaction.query_row("SELECT state FROM jobs WHERE id = ?1", [id], |row| row.get(0)).optional()?;
@@ -269,38 +312,19 @@ impl Store {
                 return Ok(false);
             }
             delete_rows(transaction, id)?;
+            deletion::intend(transaction, &folder)?;
             Ok(true)
         })?;
         if deleted {
-            remove_directory(&self.job_directory(id))?;
+            self.delete_folder(&folder)?;
         }
         Ok(deleted)
     }
+}
 
-    /// Entries of the job and upload folders that the database does not list: folders of other programs, jobs of a newer
-    /// database, leftovers of a submission, an upload or a deletion that a crash cut short. None of them is touched.
-    ///
-    /// # Errors
-    /// [`StoreError`].
-    pub fn unknown_entries(&self) -> Result<Vec<PathBuf>, StoreError> {
-        let mut unknown = Vec::new();
-        for kind in ["jobs", "uploads"] {
-            let known: HashSet<String> = {
-                let connection = self.read();
-                let mut statement = connection.prepare(&format!("SELECT id FROM {kind}"))?;
-                let rows = statement.query_map([], |row| row.get(0))?;
-                rows.collect::<Result<_, _>>()?
-            };
-            for entry in std::fs::read_dir(self.directory.join(kind))? {
-                let entry = entry?;
-                if !entry.file_name().to_str().is_some_and(|name| known.contains(name)) {
-                    unknown.push(entry.path());
-                }
-            }
-        }
-        unknown.sort();
-        Ok(unknown)
-    }
+/// Folder of a job below the data directory.
+fn job_folder(job: &str) -> String {
+    format!("{JOBS}/{job}")
 }
 
 fn delete_rows(transaction: &Transaction, job: &str) -> rusqlite::Result<()> {
@@ -310,7 +334,7 @@ fn delete_rows(transaction: &Transaction, job: &str) -> rusqlite::Result<()> {
             "UPDATE jobs SET superseded = 0 WHERE id = (SELECT retry_of FROM jobs WHERE id = ?1 AND superseded = 0)",
         )?
         .execute([job])?;
-    for table in ["events", "files", "checkpoints", "inputs"] {
+    for table in ["events", "files", "checkpoints", "inputs", "dependencies"] {
         transaction.prepare_cached(&format!("DELETE FROM {table} WHERE job = ?1"))?.execute([job])?;
     }
     transaction.prepare_cached("DELETE FROM jobs WHERE id = ?1")?.execute([job]).map(|_| ())

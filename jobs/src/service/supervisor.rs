@@ -3,6 +3,7 @@
 
 mod leftovers;
 mod limits;
+mod patience;
 mod recovery;
 mod starting;
 
@@ -12,11 +13,12 @@ use crate::service::store::import::{Imported, ProgressPace};
 use crate::service::store::{Change, ChangeError, Store, StoreError};
 use crate::spec::attempt_files::attempt_directory;
 use crate::spec::records::Usage;
-use crate::spec::requests::Request;
+use crate::spec::requests::{NOT_STARTED_CODE, Request};
 use crate::spec::run_options::RunOptions;
 use crate::spec::states::{Reason, Trigger};
 use crate::system::breakpoints::pass;
 use crate::system::process;
+use patience::{GrowingPause, PatientClock};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
@@ -98,10 +100,12 @@ struct Running {
     usage_before: Usage,
     /// Running time of the job at its last resume, in seconds.
     leg_wall_s: f64,
-    pause_sent: Option<Instant>,
-    cancel_sent: Option<Instant>,
+    /// Times of requests and signs of life, by the supervisor's own clock.
+    pause_sent: Option<Duration>,
+    cancel_sent: Option<Duration>,
+    heard: Duration,
     /// Time at which its verdict came; the process is to end soon after.
-    verdict_since: Option<Instant>,
+    verdict_since: Option<Duration>,
     /// Memory that was reserved for it.
     reserved_bytes: u64,
     disk_checked: Instant,
@@ -123,8 +127,10 @@ pub struct Supervisor {
     expired: Option<Instant>,
     /// Whether something failed in this round.
     round_failed: bool,
-    /// No worker is started before this time, after one could not be started.
-    start_again: Instant,
+    /// No worker is started for a while after one could not be started.
+    start_pause: GrowingPause,
+    clock: PatientClock,
+    clock_saved: Instant,
 }
 
 /// Time between two rounds without messages.
@@ -139,6 +145,8 @@ const TIME_TO_EXIT: Duration = Duration::from_secs(5);
 const VERDICT_BYTES: u64 = 1 << 20;
 /// Time without rounds after one in which something failed.
 const FAILURE_PAUSE: Duration = Duration::from_millis(400);
+/// Time between two times at which the clock of the data directory is saved.
+const CLOCK_INTERVAL: Duration = Duration::from_secs(60);
 /// Time between two searches for jobs that are kept no longer.
 const EXPIRY_INTERVAL: Duration = Duration::from_secs(600);
 
@@ -159,7 +167,9 @@ impl Supervisor {
             space_checked: now,
             expired: None,
             round_failed: false,
-            start_again: now,
+            start_pause: GrowingPause::default(),
+            clock: PatientClock::new(),
+            clock_saved: now,
         }
     }
 
@@ -219,6 +229,7 @@ impl Supervisor {
 
     /// One round: import records, hold workers to their limits, finish attempts, start workers.
     fn round(&mut self) -> Result<(), StoreError> {
+        self.clock.begin_round();
         for mut running in std::mem::take(&mut self.running) {
             match self.watch(&mut running) {
                 Ok(true) => continue,
@@ -233,7 +244,11 @@ impl Supervisor {
         }
         self.store.stop_failed_studies()?;
         self.expire()?;
-        if !self.is_draining() && Instant::now() >= self.start_again {
+        if self.clock_saved.elapsed() >= CLOCK_INTERVAL {
+            self.clock_saved = Instant::now();
+            self.store.save_clock()?;
+        }
+        if !self.is_draining() && !self.start_pause.is_on() {
             self.resume_when_space_is_back()?;
             while self.running.len() < self.settings.slots && self.start_next()? {}
         }
@@ -246,6 +261,7 @@ impl Supervisor {
             return Ok(());
         }
         self.expired = Some(Instant::now());
+        self.store.delete_intended()?;
         let gone = self.store.expire(self.settings.retention_days)?;
         if gone > 0 {
             // There may be more; workers are watched in between.
@@ -256,7 +272,7 @@ impl Supervisor {
     }
 
     /// Watches one worker; true when it has ended and its attempt is finished.
-    fn watch(&self, running: &mut Running) -> Result<bool, StoreError> {
+    fn watch(&mut self, running: &mut Running) -> Result<bool, StoreError> {
         // The end is noted before the last import, so that nothing written before it is missed.
         let end = running.worker.poll()?;
         // Records that cannot be read are as good as none; limits and the end are watched all the same.
@@ -271,11 +287,15 @@ impl Supervisor {
             self.finish(running, cause, imported.is_whole)?;
             return Ok(true);
         }
+        if imported.any {
+            self.start_pause.reset();
+        }
+        let now = self.clock.now();
         if imported.verdict.is_some() {
-            running.verdict_since = Some(Instant::now());
+            running.verdict_since = Some(now);
         }
         match running.verdict_since {
-            Some(since) if since.elapsed() >= TIME_TO_EXIT => running.worker.kill(),
+            Some(since) if now - since >= TIME_TO_EXIT => running.worker.kill(),
             Some(_) => {}
             None => self.hold_to_limits(running)?,
         }
@@ -283,7 +303,10 @@ impl Supervisor {
     }
 
     /// Finishes the attempt of a worker that has ended.
-    fn finish(&self, running: &Running, cause: EndCause, is_whole: bool) -> Result<(), StoreError> {
+    fn finish(&mut self, running: &Running, cause: EndCause, is_whole: bool) -> Result<(), StoreError> {
+        if cause == (EndCause::Exited { code: i32::from(NOT_STARTED_CODE) }) {
+            return self.miss(&running.job, running.epoch, "the system did not grant what a worker needs");
+        }
         // On a full device a worker cannot leave a verdict either.
         let is_full = process::free_space(self.store.directory()).is_some_and(|free| free < VERDICT_BYTES);
         let loss = match cause {

@@ -25,6 +25,9 @@ pub const FRAME_ENDING: &str = "vtkhdf";
 /// Ending of a checkpoint's name, which is otherwise its step.
 pub const CHECKPOINT_ENDING: &str = "h5";
 
+/// Mark in the name of a checkpoint that was written before the measurements and the output of its step.
+pub const UNMEASURED: &str = "-unmeasured";
+
 /// Media type of frames and checkpoints.
 pub const HDF5_MEDIA_TYPE: &str = "application/x-hdf5";
 

@@ -1,7 +1,9 @@
 //! The specification of an attempt, from which a worker learns what to do: `attempt.json` in the attempt's directory.
 
 use crate::spec::calibration::TimeForecast;
+use crate::spec::forecast::ForecastRecord;
 use crate::spec::records::Usage;
+use meniscus::simulation::Finding;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -33,6 +35,29 @@ pub struct AttemptSpec {
     pub reserve_bytes: u64,
     /// Cost of the attempts before.
     pub usage: Usage,
+    /// What the worker does not need: by it the job comes back into a database that was lost.
+    #[serde(default)]
+    pub submission: Option<Submission>,
+}
+
+/// What the database has of a job beside its resolved body.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Submission {
+    /// Body as sent.
+    pub spec: Value,
+    /// What the run was forecast to take.
+    pub forecast: ForecastRecord,
+    /// What was doubtful before it ran.
+    pub warnings: Vec<Finding>,
+    /// Time at which it was made.
+    pub created_at: Option<String>,
+    /// Name of the token that made it.
+    pub owner: Option<String>,
+    /// Study that it is a point of, with the number of the point.
+    pub study: Option<(String, u64)>,
+    /// Job that it repeats.
+    pub retry_of: Option<String>,
 }
 
 /// A checkpoint to begin with.

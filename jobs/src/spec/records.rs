@@ -38,6 +38,11 @@ pub enum Record {
         /// Pid of the worker.
         pid: u32,
     },
+    /// What is being done, before there is any progress.
+    Phase {
+        /// Name of the phase.
+        phase: String,
+    },
     /// How far it is.
     Progress(Progress),
     /// A file was written in place.
@@ -160,6 +165,11 @@ pub enum Verdict {
     },
     /// The step was dropped on request.
     Canceled,
+    /// The system did not grant what a worker needs to begin. It is no record: the exit code of the worker says so.
+    Unstarted {
+        /// What the system said.
+        cause: String,
+    },
     /// It cannot go on.
     Failed {
         /// Reason of the failure.
@@ -176,6 +186,7 @@ impl fmt::Display for Verdict {
             Self::Paused { reason: None } => formatter.write_str("paused on request"),
             Self::Paused { reason: Some(reason) } => write!(formatter, "paused ({})", reason.word()),
             Self::Canceled => formatter.write_str("canceled"),
+            Self::Unstarted { cause } => write!(formatter, "not started: {cause}"),
             Self::Failed { reason, message } => write!(formatter, "failed ({}): {message}", reason.word()),
         }
     }

@@ -1,5 +1,8 @@
 //! Requests of the service to a running worker. Nothing else flows into a run.
 
+/// Exit code of a worker to which the system did not grant what it needs to begin, such as threads: EX_TEMPFAIL.
+pub const NOT_STARTED_CODE: u8 = 75;
+
 /// A request to a running worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {

@@ -64,6 +64,8 @@ words! {
     Trigger {
         /// A slot and memory are free.
         Claim => "claim",
+        /// The worker could not be started.
+        Miss => "miss",
         /// A request to cancel.
         Cancel => "cancel",
         /// A request to pause, or a limit.
@@ -156,6 +158,9 @@ pub const TRANSITIONS: &[(State, Trigger, State)] = &[
     (State::Queued, Trigger::Pause, State::Paused),
     (State::Paused, Trigger::Cancel, State::Canceled),
     (State::Paused, Trigger::Resume, State::Queued),
+    (State::Running, Trigger::Miss, State::Queued),
+    (State::Pausing, Trigger::Miss, State::Paused),
+    (State::Canceling, Trigger::Miss, State::Canceled),
     (State::Running, Trigger::Finish, State::Succeeded),
     (State::Running, Trigger::Pause, State::Pausing),
     (State::Running, Trigger::Cancel, State::Canceling),
@@ -224,6 +229,19 @@ impl From<&StepError> for Reason {
 }
 
 impl Reason {
+    /// What a user can do about it, where the job has no checkpoint to go on from.
+    #[must_use]
+    pub fn hint_without_checkpoint(self) -> &'static str {
+        match self {
+            Self::UserPause => "paused on request before its first checkpoint; resumed, the job starts from the beginning",
+            Self::ServerRestart => {
+                "the service stopped before the first checkpoint of the job; it starts from the beginning"
+            }
+            Self::WorkerEvicted => "the cluster took the node back before the first checkpoint; the job starts from the beginning",
+            other => other.hint(),
+        }
+    }
+
     /// What a user can do about it.
     #[must_use]
     pub fn hint(self) -> &'static str {

@@ -4,6 +4,9 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::Path;
 
+/// Name of the lock file.
+pub const FILE_NAME: &str = "lock";
+
 /// Holds the directory until it is dropped or the process ends.
 #[derive(Debug)]
 pub struct DirectoryLock {
@@ -27,7 +30,7 @@ impl DirectoryLock {
     /// # Errors
     /// [`LockError`].
     pub fn take(directory: &Path) -> Result<Self, LockError> {
-        let mut file = OpenOptions::new().create(true).truncate(false).write(true).open(directory.join("lock"))?;
+        let mut file = OpenOptions::new().create(true).truncate(false).write(true).open(directory.join(FILE_NAME))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(LockError::Held),

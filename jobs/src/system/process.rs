@@ -108,3 +108,18 @@ pub fn cpu_name() -> Option<String> {
     let line = info.lines().find(|line| line.starts_with("model name"))?;
     line.split(':').nth(1).map(|name| name.trim().to_owned())
 }
+
+/// Whether an error says that the system has no descriptors, threads, processes or memory left, which may pass.
+#[must_use]
+pub fn is_shortage(error: &(dyn std::error::Error + 'static)) -> bool {
+    const SHORTAGES: [i32; 4] = [libc::EAGAIN, libc::EMFILE, libc::ENFILE, libc::ENOMEM];
+    let mut current = Some(error);
+    while let Some(error) = current {
+        let code = error.downcast_ref::<std::io::Error>().and_then(std::io::Error::raw_os_error);
+        if code.is_some_and(|code| SHORTAGES.contains(&code)) {
+            return true;
+        }
+        current = error.source();
+    }
+    false
+}

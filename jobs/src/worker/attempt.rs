@@ -37,6 +37,10 @@ pub fn run_attempt(spec: &AttemptSpec, directory: &Path, control: &Control, sink
         Err(_) => Verdict::Failed { reason: Reason::Internal, message: "the worker panicked".to_owned() },
     };
     log.line(&verdict.to_string());
+    if let Verdict::Unstarted { .. } = verdict {
+        // The exit code tells; the records begin with the next try.
+        return verdict;
+    }
     // Without a verdict the service treats the worker as lost, which is the truth then.
     let _ = sink.put(&Record::Verdict(verdict.clone()), true);
     verdict
@@ -64,6 +68,10 @@ enum Failure {
     Other(ObserverError),
     Known(Reason, String),
     Canceled,
+    /// The set-up was dropped on request.
+    Paused,
+    /// The system did not grant what it needs to begin.
+    Unstarted(String),
 }
 
 impl<E: Into<ObserverError>> From<E> for Failure {
@@ -75,6 +83,8 @@ impl<E: Into<ObserverError>> From<E> for Failure {
 impl Failure {
     fn verdict(self, directory: &Path) -> Verdict {
         match self {
+            Self::Paused => Verdict::Paused { reason: None },
+            Self::Unstarted(cause) => Verdict::Unstarted { cause },
             Self::Canceled | Self::Run(RunError::Step(StepError::Interrupted)) => Verdict::Canceled,
             Self::Known(reason, message) => Verdict::Failed { reason, message },
             Self::Run(RunError::Step(error)) => Verdict::Failed { reason: (&error).into(), message: error.to_string() },
@@ -111,11 +121,13 @@ fn attempt(
         Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
     })?;
     let threads = options.threads();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| internal(&e))?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| if process::is_shortage(&e) { Failure::Unstarted(e.to_string()) } else { internal(&e) })?;
     log.line(&format!("attempt {} of {} on {} threads", spec.epoch, spec.job, threads));
     // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
     let mut progress = ProgressMeter::new(spec.usage, spec.time.clone());
     pool.install(|| {
+        sink.put(&Record::Phase { phase: "setting up".to_owned() }, false)?;
         let mut simulation = build(spec, scene.as_ref(), &options, control)?;
         let start = restore(spec, simulation.as_mut(), sink, log)?;
         progress.continue_phases(start.counters.phases.clone());
@@ -136,14 +148,28 @@ fn attempt(
             }
         }
         log.line(&format!("start at step {step}, {} particles", simulation.particle_count()));
-        let ending = run(simulation.as_mut(), &mut observers).map_err(Failure::Run)?;
+        let ending = match run(simulation.as_mut(), &mut observers) {
+            Err(RunError::Step(StepError::Interrupted)) if control.is_pausing() && !control.is_canceled() => {
+                observers.rescue()?;
+                return Ok(Verdict::Paused { reason: None });
+            }
+            ran => ran.map_err(Failure::Run)?,
+        };
         let word = if ending == Ending::Finished { "finished" } else { "stopped" };
         log.line(&format!("{word} at step {}", simulation.clock().step));
         match ending {
-            Ending::Stopped if control.interrupt().is_raised() => Ok(Verdict::Canceled),
+            Ending::Stopped if control.is_canceled() => Ok(Verdict::Canceled),
             Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),
             Ending::Finished => {
-                let operators = write_operators(directory, &options, simulation.as_mut(), &mut observers)?;
+                let operators = match write_operators(directory, &options, simulation.as_mut(), &mut observers) {
+                    // The checkpoint of the end stands; they are made when the job goes on.
+                    Err(Failure::Run(RunError::Step(StepError::Interrupted)))
+                        if control.is_pausing() && !control.is_canceled() =>
+                    {
+                        return Ok(Verdict::Paused { reason: None });
+                    }
+                    written => written?,
+                };
                 let ended =
                     Ended { simulation: simulation.as_ref(), scene: scene.as_ref(), scene_sha256, threads, operators };
                 finish(spec, directory, &ended, &mut observers, log)?;
@@ -169,8 +195,11 @@ fn build(
     };
     let built = scene.build(context);
     // A build that was dropped on request says nothing about the input.
-    if control.interrupt().is_raised() {
+    if control.is_canceled() {
         return Err(Failure::Canceled);
+    }
+    if control.interrupt().is_raised() {
+        return Err(Failure::Paused);
     }
     built.map_err(|found| {
         let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
@@ -308,7 +337,8 @@ fn prepare<'a>(
         directory: directory.to_owned(),
         reserve_bytes: spec.reserve_bytes,
         is_starved: false,
-        restored: start.is_own.then_some(start.step),
+        restored: (start.is_own && !counters.is_before_output).then_some(start.step),
+        kept: None,
     })
 }
 

@@ -49,6 +49,7 @@ pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<J
         time: None,
         reserve_bytes: 0,
         usage: Usage::default(),
+        submission: None,
     };
     match attempt::run_attempt(&spec, directory, &Control::default(), &mut Silent) {
         Verdict::Succeeded => {

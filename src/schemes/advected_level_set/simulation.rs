@@ -8,7 +8,7 @@ use super::system::{AdvectedSystem, RedistanceWhen};
 use crate::closest_point::enclosed_moments::enclosed_area_or_volume;
 use crate::closest_point::{FitDiagnostics, LevelSurface};
 use crate::geometry::Vector;
-use crate::parallel::{Interrupt, Interrupted};
+use crate::parallel::Interrupted;
 use crate::particles::Particles;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_diagnostics, rescued};
 use crate::simulation::components::{load_particles, save_particles};
@@ -143,11 +143,13 @@ impl<const D: usize> AdvectedLevelSet<D> {
             if surface.is_lost() {
                 return Err(StepError::InterfaceLost { step: now.step, time: now.time });
             }
-            // What the copy could not do the plain way stands behind the errors that are reported.
+            let measure = enclosed_area_or_volume(&surface, &self.system.interrupt)?;
+            let measured = self.measure_errors(now.time, &particles, &surface, measure)?;
+            // From here on nothing is interrupted. What the copy could not do the plain way stands behind the errors that are
+            // reported.
             self.system.redistancing.fit_diagnostics_mut().merge(surface.fit_diagnostics());
-            self.measure = enclosed_area_or_volume(&surface, &self.system.interrupt)?;
-            self.measured = now.step;
-            self.measure_errors(now.time, &particles, &surface, self.measure)?
+            (self.measure, self.measured) = (measure, now.step);
+            measured
         };
         self.errors.push(measured);
         let spent = (self.course.phases.clock())() - start;
@@ -167,8 +169,8 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
 
     /// 1. Transport: positions move, ψ stays with them.
     /// 2. Redistancing, on the scene's schedule or, without one, where output needs it.
-    /// 3. The enclosed measure for a due series row; errors half way and at the end.
-    fn step(&mut self) -> Result<(), StepError> {
+    /// 3. The enclosed measure for a due series row. Errors half way and at the end are a measurement.
+    fn advance(&mut self) -> Result<(), StepError> {
         let before = self.clock();
         let next = self.course.next();
         let (system, time_step) = (&mut self.system, self.course.pace.time_step);
@@ -191,11 +193,17 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
                 self.measured = next.step;
             }
         }
-        if self.is_error_due(next.step) {
-            self.take_errors(next)?;
-        }
         self.course.step = next.step;
         Ok(())
+    }
+
+    fn is_measurement_due(&self) -> bool {
+        let Clock { step, time } = self.clock();
+        step > 0 && self.is_error_due(step) && self.errors.last().is_none_or(|last| last.time != time)
+    }
+
+    fn measure(&mut self) -> Result<(), StepError> {
+        self.take_errors(self.clock())
     }
 
     fn observables(&self) -> Observables {
@@ -223,8 +231,8 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let particles = if self.redistanced == Some(self.course.step) || !shows_surface {
             &self.system.particles
         } else {
-            // Without an interrupt nothing fails; the particles as they are would be shown otherwise.
-            match self.system.redistanced_copy(&Interrupt::default()) {
+            // An interrupted frame is dropped by its writer.
+            match self.system.redistanced_copy(&self.system.interrupt) {
                 Ok((copy, _)) => {
                     fresh = copy;
                     &fresh

@@ -106,7 +106,7 @@ impl Simulation for EmbeddingClosestPoint {
     }
 
     /// 1. The band, where there is none yet. 2. Extension, differences, evaluation.
-    fn step(&mut self) -> Result<(), StepError> {
+    fn advance(&mut self) -> Result<(), StepError> {
         let Self { surface, field, data, parts, made, course, interrupt, .. } = self;
         let (to, phases) = (course.next(), &mut course.phases);
         let made = match made {

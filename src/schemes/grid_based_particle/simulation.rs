@@ -33,7 +33,9 @@ pub struct GridBasedParticles<const D: usize, const M: usize> {
     vanished: Option<f64>,
     /// Errors at the times where they were due so far.
     errors: Vec<FrontErrors>,
-    /// Particles at open ends, found in the last step.
+    /// Time of the last measurement.
+    measured_at: Option<f64>,
+    /// Particles at open ends, found in the last measurement.
     ends: Vec<usize>,
     course: Course,
 }
@@ -57,6 +59,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
             max_cfl: 0.0,
             vanished: None,
             errors: Vec::new(),
+            measured_at: None,
             ends: Vec::new(),
             course: Course::new(fixed.into(), Phases::new(cpu_clock), method),
         }
@@ -118,8 +121,8 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         &mut self.course
     }
 
-    /// 1. Move and resample the front, as long as there is one. 2. Compute the errors, where they are due.
-    fn step(&mut self) -> Result<(), StepError> {
+    /// Moves and resamples the front, as long as there is one.
+    fn advance(&mut self) -> Result<(), StepError> {
         let (from, to) = (self.clock(), self.course.next());
         self.ends.clear();
         if !self.system.feet.is_empty() {
@@ -133,15 +136,24 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
                 self.course.findings.push(Finding::info("front_vanished", message, (to.step, to.time)));
             }
         }
-        if self.is_error_due(to.step) {
+        self.course.step = to.step;
+        Ok(())
+    }
+
+    fn is_measurement_due(&self) -> bool {
+        let Clock { step, time } = self.clock();
+        step > 0 && self.is_error_due(step) && self.measured_at != Some(time)
+    }
+
+    fn measure(&mut self) -> Result<(), StepError> {
+        let to = self.clock();
             let Self { exact, ball, system, course, .. } = self;
             let FrontConfig { grid, interrupt, .. } = &system.config;
             let moment = Moment { feet: &system.feet, grid, time: to.time, interrupt };
             let found = course.phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
             self.errors.extend(found);
             self.find_open_ends(to);
-        }
-        self.course.step = to.step;
+        self.measured_at = Some(to.time);
         Ok(())
     }
 
@@ -181,6 +193,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         state.put_real("max_cfl", self.max_cfl);
         state.put_optional("vanished_at", self.vanished);
         state.put_list("errors", &self.errors);
+        state.put_optional("measured_at", self.measured_at);
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
@@ -189,9 +202,12 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         let removals: Removals = state.component("removals")?;
         let (max_cfl, vanished) = (state.real("max_cfl")?, state.optional("vanished_at")?);
         let errors = state.list("errors")?;
+        // States of earlier versions were always measured.
+        let measured_at = if state.has("measured_at") { state.optional("measured_at")? } else { Some(clock.time) };
         // From here on nothing fails.
         (self.system.feet, self.system.removals) = (feet, removals);
         (self.max_cfl, self.vanished, self.errors) = (max_cfl, vanished, errors);
+        self.measured_at = measured_at;
         self.ends.clear();
         self.course.step = clock.step;
         Ok(())

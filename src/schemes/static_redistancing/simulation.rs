@@ -89,7 +89,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
     /// 1. Detection, regression and projection from the present level, or from what a grid gets of it.
     /// 2. Queries at every particle.
     /// 3. The distances become the level.
-    fn step(&mut self) -> Result<(), StepError> {
+    fn advance(&mut self) -> Result<(), StepError> {
         let system = &mut self.system;
         let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
         let (surface, answers) = (&mut system.redistancing, &mut system.answers);

@@ -266,7 +266,7 @@ impl<const D: usize> Simulation for MovingSurface<D> {
         &mut self.course
     }
 
-    fn step(&mut self) -> Result<(), StepError> {
+    fn advance(&mut self) -> Result<(), StepError> {
         let (from, to) = (self.course.clock(), self.course.next());
         let (torn, uneven) = (self.torn(), self.unevenness());
         let seconds = self.course.phases.clock();

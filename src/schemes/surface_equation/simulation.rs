@@ -226,7 +226,7 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
     }
 
     /// 1. Operators, where there are none yet: a row for every point. 2. The problem's step. 3. A look at the numbers.
-    fn step(&mut self) -> Result<(), StepError> {
+    fn advance(&mut self) -> Result<(), StepError> {
         if self.operators.is_none() {
             self.construct_operators()?;
         }

@@ -311,7 +311,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
     }
 
     /// 1. The parts that the limits ask for. 2. Each part by the integrator. 3. A look at soundness and, where due, a row.
-    fn step(&mut self) -> Result<(), StepError> {
+    fn advance(&mut self) -> Result<(), StepError> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }

@@ -46,8 +46,13 @@ impl Executor for LocalExecutor {
             .stderr(errors)
             .spawn()?;
         let last_heartbeat = Arc::new(Mutex::new(Instant::now()));
-        if let Some(output) = child.stdout.take() {
-            follow_heartbeat(output, Arc::clone(&last_heartbeat), notify)?;
+        if let Some(output) = child.stdout.take()
+            && let Err(error) = follow_heartbeat(output, Arc::clone(&last_heartbeat), notify)
+        {
+            // Without a thread that listens to it, it would run unwatched.
+            child.kill()?;
+            child.wait()?;
+            return Err(error.into());
         }
         let name = format!("{}-{}", std::process::id(), child.id());
         let group = MemoryGroup::enclose(Path::new("/sys/fs/cgroup"), &name, child.id(), needs.memory_bytes);

@@ -44,7 +44,7 @@ impl Store {
 
 fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
     let step = |trigger: Trigger, reason: Option<Reason>, message: Option<String>| {
-        apply(transaction, &row.id, trigger, &Change { reason, message, epoch: Some(row.attempt) })
+        apply(transaction, &row.id, trigger, &Change { reason, message, epoch: Some(row.attempt), ..Change::default() })
     };
     match row.state {
         // The cancellation came first, whatever the verdict is.
@@ -66,7 +66,7 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<()
                 step(if drained { Trigger::Drain } else { Trigger::Rest }, kept, None).map(|_| ())
             }
             // A worker ends as canceled on request only; without a request it counts as lost.
-            Some(Verdict::Canceled) | None => lose(transaction, row, lost),
+            Some(Verdict::Canceled | Verdict::Unstarted { .. }) | None => lose(transaction, row, lost),
         },
         _ => Ok(()),
     }
@@ -75,7 +75,8 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<()
 fn lose(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
     let reason = row.kill_reason.unwrap_or(lost.reason);
     let step = |trigger: Trigger, reason: Reason, message: Option<String>| {
-        apply(transaction, &row.id, trigger, &Change { reason: Some(reason), message, epoch: Some(row.attempt) })
+        let change = Change { reason: Some(reason), message, epoch: Some(row.attempt), ..Change::default() };
+        apply(transaction, &row.id, trigger, &change)
     };
     if matches!(reason, Reason::LimitMemory | Reason::WorkerOom) {
         return step(Trigger::Fail, reason, None).map(|_| ());

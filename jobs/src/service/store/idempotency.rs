@@ -31,7 +31,9 @@ pub enum Made {
 }
 
 /// Days that a receipt is kept at least.
-pub const KEPT_DAYS: i64 = 7;
+pub const KEPT_DAYS: f64 = 7.0;
+/// Seconds of a day.
+pub(super) const DAY_S: f64 = 86_400.0;
 
 /// The outcome that is kept under a key; None where the key is new.
 pub(super) fn recall(connection: &Connection, key: &IdempotencyKey) -> Result<Option<Made>, StoreError> {
@@ -50,7 +52,8 @@ fn keep(transaction: &Transaction, key: &IdempotencyKey, receipt: &Receipt) -> R
     let now = crate::system::clock::now();
     transaction
         .prepare_cached(
-            "INSERT INTO receipts (owner, key, fingerprint, receipt, created_at) VALUES (?1, ?2, ?3, ?4, ?5)",
+            "INSERT INTO receipts (owner, key, fingerprint, receipt, created_at, made_s)
+             VALUES (?1, ?2, ?3, ?4, ?5, (SELECT seconds FROM service_clock))",
         )?
         .execute(params![key.owner, key.key, key.fingerprint, receipt.0, now])?;
     Ok(())
@@ -72,11 +75,9 @@ pub(super) fn make_once(
     Ok(Made::New(receipt))
 }
 
-/// Deletes receipts that are older than they need to be.
-pub(super) fn expire(transaction: &Transaction) -> Result<(), StoreError> {
-    const DAY_S: i64 = 86_400;
-    let before = crate::system::clock::from_now(-KEPT_DAYS * DAY_S);
-    transaction.execute("DELETE FROM receipts WHERE created_at < ?1", [before])?;
+/// Deletes receipts that are older than they need to be, by the clock of the data directory.
+pub(super) fn expire(transaction: &Transaction, clock_s: f64) -> Result<(), StoreError> {
+    transaction.execute("DELETE FROM receipts WHERE made_s < ?1", [clock_s - KEPT_DAYS * DAY_S])?;
     Ok(())
 }
 

@@ -31,9 +31,20 @@ impl RisingIds {
     /// The next one.
     #[must_use]
     pub fn next(&self) -> Ulid {
+        self.next_with(|| ()).0
+    }
+
+    /// Makes later ids rise above this one.
+    pub fn rise_above(&self, id: Ulid) {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        *last = id.max(*last);
+    }
+
+    /// The next one, with a value that is taken at its turn: no other id is given out in between.
+    pub fn next_with<R>(&self, value: impl FnOnce() -> R) -> (Ulid, R) {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let fresh = Ulid::from_parts(crate::system::clock::milliseconds(), Ulid::generate().random());
         *last = if fresh > *last { fresh } else { last.increment().unwrap_or(fresh) };
-        *last
+        (*last, value())
     }
 }

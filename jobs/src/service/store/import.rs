@@ -142,10 +142,10 @@ impl Store {
             return Ok(false);
         }
         let directory = attempt_directory(&self.job_directory(&row.job), row.attempt);
-        match std::fs::remove_file(directory.join(&row.path)) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
-            _ => Ok(true),
+        if let Err(error) = std::fs::remove_file(directory.join(&row.path)) {
+            tracing::warn!(job = row.job, checkpoint = row.id, %error, "the file of a deleted checkpoint is left");
         }
+        Ok(true)
     }
 
     /// Takes checkpoints beyond the newest `keep` out of the store; the caller removes their files.
@@ -237,6 +237,14 @@ impl Store {
                     transaction.execute("UPDATE jobs SET health = ?2 WHERE id = ?1", params![job, doubtful])?;
                 }
                 of.append_event(transaction, "finding", &serde_json::to_value(finding)?)?;
+            }
+            Record::Phase { phase } => {
+                let Some(row) = rows::job(transaction, job)? else { return Ok(()) };
+                let progress = Progress { phase: phase.clone(), ..row.progress };
+                transaction.execute(
+                    "UPDATE jobs SET progress = ?2, progress_count = progress_count + 1 WHERE id = ?1",
+                    params![job, serde_json::to_string(&progress)?],
+                )?;
             }
             Record::Progress(_) | Record::Checkpoint(_) | Record::Verdict(_) => {}
         }

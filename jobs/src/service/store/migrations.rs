@@ -177,7 +177,43 @@ const MIGRATIONS: &[&str] = &[
     ALTER TABLE jobs ADD COLUMN health TEXT;
     CREATE INDEX jobs_by_health ON jobs (health, id) WHERE health = 'doubtful';
 ",
+    // A clock that does not depend on the time of day; folders that are being deleted; owners; jobs that wait for others.
+    "
+    CREATE TABLE service_clock (
+        id INTEGER PRIMARY KEY CHECK (id = 1),
+        seconds REAL NOT NULL,
+        wall_ms INTEGER NOT NULL
+    ) STRICT;
+    INSERT INTO service_clock (id, seconds, wall_ms)
+        VALUES (1, (SELECT COALESCE(MAX(rank + priority * 600.0), 0.0) FROM jobs), unixepoch() * 1000);
+    ALTER TABLE jobs ADD COLUMN ended_s REAL;
+    UPDATE jobs SET ended_s = (SELECT seconds FROM service_clock)
+        WHERE state IN ('succeeded', 'failed', 'canceled');
+    CREATE INDEX jobs_by_end ON jobs (ended_s) WHERE ended_s IS NOT NULL;
+    ALTER TABLE studies ADD COLUMN made_s REAL NOT NULL DEFAULT 0;
+    UPDATE studies SET made_s = (SELECT seconds FROM service_clock);
+    ALTER TABLE receipts ADD COLUMN made_s REAL NOT NULL DEFAULT 0;
+    UPDATE receipts SET made_s = (SELECT seconds FROM service_clock);
+    CREATE TABLE deletions (folder TEXT PRIMARY KEY) STRICT, WITHOUT ROWID;
+    ALTER TABLE jobs ADD COLUMN owner TEXT;
+    ALTER TABLE studies ADD COLUMN owner TEXT;
+    ALTER TABLE uploads ADD COLUMN owner TEXT;
+    CREATE INDEX jobs_by_owner ON jobs (owner, id) WHERE owner IS NOT NULL;
+    ALTER TABLE jobs ADD COLUMN predecessors TEXT NOT NULL DEFAULT '[]';
+    CREATE TABLE dependencies (
+        job TEXT NOT NULL,
+        predecessor TEXT NOT NULL,
+        PRIMARY KEY (job, predecessor)
+    ) STRICT, WITHOUT ROWID;
+    CREATE INDEX dependencies_by_predecessor ON dependencies (predecessor);
+",
 ];
+
+/// Number of schema changes that this program knows.
+#[must_use]
+pub fn known() -> i64 {
+    MIGRATIONS.len() as i64
+}
 
 /// Makes the changes that are missing, each in a transaction of its own.
 ///
@@ -185,7 +221,7 @@ const MIGRATIONS: &[&str] = &[
 /// [`StoreError`]; a store of a later version is refused.
 pub fn apply(connection: &mut Connection) -> Result<(), StoreError> {
     let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-    let known = MIGRATIONS.len() as i64;
+    let known = known();
     if found > known {
         return Err(StoreError::Newer { found, known });
     }

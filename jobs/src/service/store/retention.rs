@@ -1,4 +1,4 @@
-//! How long jobs, studies and receipts are kept.
+//! How long jobs, studies and receipts are kept, by the clock of the data directory: the time of day may jump.
 
 use super::{Store, StoreError, idempotency};
 use rusqlite::params;
@@ -10,17 +10,16 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn expire(&self, days: Option<u32>) -> Result<usize, StoreError> {
-        let day = 86_400;
-        self.write(|transaction| -> Result<(), StoreError> { idempotency::expire(transaction) })?;
+        let now_s = self.clock.seconds();
+        self.write(|transaction| idempotency::expire(transaction, now_s))?;
         let Some(days) = days else { return Ok(0) };
-        let before = crate::system::clock::from_now(-i64::from(days) * day);
+        let before_s = now_s - f64::from(days) * idempotency::DAY_S;
         let old: Vec<String> = {
             let connection = self.read();
             // What a restart that has not ended began with was linked; nothing else holds on to a job.
-            let mut statement = connection.prepare_cached(
-                "SELECT id FROM jobs WHERE state IN ('succeeded', 'failed', 'canceled') AND finished_at < ?1 LIMIT 20",
-            )?;
-            let rows = statement.query_map([&before], |row| row.get(0))?;
+            let mut statement =
+                connection.prepare_cached("SELECT id FROM jobs WHERE ended_s IS NOT NULL AND ended_s < ?1 LIMIT 20")?;
+            let rows = statement.query_map([before_s], |row| row.get(0))?;
             rows.collect::<Result<_, _>>()?
         };
         for id in &old {
@@ -32,10 +31,10 @@ impl Store {
             for table in ["study_events WHERE study", "studies WHERE id"] {
                 transaction.execute(
                     &format!(
-                        "DELETE FROM {table} IN (SELECT id FROM studies s WHERE created_at < ?1
+                        "DELETE FROM {table} IN (SELECT id FROM studies s WHERE made_s < ?1
                              AND NOT EXISTS (SELECT 1 FROM jobs WHERE study = s.id))"
                     ),
-                    params![before],
+                    params![before_s],
                 )?;
             }
             Ok(())

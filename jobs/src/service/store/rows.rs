@@ -86,6 +86,10 @@ pub struct JobRow {
     pub study_index: Option<u64>,
     /// Job that it repeats.
     pub retry_of: Option<String>,
+    /// Name of the token that made it; None without tokens.
+    pub owner: Option<String>,
+    /// Jobs that it starts after.
+    pub predecessors: Vec<String>,
     /// Errors and cost, once it has succeeded.
     pub results: Option<Results>,
 }
@@ -214,6 +218,8 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         study: row.get("study")?,
         study_index: row.get::<_, Option<i64>>("study_index")?.map(|index| index as u64),
         retry_of: row.get("retry_of")?,
+        owner: row.get("owner")?,
+        predecessors: json(row, "predecessors")?,
         results: json(row, "results")?,
     })
 }

@@ -1,5 +1,6 @@
 //! Counts of jobs and uploads by state, and the size of the store.
 
+use super::submission::AGING_S;
 use super::{FILE_NAME, Store, StoreError};
 use crate::spec::states::State;
 use std::collections::BTreeMap;
@@ -42,8 +43,8 @@ impl Store {
             }
         }
         statistics.oldest_queued_s = connection.query_row(
-            "SELECT COALESCE(?1 - MIN(unixepoch(created_at)), 0) FROM jobs WHERE state = 'queued'",
-            [crate::system::clock::milliseconds() as f64 * 1e-3],
+            "SELECT COALESCE(MAX(0.0, ?1 - MIN(rank + priority * ?2)), 0.0) FROM jobs WHERE state = 'queued'",
+            [self.clock.seconds(), AGING_S],
             |row| row.get(0),
         )?;
         statistics.quarantined =

@@ -1,9 +1,9 @@
 //! Studies: sweeps of jobs as one object. Its state is that of its jobs.
 
 use super::idempotency::{IdempotencyKey, Made, Receipt};
-use super::submission::{NewJob, insert};
+use super::submission::{NewJob, Place, insert};
 use super::transitions::apply;
-use super::{Change, ChangeError, Store, StoreError, remove_directory, rows};
+use super::{Change, ChangeError, Store, StoreError, deletion, remove_directory, rows};
 use crate::spec::forecast::ForecastRecord;
 use crate::spec::health::HealthStatus;
 use crate::spec::records::{Progress, Usage};
@@ -41,6 +41,8 @@ pub struct StudyRow {
     pub forecast: StudyForecast,
     /// Time at which it was made.
     pub created_at: String,
+    /// Name of the token that made it; None without tokens.
+    pub owner: Option<String>,
     /// Points by the state of their latest job.
     pub counts: BTreeMap<State, u64>,
 }
@@ -66,12 +68,14 @@ pub struct NewStudy {
     pub forecast: StudyForecast,
     /// Jobs, one for each point.
     pub jobs: Vec<NewJob>,
+    /// Name of the token that makes it; None without tokens.
+    pub owner: Option<String>,
 }
 
 impl From<Study<NewJob>> for NewStudy {
     fn from(study: Study<NewJob>) -> Self {
         let Study { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, .. } = study;
-        Self { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs }
+        Self { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, owner: None }
     }
 }
 
@@ -117,18 +121,21 @@ impl Store {
         receipt: impl FnOnce(&StudyRow) -> Receipt,
     ) -> Result<Made, StoreError> {
         let id = format!("std_{}", self.next_id());
-        let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs } = study;
+        let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, owner } = study;
         let mut prepared = Vec::with_capacity(jobs.len());
         for (index, mut job) in jobs.into_iter().enumerate() {
-            let job_id = format!("job_{}", self.next_id());
+            let (number, clock_s) = self.next_submission();
+            let job_id = format!("job_{number}");
             let start = self.prepare_start(&job_id, &job)?;
             job.study = Some((id.clone(), index as u64));
-            prepared.push((job_id, job, start));
+            job.owner.clone_from(&owner);
+            prepared.push((job_id, clock_s, job, start));
         }
         let made = self.make_once(key, |transaction| {
             transaction.execute(
-                "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+                "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at,
+                     made_s, owner)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
                 params![
                     id,
                     name,
@@ -141,10 +148,12 @@ impl Store {
                     on_failure,
                     serde_json::to_string(&forecast)?,
                     crate::system::clock::now(),
+                    self.clock.seconds(),
+                    owner,
                 ],
             )?;
-            for (job_id, job, start) in &prepared {
-                insert(transaction, job_id, job, start.as_deref())?;
+            for (job_id, clock_s, job, start) in &prepared {
+                insert(transaction, &Place { id: job_id, clock_s: *clock_s }, job, start.as_deref())?;
             }
             Ok(receipt(&study_of(transaction, &id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
         });
@@ -169,19 +178,20 @@ impl Store {
     ) -> Result<Made, StoreError> {
         let mut prepared = Vec::with_capacity(jobs.len());
         for job in jobs {
-            let id = format!("job_{}", self.next_id());
+            let (number, clock_s) = self.next_submission();
+            let id = format!("job_{number}");
             let start = self.prepare_start(&id, job)?;
-            prepared.push((id, job, start));
+            prepared.push((id, clock_s, job, start));
         }
         let made = self.make_once(key, |transaction| {
             transaction.execute("UPDATE studies SET stopping = 0 WHERE id = ?1", [study])?;
-            for (id, job, start) in &prepared {
+            for (id, clock_s, job, start) in &prepared {
                 // Another request may have repeated it in the meantime.
                 let is_latest: bool = transaction
                     .prepare_cached("SELECT EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND superseded = 0)")?
                     .query_row([&job.retry_of], |row| row.get(0))?;
                 if is_latest {
-                    insert(transaction, id, job, start.as_deref())?;
+                    insert(transaction, &Place { id, clock_s: *clock_s }, job, start.as_deref())?;
                 }
             }
             Ok(receipt(&study_of(transaction, study)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
@@ -321,6 +331,7 @@ impl Store {
             }
             for (job, _) in &jobs {
                 super::delete_rows(transaction, job)?;
+                deletion::intend(transaction, &super::job_folder(job))?;
             }
             transaction.execute("DELETE FROM study_events WHERE study = ?1", [id])?;
             transaction.execute("DELETE FROM studies WHERE id = ?1", [id])?;
@@ -328,7 +339,7 @@ impl Store {
         })?;
         let Some(jobs) = deleted else { return Ok(false) };
         for job in jobs {
-            remove_directory(&self.job_directory(&job))?;
+            self.delete_folder(&super::job_folder(&job))?;
         }
         Ok(true)
     }
@@ -351,6 +362,7 @@ fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, Store
                 is_stopping: row.get::<_, i64>("stopping")? != 0,
                 forecast: rows::json(row, "estimate")?,
                 created_at: row.get("created_at")?,
+                owner: row.get("owner")?,
                 counts: BTreeMap::new(),
             })
         })

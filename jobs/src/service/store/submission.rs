@@ -3,9 +3,11 @@
 use super::idempotency::{self, IdempotencyKey, Made, Receipt};
 use super::{JobRow, Store, StoreError, events, remove_directory, rows};
 use crate::spec::attempt_files::attempt_directory;
-use crate::spec::body::{JobBody, Origin};
+use crate::spec::attempt_spec::{AttemptSpec, Submission};
+use crate::spec::body::{JobBody, Origin, ResolvedBody};
 use crate::spec::states::State;
 use rusqlite::{Transaction, params};
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 /// A job to be made, as it will stand in the store.
@@ -29,6 +31,8 @@ pub struct NewJob {
     pub study: Option<(String, u64)>,
     /// The job that it repeats.
     pub retry_of: Option<String>,
+    /// Name of the token that makes it; None without tokens.
+    pub owner: Option<String>,
 }
 
 impl NewJob {
@@ -50,8 +54,43 @@ impl NewJob {
             uploads: body.uploads.clone(),
             study: None,
             retry_of: None,
+            owner: None,
         }
     }
+
+    /// The job of an attempt whose database was lost.
+    ///
+    /// # Errors
+    /// When the resolved body cannot be read.
+    pub(super) fn from_attempt(spec: &AttemptSpec) -> Result<Self, StoreError> {
+        let body = ResolvedBody::deserialize(&spec.body)?;
+        let Submission { spec: sent, forecast, warnings, owner, study, retry_of, .. } =
+            spec.submission.clone().unwrap_or_default();
+        let sent = if sent.is_null() { &spec.body } else { &sent };
+        Ok(Self {
+            name: body.name,
+            labels: json!(body.labels).to_string(),
+            kind: SceneWord::deserialize(&body.scene)?.kind,
+            spec: sent.to_string(),
+            resolved: spec.body.to_string(),
+            estimate: json!(forecast).to_string(),
+            warnings: json!(warnings).to_string(),
+            memory_bytes: forecast.memory_bytes,
+            disk_bytes: forecast.disk_bytes,
+            priority: body.priority,
+            origin: None,
+            uploads: spec.inputs.keys().cloned().collect(),
+            study,
+            retry_of,
+            owner,
+        })
+    }
+}
+
+/// The kind of a scene.
+#[derive(Deserialize)]
+struct SceneWord {
+    kind: String,
 }
 
 /// Seconds of waiting that weigh as much as one point of priority: nothing waits for ever behind what is more urgent.
@@ -72,12 +111,13 @@ impl Store {
         key: Option<IdempotencyKey>,
         receipt: impl FnOnce(JobRow) -> Receipt + Send + 'static,
     ) -> Result<Made, StoreError> {
-        let id = format!("job_{}", self.next_id());
+        let (number, clock_s) = self.next_submission();
+        let id = format!("job_{number}");
         let start = self.prepare_start(&id, &job)?;
         let (sha256, new) = (start.clone(), id.clone());
         let made = self.write_in_group(Box::new(move |transaction| {
             idempotency::make_once(transaction, key.as_ref(), |transaction| {
-                insert(transaction, &new, &job, sha256.as_deref())?;
+                insert(transaction, &Place { id: &new, clock_s }, &job, sha256.as_deref())?;
                 let row = rows::job(transaction, &new)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?;
                 Ok(receipt(row))
             })
@@ -116,20 +156,29 @@ impl Store {
     }
 }
 
+/// Place of a new job among all jobs.
+pub(super) struct Place<'a> {
+    /// Id of the job.
+    pub(super) id: &'a str,
+    /// Reading of the clock of the data directory at its submission, in seconds.
+    pub(super) clock_s: f64,
+}
+
 /// Writes the row, the first event and the inputs of a job.
 pub(super) fn insert(
     transaction: &Transaction,
-    id: &str,
+    place: &Place,
     job: &NewJob,
     start_sha256: Option<&str>,
 ) -> Result<(), StoreError> {
-    let now_s = crate::system::clock::milliseconds() as f64 * 1e-3;
+    let id = place.id;
     let (study, index) = job.study.as_ref().map_or((None, None), |(study, index)| (Some(study), Some(*index as i64)));
     transaction
         .prepare_cached(
             "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
-                 restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings)
-             VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18)",
+                 restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings,
+                 owner)
+             VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)",
         )?
         .execute(params![
             id,
@@ -146,10 +195,11 @@ pub(super) fn insert(
             study,
             index,
             job.retry_of,
-            now_s - job.priority as f64 * AGING_S,
+            place.clock_s - job.priority as f64 * AGING_S,
             i64::try_from(job.memory_bytes).unwrap_or(i64::MAX),
             i64::try_from(job.disk_bytes).unwrap_or(i64::MAX),
             job.warnings,
+            job.owner,
         ])?;
     for upload in &job.uploads {
         let known = transaction

@@ -3,6 +3,7 @@
 use super::finish_attempt::LossCause;
 use super::import::ProgressPace;
 use super::{Change, ChangeError, JobFilter, JobRow, Store};
+use crate::service::found_folders;
 use crate::spec::attempt_files::attempt_directory;
 use crate::spec::body::{self, Allowance, NoSources};
 use crate::spec::records::{CheckpointRecord, FileRecord, Progress, Record, RecordFile, RecordSink, Verdict};
@@ -171,20 +172,20 @@ fn deletion_takes_terminal_jobs_only() {
 }
 
 #[test]
-fn entries_that_the_database_does_not_list_are_named() {
+fn a_deletion_that_was_cut_short_is_done_later_and_is_no_loss() {
     let (directory, store) = store();
-    let known = submit(&store, &json!({}));
-    std::fs::create_dir_all(store.job_directory(&known.id)).unwrap();
-    let foreign =
-        ["jobs/2025-thesis", "jobs/job_of_a_newer_database", "uploads/photos"].map(|p| directory.path().join(p));
-    for folder in &foreign {
-        std::fs::create_dir_all(folder).unwrap();
-    }
-    std::fs::write(directory.path().join("jobs/.DS_Store"), "x").unwrap();
-    let mut expected = foreign.to_vec();
-    expected.push(directory.path().join("jobs/.DS_Store"));
-    expected.sort();
-    assert_eq!(store.unknown_entries().unwrap(), expected);
+    let job = submit(&store, &json!({}));
+    store.change(&job.id, Trigger::Cancel, &Change::default()).unwrap();
+    let folder = store.job_directory(&job.id);
+    // A file where the folder should be cannot be deleted as a folder.
+    std::fs::write(&folder, "").unwrap();
+    assert!(store.delete(&job.id).unwrap());
+    assert_eq!(store.intended_deletions().unwrap(), [format!("jobs/{}", job.id)]);
+    std::fs::remove_file(&folder).unwrap();
+    std::fs::create_dir(&folder).unwrap();
+    assert!(found_folders::compare(directory.path(), Some(&store)).unwrap().orphans.is_empty());
+    store.delete_intended().unwrap();
+    assert!(!folder.exists() && store.intended_deletions().unwrap().is_empty());
 }
 
 #[test]

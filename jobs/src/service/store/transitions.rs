@@ -35,6 +35,8 @@ pub struct Change {
     pub reason: Option<Reason>,
     /// Numbers and places of a failure, in a sentence.
     pub message: Option<String>,
+    /// What a user can do, where it is not the hint of the reason.
+    pub hint: Option<String>,
     /// If given, the change is made only while the job is at this attempt.
     pub epoch: Option<u64>,
 }
@@ -190,22 +192,32 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     let now = crate::system::clock::now();
     let is_claim = trigger == Trigger::Claim;
     // A plain state has no reason; a pause or cancellation keeps the one that it was asked with.
-    let plain = matches!(to, State::Running | State::Succeeded);
+    let plain = matches!(to, State::Running | State::Succeeded) || trigger == Trigger::Miss && to == State::Queued;
     let reason = if plain { None } else { change.reason.or(job.reason) };
     let reason = if trigger == Trigger::Resume { None } else { reason };
     let message = if plain || trigger == Trigger::Resume { None } else { change.message.clone().or(job.message) };
-    let hint = reason.map(Reason::hint);
+    let has_checkpoint: bool = transaction
+        .prepare_cached(
+            "SELECT EXISTS (SELECT 1 FROM checkpoints WHERE job = ?1)
+                 OR EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND restarted_from IS NOT NULL)",
+        )?
+        .query_row([id], |row| row.get(0))?;
+    let hint_of = if has_checkpoint { Reason::hint } else { Reason::hint_without_checkpoint };
+    let hint = change.hint.clone().or_else(|| reason.map(|reason| hint_of(reason).to_owned()));
+    // An attempt whose worker could not be started does not count.
+    let attempt = if is_claim { job.attempt + 1 } else { job.attempt - u64::from(trigger == Trigger::Miss) };
     // Three deaths in a row count; a person's resume begins a new row.
     let deaths = if trigger == Trigger::Resume { 0 } else { job.deaths };
     let changed = transaction
         .prepare_cached(
             "UPDATE jobs SET rev = rev + 1, state = ?3, reason = ?4, hint = ?5, message = ?6,
-                 attempt = attempt + ?7, records_offset = CASE WHEN ?7 = 1 THEN 0 ELSE records_offset END,
+                 attempt = ?12, records_offset = CASE WHEN ?7 = 1 THEN 0 ELSE records_offset END,
                  verdict = CASE WHEN ?7 = 1 THEN NULL ELSE verdict END,
                  kill_reason = CASE WHEN ?7 = 1 THEN NULL ELSE kill_reason END,
                  worker_handle = CASE WHEN ?7 = 1 THEN NULL ELSE worker_handle END,
                  started_at = CASE WHEN ?7 = 1 THEN COALESCE(started_at, ?8) ELSE started_at END,
-                 finished_at = CASE WHEN ?9 THEN ?8 ELSE NULL END, deaths = ?10, leg_wall_s = ?11
+                 finished_at = CASE WHEN ?9 THEN ?8 ELSE NULL END,
+                 ended_s = CASE WHEN ?9 THEN (SELECT seconds FROM service_clock) ELSE NULL END, deaths = ?10, leg_wall_s = ?11
              WHERE id = ?1 AND rev = ?2",
         )?
         .execute(params![
@@ -220,13 +232,13 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
             to.is_terminal(),
             deaths,
             if trigger == Trigger::Resume { job.wall_s } else { job.leg_wall_s },
+            attempt as i64,
         ])?;
     if changed != 1 {
         return Err(ChangeError::Stale);
     }
     let reason_word = reason.map_or("", Reason::word);
     metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => reason_word).increment(1);
-    let attempt = job.attempt + u64::from(is_claim);
     let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
     events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
     if to == State::Failed

@@ -1,17 +1,54 @@
 //! Uploads: files from outside, quarantined until a process of its own has inspected them.
 
 use super::idempotency::{IdempotencyKey, Made, Receipt};
-use super::{Store, StoreError, remove_directory, rows};
+use super::{Store, StoreError, deletion, remove_directory, rows};
 use crate::spec::body::{Origin, RestartSource, resolved_scene};
 use crate::spec::uploads::{Contents, Purpose};
+use crate::system::artifacts;
 use rusqlite::{Connection, OptionalExtension, Row, params};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Name of the file as it was sent, in the directory of the upload.
 pub const CONTENT: &str = "content";
 /// Name of the points that were found in it, in our own plain format.
 pub const CLOUD: &str = "cloud.bin";
+
+/// Name of the record of an upload that was inspected.
+const RECORD: &str = "upload.json";
+
+/// What the database has of an inspected upload, as a file beside it: by it the upload comes back into a database that was
+/// lost.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UploadRecord {
+    /// Id of the upload.
+    pub id: String,
+    /// What it is to be used as.
+    pub purpose: Purpose,
+    /// Name that the client gave.
+    pub name: Option<String>,
+    /// Size in bytes.
+    pub size_bytes: u64,
+    /// SHA-256 of the file.
+    pub sha256: String,
+    /// Time at which it came in.
+    pub created_at: String,
+    /// Name of the token that made it.
+    pub owner: Option<String>,
+    /// Why it was rejected.
+    pub reason: Option<String>,
+    /// What was found in it; None where it was rejected.
+    pub found: Option<Contents>,
+}
+
+impl UploadRecord {
+    /// The record in the folder of an upload; None where there is none that can be read.
+    #[must_use]
+    pub fn read(folder: &Path) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(folder.join(RECORD)).ok()?).ok()
+    }
+}
 
 /// An upload as the store has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +73,8 @@ pub struct UploadRow {
     pub created_at: String,
     /// Time at which the inspection ended.
     pub checked_at: Option<String>,
+    /// Name of the token that made it; None without tokens.
+    pub owner: Option<String>,
 }
 
 /// A file that has come in whole.
@@ -51,13 +90,15 @@ pub struct NewUpload {
     pub size_bytes: u64,
     /// SHA-256 of the file.
     pub sha256: String,
+    /// Name of the token that makes it; None without tokens.
+    pub owner: Option<String>,
 }
 
 impl Store {
     /// The directory of an upload.
     #[must_use]
     pub fn upload_directory(&self, id: &str) -> PathBuf {
-        self.directory().join("uploads").join(id)
+        self.directory().join(super::UPLOADS).join(id)
     }
 
     /// An id and a directory for a file that is about to come in.
@@ -91,15 +132,16 @@ impl Store {
     ) -> Result<Made, StoreError> {
         let made = self.make_once(key, |transaction| {
             transaction.execute(
-                "INSERT INTO uploads (id, purpose, state, name, size_bytes, sha256, created_at)
-                 VALUES (?1, ?2, 'quarantined', ?3, ?4, ?5, ?6)",
+                "INSERT INTO uploads (id, purpose, state, name, size_bytes, sha256, created_at, owner)
+                 VALUES (?1, ?2, 'quarantined', ?3, ?4, ?5, ?6, ?7)",
                 params![
                     upload.id,
                     upload.purpose.word(),
                     upload.name,
                     upload.size_bytes as i64,
                     upload.sha256,
-                    crate::system::clock::now()
+                    crate::system::clock::now(),
+                    upload.owner,
                 ],
             )?;
             Ok(receipt(&upload_of_id(transaction, &upload.id)?.ok_or(rusqlite::Error::QueryReturnedNoRows)?))
@@ -119,13 +161,36 @@ impl Store {
             Ok(found) => ("ready", None, Some(serde_json::to_string(found)?)),
             Err(reason) => ("rejected", Some(reason), None),
         };
+        let checked_at = crate::system::clock::now();
         self.write(|transaction| -> Result<(), StoreError> {
             transaction.execute(
                 "UPDATE uploads SET state = ?2, reason = ?3, found = ?4, checked_at = ?5 WHERE id = ?1",
-                params![id, state, reason, found, crate::system::clock::now()],
+                params![id, state, reason, found, checked_at],
             )?;
             Ok(())
-        })
+        })?;
+        self.upload(id)?.map_or(Ok(()), |row| self.write_record(row))
+    }
+
+    /// Writes the record of an inspected upload into its folder.
+    fn write_record(&self, row: UploadRow) -> Result<(), StoreError> {
+        let UploadRow { id, purpose, name, size_bytes, sha256, created_at, owner, reason, found, .. } = row;
+        let path = self.upload_directory(&id).join(RECORD);
+        let record = UploadRecord { id, purpose, name, size_bytes, sha256, created_at, owner, reason, found };
+        Ok(artifacts::write(&path, &serde_json::to_vec_pretty(&record)?)?)
+    }
+
+    /// Writes the records of inspected uploads that have none, such as those of an earlier version.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn write_missing_records(&self) -> Result<(), StoreError> {
+        let rows = self.uploads(None, u64::MAX >> 1)?;
+        let is_missing = |row: &UploadRow| {
+            let folder = self.upload_directory(&row.id);
+            row.checked_at.is_some() && folder.is_dir() && !folder.join(RECORD).is_file()
+        };
+        rows.into_iter().filter(is_missing).try_for_each(|row| self.write_record(row))
     }
 
     /// An upload by id.
@@ -177,6 +242,7 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn delete_upload(&self, id: &str) -> Result<bool, StoreError> {
+        let folder = format!("{}/{id}", super::UPLOADS);
         let deleted = self.write(|transaction| -> Result<bool, StoreError> {
             let users: i64 = transaction.query_row(
                 "SELECT (SELECT COUNT(*) FROM inputs i JOIN jobs j ON j.id = i.job WHERE i.upload = ?1
@@ -189,10 +255,11 @@ impl Store {
                 return Ok(false);
             }
             transaction.execute("DELETE FROM uploads WHERE id = ?1", [id])?;
+            deletion::intend(transaction, &folder)?;
             Ok(true)
         })?;
         if deleted {
-            remove_directory(&self.upload_directory(id))?;
+            self.delete_folder(&folder)?;
         }
         Ok(deleted)
     }
@@ -230,5 +297,6 @@ fn upload_of(row: &Row) -> rusqlite::Result<UploadRow> {
         sha256: row.get("sha256")?,
         created_at: row.get("created_at")?,
         checked_at: row.get("checked_at")?,
+        owner: row.get("owner")?,
     })
 }

@@ -46,6 +46,7 @@ pub(super) fn remove(store: &Store, job: &str, last_attempt: u64) -> Result<(), 
 fn is_numbered(name: &str, ending: &str) -> bool {
     let whole = name.strip_suffix(".unfinished").unwrap_or(name);
     let number = whole.strip_suffix(ending).and_then(|rest| rest.strip_suffix('.'));
+    let number = number.map(|rest| rest.strip_suffix(attempt_files::UNMEASURED).unwrap_or(rest));
     number.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
 }
 
@@ -55,7 +56,7 @@ mod tests {
 
     #[test]
     fn only_names_that_workers_give_are_ours() {
-        for name in ["000012.vtkhdf", "000012.vtkhdf.unfinished"] {
+        for name in ["000012.vtkhdf", "000012.vtkhdf.unfinished", "000012-unmeasured.vtkhdf"] {
             assert!(is_numbered(name, "vtkhdf"));
         }
         for name in ["notes.txt", ".vtkhdf", "best.vtkhdf", "000012.h5", "000012.vtkhdf.bak", "12vtkhdf"] {

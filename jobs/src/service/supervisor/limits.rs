@@ -29,9 +29,9 @@ impl Supervisor {
         let settings = self.settings;
         match state {
             Some(State::Canceling) => {
-                insist(running, Request::Cancel, settings.cancel_grace);
+                insist(running, Request::Cancel, settings.cancel_grace, self.clock.now());
             }
-            Some(State::Pausing) => insist(running, Request::Pause, settings.pause_grace),
+            Some(State::Pausing) => insist(running, Request::Pause, settings.pause_grace, self.clock.now()),
             // The row is gone: the records of this worker would not be believed.
             None => running.worker.kill(),
             Some(_) => {}
@@ -47,7 +47,9 @@ impl Supervisor {
     }
 
     fn watch_heartbeat(&self, running: &mut Running) -> Result<(), StoreError> {
-        if running.worker.time_since_heartbeat() >= self.settings.lease {
+        let now = self.clock.now();
+        running.heard = running.heard.max(now.saturating_sub(running.worker.time_since_heartbeat()));
+        if now - running.heard >= self.settings.lease {
             self.kill(running, Reason::WorkerStalled)?;
         }
         Ok(())
@@ -95,11 +97,11 @@ impl Supervisor {
     }
 
     fn pause(&self, running: &mut Running, reason: Reason) -> Result<(), StoreError> {
-        let change = Change { reason: Some(reason), message: None, epoch: Some(running.epoch) };
+        let change = Change { reason: Some(reason), epoch: Some(running.epoch), ..Change::default() };
         self.change(&running.job, Trigger::Pause, &change)?;
         if running.pause_sent.is_none() {
             running.worker.send(Request::Pause);
-            running.pause_sent = Some(Instant::now());
+            running.pause_sent = Some(self.clock.now());
         }
         Ok(())
     }
@@ -121,14 +123,14 @@ impl Supervisor {
 }
 
 /// Sends a request once, and kills a worker that has not followed it in time.
-fn insist(running: &mut Running, request: Request, grace: Duration) {
+fn insist(running: &mut Running, request: Request, grace: Duration, now: Duration) {
     let sent = if request == Request::Cancel { &mut running.cancel_sent } else { &mut running.pause_sent };
     match sent {
         None => {
-            *sent = Some(Instant::now());
+            *sent = Some(now);
             running.worker.send(request);
         }
-        Some(sent) if sent.elapsed() >= grace => running.worker.kill(),
+        Some(sent) if now - *sent >= grace => running.worker.kill(),
         Some(_) => {}
     }
 }

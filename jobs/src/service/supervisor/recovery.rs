@@ -10,7 +10,7 @@ use crate::spec::run_options::RunOptions;
 use crate::spec::states::Reason;
 
 impl Supervisor {
-    /// Brings every job that had a worker to a legal state, and names what the database does not know. To be done before the
+    /// Brings every job that had a worker to a legal state, and finishes what a crash cut short. To be done before the
     /// service is ready.
     ///
     /// # Errors
@@ -31,10 +31,8 @@ impl Supervisor {
             self.store.finish_attempt(&job.id, job.attempt, lost)?;
             tracing::info!(job = job.id, attempt = job.attempt, "recovered");
         }
-        for path in self.store.unknown_entries()? {
-            tracing::warn!(path = %path.display(), "not in the database; left where it is");
-        }
-        Ok(())
+        self.store.delete_intended()?;
+        self.store.write_missing_records()
     }
 
     /// Takes the worker of an earlier service over; false where there is none.

@@ -2,20 +2,16 @@
 
 use super::{Message, Running, Supervisor, limits};
 use crate::service::executor::{Needs, NotStarted, Notify, Reservation, Worker};
-use crate::service::store::finish_attempt::LossCause;
 use crate::service::store::import::ProgressPace;
 use crate::service::store::{Change, JobRow, START_CHECKPOINT, StoreError};
 use crate::spec::attempt_files::{self, attempt_directory};
-use crate::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
+use crate::spec::attempt_spec::{AttemptSpec, StartCheckpoint, Submission};
 use crate::spec::run_options::RunOptions;
 use crate::spec::states::{Reason, Trigger};
 use crate::system::{artifacts, process};
 use serde::Deserialize;
 use std::io;
-use std::time::{Duration, Instant};
-
-/// Time without starts after one that failed.
-const START_PAUSE: Duration = Duration::from_secs(1);
+use std::time::Instant;
 
 impl Supervisor {
     /// Takes and starts the next job of the queue; false when there is none that fits.
@@ -28,15 +24,32 @@ impl Supervisor {
         let fits = |memory: u64, disk: u64| disk <= disk_left && (is_alone || memory <= capacity.memory_bytes);
         let Some(job) = self.store.claim(fits)? else { return Ok(false) };
         let Err(error) = self.start(&job) else { return Ok(true) };
-        tracing::error!(job = job.id, %error, "a worker could not be started");
-        self.start_again = Instant::now() + START_PAUSE;
-        if let NotStarted::OutOfSpace(_) = error {
-            let change = Change { reason: Some(Reason::StorageEnospc), message: None, epoch: Some(job.attempt) };
-            self.change(&job.id, Trigger::Pause, &change)?;
+        match &error {
+            NotStarted::Unreadable(cause) => {
+                tracing::error!(job = job.id, cause, "a job of the store cannot be read");
+                let message = Some(format!("the stored body cannot be read: {cause}"));
+                let change = Change { reason: Some(Reason::Internal), message, ..Change::default() };
+                self.change(&job.id, Trigger::Fail, &change)?;
+            }
+            NotStarted::OutOfSpace(_) => {
+                tracing::error!(job = job.id, %error, "a worker could not be started");
+                self.change(&job.id, Trigger::Pause, &Change::because(Reason::StorageEnospc))?;
+                self.change(&job.id, Trigger::Miss, &Change::because(Reason::StorageEnospc))?;
+            }
+            NotStarted::System(cause) => self.miss(&job.id, job.attempt, &cause.to_string())?,
         }
-        let lost = LossCause { reason: Reason::StorageIo, is_death: true };
-        self.store.finish_attempt(&job.id, job.attempt, lost)?;
         Ok(false)
+    }
+
+    /// Sends a job whose worker could not be started back to the queue, which pauses for a while. Nothing has died.
+    pub(super) fn miss(&mut self, job: &str, epoch: u64, cause: &str) -> Result<(), StoreError> {
+        let pause = self.start_pause.begin();
+        tracing::error!(job, cause, pause_s = pause.as_secs(), "a worker could not be started");
+        let hint = Some(format!(
+            "a worker could not be started ({cause}); the queue tries again by itself, next time in {} s",
+            pause.as_secs()
+        ));
+        self.change(job, Trigger::Miss, &Change { hint, epoch: Some(epoch), ..Change::default() })
     }
 
     fn reservations(&self) -> Vec<Reservation> {
@@ -48,8 +61,13 @@ impl Supervisor {
     }
 
     fn start(&mut self, job: &JobRow) -> Result<(), NotStarted> {
-        let options = RunOptions::from_resolved(&job.resolved).map_err(io::Error::from)?;
+        let options =
+            RunOptions::from_resolved(&job.resolved).map_err(|error| NotStarted::Unreadable(error.to_string()))?;
         let directory = attempt_directory(&self.store.job_directory(&job.id), job.attempt);
+        // A worker of this attempt that was ended while it was being started may have written records.
+        if directory.join(attempt_files::RECORDS).exists() {
+            std::fs::remove_dir_all(&directory)?;
+        }
         std::fs::create_dir_all(&directory)?;
         let spec = self.attempt_spec(job).map_err(io::Error::other)?;
         let text = serde_json::to_vec_pretty(&spec).map_err(io::Error::from)?;
@@ -87,6 +105,7 @@ impl Supervisor {
             leg_wall_s: job.leg_wall_s,
             pause_sent: None,
             cancel_sent: None,
+            heard: self.clock.now(),
             verdict_since: None,
             reserved_bytes: job.forecast.memory_bytes,
             disk_checked: now,
@@ -122,6 +141,15 @@ impl Supervisor {
             time: job.forecast.time.clone(),
             reserve_bytes: self.settings.disk_reserve_bytes,
             usage: job.usage,
+            submission: Some(Submission {
+                spec: job.spec.clone(),
+                forecast: job.forecast.clone(),
+                warnings: job.warnings.clone(),
+                created_at: Some(job.created_at.clone()),
+                owner: job.owner.clone(),
+                study: job.study.clone().zip(job.study_index),
+                retry_of: job.retry_of.clone(),
+            }),
         })
     }
 }

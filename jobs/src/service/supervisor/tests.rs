@@ -15,6 +15,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Starts a command instead of a worker, with a fixed time since the last heartbeat.
@@ -91,11 +92,12 @@ fn submit(store: &Store) -> String {
     store.submit_row(&body).id
 }
 
-fn end_of(stand_in: StandIn, until: impl Fn(&JobRow) -> bool) -> JobRow {
+fn end_of(stand_in: impl Executor + 'static, until: impl Fn(&JobRow) -> bool) -> JobRow {
     let directory = tempfile::tempdir().unwrap();
     let store = Arc::new(Store::open(directory.path()).unwrap());
     let id = submit(&store);
-    let supervisor = Supervisor::new(Arc::clone(&store), Box::new(stand_in), Settings::with_slots(1));
+    let settings = Settings { lease: Duration::from_secs(2), ..Settings::with_slots(1) };
+    let supervisor = Supervisor::new(Arc::clone(&store), Box::new(stand_in), settings);
     let handle = supervisor.handle();
     let thread = std::thread::spawn(move || supervisor.run());
     let deadline = Instant::now() + Duration::from_secs(20);
@@ -149,4 +151,48 @@ fn a_worker_that_outlived_its_service_is_adopted_in_the_same_attempt() {
     for mut running in supervisor.running {
         running.worker.kill();
     }
+}
+
+/// Refuses the first starts as a system without descriptors does.
+struct Refusing {
+    left: AtomicU64,
+    then: StandIn,
+}
+
+impl Executor for Refusing {
+    fn start(&self, directory: &Path, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted> {
+        if self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok() {
+            return Err(io::Error::from_raw_os_error(libc::EMFILE).into());
+        }
+        self.then.start(directory, needs, notify)
+    }
+
+    fn adopt(&self, directory: &Path, handle: &str, notify: Notify) -> Adoption {
+        self.then.adopt(directory, handle, notify)
+    }
+
+    fn capacity(&self, reservations: &[Reservation]) -> Capacity {
+        self.then.capacity(reservations)
+    }
+}
+
+#[test]
+fn a_worker_that_cannot_be_started_has_not_died() {
+    let sleeping = || StandIn { command: &["sleep", "1000"], time_since_heartbeat: Duration::ZERO };
+    let is_waiting = |job: &JobRow| job.state == State::Queued && job.hint.is_some();
+    let job = end_of(Refusing { left: AtomicU64::new(u64::MAX), then: sleeping() }, is_waiting);
+    assert_eq!((job.attempt, job.deaths, job.reason), (0, 0, None));
+    let hint = job.hint.unwrap();
+    assert!(hint.contains("Too many open files") && hint.contains("tries again by itself"), "{hint}");
+    let is_running = |job: &JobRow| job.state == State::Running;
+    let job = end_of(Refusing { left: AtomicU64::new(2), then: sleeping() }, is_running);
+    assert_eq!((job.attempt, job.deaths, job.hint), (1, 0, None));
+}
+
+#[test]
+fn a_worker_without_threads_has_not_died_either() {
+    let command = &["sh", "-c", "exit 75"];
+    let stand_in = StandIn { command, time_since_heartbeat: Duration::ZERO };
+    let job = end_of(stand_in, |job| job.state == State::Queued && job.hint.is_some());
+    assert_eq!((job.attempt, job.deaths), (0, 0));
 }

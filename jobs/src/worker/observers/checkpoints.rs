@@ -4,11 +4,30 @@ use crate::formats::checkpoint::{self, CheckpointError, Counters};
 use crate::spec::attempt_files;
 use crate::spec::records::CheckpointRecord;
 use crate::system::build;
-use meniscus::simulation::{Simulation, state_of};
+use meniscus::simulation::{Section, Simulation, state_of};
+use meniscus::time::Clock;
 use serde_json::Value;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use ulid::Ulid;
+
+/// A whole state of a run, with what was written up to it.
+pub struct WholeState {
+    /// Clock of the state.
+    pub clock: Clock,
+    /// The state.
+    pub state: Section,
+    /// Output up to it.
+    pub counters: Counters,
+}
+
+impl WholeState {
+    /// The present state of a simulation.
+    #[must_use]
+    pub fn of(simulation: &dyn Simulation, counters: Counters) -> Self {
+        Self { clock: simulation.clock(), state: state_of(simulation), counters }
+    }
+}
 
 /// Writes checkpoints when they are due.
 pub struct Checkpoints {
@@ -35,6 +54,12 @@ impl Checkpoints {
         Self { directory, job, body, every, every_steps, last: Instant::now(), last_step: None }
     }
 
+    /// Whether the last one is of this step.
+    #[must_use]
+    pub fn has(&self, step: u64) -> bool {
+        self.last_step == Some(step)
+    }
+
     /// Whether to write one after this step. The initial state is not worth one.
     #[must_use]
     pub fn is_due(&self, step: u64, wanted: bool) -> bool {
@@ -47,19 +72,19 @@ impl Checkpoints {
     ///
     /// # Errors
     /// [`CheckpointError`].
-    pub fn write(
-        &mut self,
-        simulation: &dyn Simulation,
-        counters: Counters,
-    ) -> Result<CheckpointRecord, CheckpointError> {
-        let clock = simulation.clock();
+    pub fn write(&mut self, whole: WholeState) -> Result<CheckpointRecord, CheckpointError> {
+        let WholeState { clock, state, counters } = whole;
         let folder = self.directory.join(attempt_files::CHECKPOINTS);
         std::fs::create_dir_all(&folder)?;
-        let name = format!("{:012}.{}", clock.step, attempt_files::CHECKPOINT_ENDING);
+        let is_before_output = counters.is_before_output;
+        let mark = if is_before_output { attempt_files::UNMEASURED } else { "" };
+        let name = format!("{:012}{mark}.{}", clock.step, attempt_files::CHECKPOINT_ENDING);
         let meta = checkpoint::meta(&self.job, &self.body, clock.step, clock.time, counters);
-        let (sha256, size_bytes) = checkpoint::write_verified(&folder.join(&name), meta, &state_of(simulation))?;
+        let (sha256, size_bytes) = checkpoint::write_verified(&folder.join(&name), meta, &state)?;
         self.last = Instant::now();
-        self.last_step = Some(clock.step);
+        if !is_before_output {
+            self.last_step = Some(clock.step);
+        }
         Ok(CheckpointRecord {
             id: format!("ckpt_{}", Ulid::generate()),
             path: format!("{}/{name}", attempt_files::CHECKPOINTS),

@@ -4,11 +4,17 @@ use crate::spec::requests::Request;
 use meniscus::parallel::Interrupt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Time that a run has to come to the end of its step after a request to pause. Then the step, or the measurement, is
+/// dropped.
+const PATIENCE: Duration = Duration::from_millis(1200);
 
 /// Flags shared between the thread that receives requests and the run.
 #[derive(Debug, Clone, Default)]
 pub struct Control {
     interrupt: Interrupt,
+    canceled: Arc<AtomicBool>,
     pausing: Arc<AtomicBool>,
     checkpoint: Arc<AtomicBool>,
 }
@@ -17,10 +23,34 @@ impl Control {
     /// Takes a request.
     pub fn receive(&self, request: Request) {
         match request {
-            Request::Cancel => self.interrupt.raise(),
-            Request::Pause => self.pausing.store(true, Ordering::Relaxed),
+            Request::Cancel => {
+                self.canceled.store(true, Ordering::Relaxed);
+                self.interrupt.raise();
+            }
+            Request::Pause => {
+                self.pausing.store(true, Ordering::Relaxed);
+                self.lose_patience_later();
+            }
             Request::Checkpoint => self.checkpoint.store(true, Ordering::Relaxed),
         }
+    }
+
+    /// Raises the interrupt after a while.
+    fn lose_patience_later(&self) {
+        let interrupt = self.interrupt.clone();
+        let started = std::thread::Builder::new().name("patience".to_owned()).spawn(move || {
+            std::thread::sleep(PATIENCE);
+            interrupt.raise();
+        });
+        if started.is_err() {
+            self.interrupt.raise();
+        }
+    }
+
+    /// Whether the run is to drop everything.
+    #[must_use]
+    pub fn is_canceled(&self) -> bool {
+        self.canceled.load(Ordering::Relaxed)
     }
 
     /// The flag that solvers poll: the step in progress is dropped.

@@ -10,6 +10,16 @@ use meniscus::simulation::{OutputPlan, Selection, Simulation};
 use meniscus::time::FixedStep;
 use std::path::PathBuf;
 
+/// What became of the frame of a step.
+pub enum FrameOutcome {
+    /// None is due.
+    NotDue,
+    /// It stands in place.
+    Written(FileRecord),
+    /// It was dropped on request.
+    Dropped,
+}
+
 /// Writes frames when they are due.
 pub struct Frames {
     directory: PathBuf,
@@ -48,17 +58,20 @@ impl Frames {
         self.before
     }
 
-    /// Writes the frame of this step, if it is due.
+    /// Writes the frame of this step, if it is due. One that `is_dropped` tells to drop may be computed half-way.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn observe(&mut self, simulation: &dyn Simulation) -> Result<Option<FileRecord>, ObserverError> {
+    pub fn observe(
+        &mut self,
+        simulation: &dyn Simulation,
+        is_dropped: impl Fn() -> bool,
+    ) -> Result<FrameOutcome, ObserverError> {
         let clock = simulation.clock();
         let is_due = self.plan.is_frame_due(&fixed_step(simulation), clock.step) || simulation.is_finished();
         if !self.is_first && !is_due {
-            return Ok(None);
+            return Ok(FrameOutcome::NotDue);
         }
-        self.is_first = false;
         let name = {
             let number = self.before + self.written.len() as u64;
             format!("{}/{number:06}.{}", attempt_files::FRAMES, attempt_files::FRAME_ENDING)
@@ -66,6 +79,10 @@ impl Frames {
         let path = self.directory.join(&name);
         std::fs::create_dir_all(self.directory.join(attempt_files::FRAMES))?;
         let fields = simulation.fields(Selection::Named(&self.chosen));
+        if is_dropped() {
+            return Ok(FrameOutcome::Dropped);
+        }
+        self.is_first = false;
         vtkhdf::write_frame(&artifacts::unfinished(&path), &fields, clock.time, clock.step)?;
         artifacts::finish(&path)?;
         let (sha256, size_bytes) = digest::of_file(&path)?;
@@ -78,7 +95,7 @@ impl Frames {
             step: Some(clock.step),
         };
         self.written.push((self.epoch, frame.clone()));
-        Ok(Some(frame))
+        Ok(FrameOutcome::Written(frame))
     }
 
     /// Writes the index of all frames. While a job runs the service derives it from the published frames; the end of
