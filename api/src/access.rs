@@ -1,10 +1,19 @@
 //! Access rules: tokens with scopes, and the host names under which the service answers.
 
+pub mod tickets;
+mod tokens;
+
+pub use tokens::{ME, TokenFileError};
+
 use axum::http::{HeaderMap, Method, header};
+use base64::Engine;
 use meniscus_jobs::system::digest;
 use std::collections::BTreeSet;
+use std::io::Read;
 use std::net::IpAddr;
 use std::path::Path;
+use std::sync::{Arc, PoisonError, RwLock};
+use tokens::Token;
 
 /// Permission that a token carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -13,13 +22,15 @@ pub enum Scope {
     Read,
     /// Create jobs, studies, uploads and estimates.
     Submit,
-    /// Cancel, pause, resume, delete, and request checkpoints.
+    /// Cancel, pause, resume, change and delete what is one's own, and request checkpoints.
     Control,
+    /// The same of what others made.
+    Admin,
 }
 
 impl Scope {
     /// All scopes.
-    pub const ALL: [Self; 3] = [Self::Read, Self::Submit, Self::Control];
+    pub const ALL: [Self; 4] = [Self::Read, Self::Submit, Self::Control, Self::Admin];
 
     /// Name of the scope in token files and headers.
     #[must_use]
@@ -28,6 +39,7 @@ impl Scope {
             Self::Read => "read",
             Self::Submit => "submit",
             Self::Control => "control",
+            Self::Admin => "admin",
         }
     }
 
@@ -46,6 +58,8 @@ impl Scope {
         let creates =
             ["/v1/jobs", "/v1/studies", "/v1/uploads", "/v1/estimates"].contains(&path) || path.ends_with("/retry");
         match *method {
+            // A ticket lets its holder read.
+            Method::POST if path == "/v1/tickets" => Some(Self::Read),
             Method::GET | Method::HEAD => Some(Self::Read),
             Method::POST if creates => Some(Self::Submit),
             _ => Some(Self::Control),
@@ -53,24 +67,37 @@ impl Scope {
     }
 }
 
-#[derive(Debug, Clone)]
-struct Token {
-    name: String,
-    scopes: BTreeSet<Scope>,
-    sha256: String,
-}
-
-/// Name of the token that a request carries; empty while the service has no tokens. Idempotency keys and budgets are
-/// kept apart by it.
+/// Who sent a request, by the token that it carries. Without tokens everybody is the same client, which may do everything.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Client(pub String);
+pub struct Client {
+    /// Name of the token; empty while the service has no tokens. Idempotency keys and budgets are kept apart by it.
+    pub name: String,
+    /// Whether it may change what others made.
+    pub is_admin: bool,
+}
 
 impl Client {
     /// The name as owner of what the client makes; None while the service has no tokens.
     #[must_use]
     pub fn owner(&self) -> Option<String> {
-        Some(self.0.clone()).filter(|name| !name.is_empty())
+        Some(self.name.clone()).filter(|name| !name.is_empty())
     }
+
+    /// Whether the client may change what this owner made. What was made without tokens belongs to all.
+    #[must_use]
+    pub fn may_change(&self, owner: Option<&str>) -> bool {
+        self.name.is_empty() || self.is_admin || owner.is_none_or(|owner| owner == self.name)
+    }
+}
+
+/// A secret of 256 random bits as text.
+///
+/// # Errors
+/// When the system has no random numbers.
+pub fn secret() -> std::io::Result<String> {
+    let mut bytes = [0_u8; 32];
+    std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+    Ok(base64::engine::general_purpose::URL_SAFE_NO_PAD.encode(bytes))
 }
 
 /// Why a request is not allowed.
@@ -84,23 +111,15 @@ pub enum AccessError {
     Forbidden(Scope),
 }
 
-/// Why a token file cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum TokenFileError {
-    /// The file cannot be read.
-    #[error("the token file cannot be read: {0}")]
-    Io(#[from] std::io::Error),
-    /// A line does not describe a token.
-    #[error(
-        "line {0} of the token file must be NAME SCOPES sha256:DIGEST, with scopes among read, submit, control; `meniscus token NAME` prints such a line"
-    )]
-    Line(usize),
-    /// Two lines have the same name.
-    #[error("the token file has two tokens with the name {0}; names must differ")]
-    Twice(String),
-    /// The file has no token.
-    #[error("the token file has no token; `meniscus token NAME` prints a line for it")]
-    Empty,
+/// What the access rules are made of.
+#[derive(Debug, Clone, Default)]
+pub struct AccessSources<'a> {
+    /// File of the tokens.
+    pub token_file: Option<&'a Path>,
+    /// Additional host names.
+    pub hosts: &'a [String],
+    /// Origins whose pages may use the service.
+    pub origins: &'a [String],
 }
 
 /// Access rules of a service.
@@ -108,18 +127,31 @@ pub enum TokenFileError {
 pub struct AccessRules {
     tokens: Vec<Token>,
     hosts: BTreeSet<String>,
+    origins: BTreeSet<String>,
 }
 
 impl AccessRules {
-    /// Rules from a token file, additional host names and the address that the service listens on.
+    /// Rules from their sources and the address that the service listens on.
     ///
     /// # Errors
     /// [`TokenFileError`].
-    pub fn new(token_file: Option<&Path>, hosts: &[String], bind: IpAddr) -> Result<Self, TokenFileError> {
-        let tokens = token_file.map(|path| parse_tokens(&std::fs::read_to_string(path)?)).transpose()?;
+    pub fn new(sources: &AccessSources, bind: IpAddr) -> Result<Self, TokenFileError> {
+        let read = |path: &Path| {
+            let text = std::fs::read_to_string(path)
+                .map_err(|error| TokenFileError::Io { path: path.display().to_string(), error })?;
+            tokens::parse(&text)
+        };
+        let tokens = sources.token_file.map(read).transpose()?;
         let own = ["localhost".to_owned(), "127.0.0.1".to_owned(), "[::1]".to_owned(), bracketed(bind)];
-        let hosts = own.into_iter().chain(hosts.iter().map(|host| host.to_ascii_lowercase())).collect();
-        Ok(Self { tokens: tokens.unwrap_or_default(), hosts })
+        let hosts = own.into_iter().chain(sources.hosts.iter().map(|host| host.to_ascii_lowercase())).collect();
+        let origins = sources.origins.iter().map(|origin| origin.trim_end_matches('/').to_ascii_lowercase()).collect();
+        Ok(Self { tokens: tokens.unwrap_or_default(), hosts, origins })
+    }
+
+    /// Whether pages of an origin, such as `https://lab.example:8443`, may use the service.
+    #[must_use]
+    pub fn is_known_origin(&self, origin: &str) -> bool {
+        self.origins.contains(&origin.to_ascii_lowercase())
     }
 
     /// Whether requests need a token.
@@ -155,7 +187,32 @@ impl AccessRules {
         // Digests are compared, so the time that a comparison takes reveals nothing about a token.
         let sha256 = digest::of_bytes(token.trim().as_bytes());
         let token = self.tokens.iter().find(|known| known.sha256 == sha256).ok_or(AccessError::Unauthorized)?;
-        if token.scopes.contains(&scope) { Ok(Client(token.name.clone())) } else { Err(AccessError::Forbidden(scope)) }
+        let is_admin = token.scopes.contains(&Scope::Admin);
+        let may = token.scopes.contains(&scope) || is_admin && scope == Scope::Control;
+        if may { Ok(Client { name: token.name.clone(), is_admin }) } else { Err(AccessError::Forbidden(scope)) }
+    }
+}
+
+/// Access rules that can be replaced while the service runs.
+#[derive(Debug, Clone)]
+pub struct SharedAccess(Arc<RwLock<Arc<AccessRules>>>);
+
+impl SharedAccess {
+    /// Begins with these rules.
+    #[must_use]
+    pub fn new(rules: AccessRules) -> Self {
+        Self(Arc::new(RwLock::new(Arc::new(rules))))
+    }
+
+    /// The present rules.
+    #[must_use]
+    pub fn current(&self) -> Arc<AccessRules> {
+        Arc::clone(&self.0.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Replaces the rules.
+    pub fn replace(&self, rules: AccessRules) {
+        *self.0.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(rules);
     }
 }
 
@@ -163,40 +220,20 @@ fn bracketed(ip: IpAddr) -> String {
     if ip.is_ipv6() { format!("[{ip}]") } else { ip.to_string() }
 }
 
-fn parse_tokens(text: &str) -> Result<Vec<Token>, TokenFileError> {
-    let mut tokens: Vec<Token> = Vec::new();
-    for (k, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let parsed = match words.as_slice() {
-            [name, scopes, sha256] => sha256
-                .strip_prefix("sha256:")
-                .filter(|hex| hex.len() == 64 && hex.bytes().all(|b| b.is_ascii_hexdigit()))
-                .zip(Scope::parse_list(scopes))
-                .map(|(hex, scopes)| Token { name: (*name).to_owned(), scopes, sha256: hex.to_ascii_lowercase() }),
-            _ => None,
-        };
-        let token = parsed.ok_or(TokenFileError::Line(k + 1))?;
-        if tokens.iter().any(|other| other.name == token.name) {
-            return Err(TokenFileError::Twice(token.name));
-        }
-        tokens.push(token);
-    }
-    if tokens.is_empty() { Err(TokenFileError::Empty) } else { Ok(tokens) }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{AccessRules, Client, Scope, parse_tokens};
+    use super::tokens::parse as parse_tokens;
+    use super::{AccessRules, AccessSources, Client, Scope};
     use axum::http::{HeaderMap, HeaderValue, Method};
     use meniscus_jobs::system::digest;
 
     fn rules() -> AccessRules {
         let line = |name: &str, scopes: &str| format!("{name} {scopes} sha256:{}\n", digest::of_bytes(name.as_bytes()));
-        let mut rules = AccessRules::new(None, &["Sim.Example".into()], [10, 0, 0, 1].into()).unwrap();
+        let mut rules = AccessRules::new(
+            &AccessSources { hosts: &["Sim.Example".into()], ..AccessSources::default() },
+            [10, 0, 0, 1].into(),
+        )
+        .unwrap();
         rules.tokens =
             parse_tokens(&(line("alice", "read,submit") + "# a comment\n\n" + &line("bob", "read"))).unwrap();
         rules
@@ -208,7 +245,10 @@ mod tests {
         let with = |text: &'static str| {
             HeaderMap::from_iter([("authorization".parse().unwrap(), HeaderValue::from_static(text))])
         };
-        assert_eq!(rules.client(&with("Bearer alice"), Scope::Submit).unwrap(), Client("alice".into()));
+        assert_eq!(
+            rules.client(&with("Bearer alice"), Scope::Submit).unwrap(),
+            Client { name: "alice".into(), is_admin: false }
+        );
         for (text, scope) in [
             ("Bearer bob", Scope::Submit),
             ("Bearer eve", Scope::Read),
@@ -218,8 +258,24 @@ mod tests {
             assert!(rules.client(&with(text), scope).is_err(), "{text}");
         }
         assert!(rules.client(&HeaderMap::new(), Scope::Read).is_err());
-        for text in ["a read", "a fly sha256:00", "a read sha256:0", ""] {
+        for text in [&format!("me read sha256:{}", "0".repeat(64)), "a read", "a fly sha256:00", "a read sha256:0", ""]
+        {
             assert!(parse_tokens(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_others_made_is_changed_by_admins_alone() {
+        let [alice, root, anybody] = [("alice", false), ("root", true), ("", false)]
+            .map(|(name, is_admin)| Client { name: name.to_owned(), is_admin });
+        for (client, owner, may) in [
+            (&alice, Some("alice"), true),
+            (&alice, Some("bob"), false),
+            (&alice, None, true),
+            (&root, Some("bob"), true),
+            (&anybody, Some("bob"), true),
+        ] {
+            assert_eq!(client.may_change(owner), may, "{client:?} {owner:?}");
         }
     }
 
@@ -244,6 +300,9 @@ mod tests {
             (Method::POST, "/v1/studies/std_1/retry", Some(Scope::Submit)),
             (Method::POST, "/v1/jobs/job_1/cancel", Some(Scope::Control)),
             (Method::DELETE, "/v1/uploads/upl_1", Some(Scope::Control)),
+            (Method::PATCH, "/v1/jobs/job_1", Some(Scope::Control)),
+            (Method::POST, "/v1/jobs/actions", Some(Scope::Control)),
+            (Method::POST, "/v1/tickets", Some(Scope::Read)),
             (Method::POST, "/v1/jobs/job_1/checkpoints", Some(Scope::Control)),
         ] {
             assert_eq!(Scope::needed(&method, path), scope, "{method} {path}");

@@ -1,11 +1,10 @@
 //! The command line.
 
-use crate::access::Scope;
+use crate::access::{self, ME, Scope};
 use crate::config::{Choices, Config};
 use crate::foreground;
-use crate::serve;
+use crate::serve::{self, Reloading};
 use crate::telemetry;
-use base64::Engine;
 use clap::{Parser, Subcommand};
 use meniscus_jobs::inspection::{look, sandbox};
 use meniscus_jobs::service::backup;
@@ -18,7 +17,7 @@ use meniscus_jobs::system::process;
 use meniscus_jobs::verify;
 use meniscus_jobs::worker;
 use std::fmt::Display;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -97,7 +96,7 @@ enum Command {
     Token {
         /// Name of the client.
         name: String,
-        /// Scopes of the token: read, submit, control, separated by commas.
+        /// Scopes of the token: read, submit, control, admin, separated by commas.
         #[arg(long, default_value = "read,submit,control")]
         scopes: String,
     },
@@ -138,6 +137,7 @@ pub fn main() -> ExitCode {
     match Arguments::parse().command {
         Command::Serve { config, choices } => {
             telemetry::start();
+            let reloading = Reloading { flags: choices.clone(), file: config.clone() };
             let choices = match config.map(|path| Choices::from_file(&path)).transpose() {
                 Ok(file) => choices.or(file.unwrap_or_default()),
                 Err(error) => return fail(&error),
@@ -154,7 +154,7 @@ pub fn main() -> ExitCode {
                 Ok(runtime) => runtime,
                 Err(error) => return fail(&error),
             };
-            let served = runtime.block_on(serve::serve(config));
+            let served = runtime.block_on(serve::serve(config, reloading));
             // Handlers that still wait for a disk do not delay the end.
             runtime.shutdown_background();
             served.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
@@ -198,7 +198,10 @@ fn check_data(data: &Path) -> Result<ExitCode, fsck::FsckError> {
         writeln!(output, "{finding}")?;
     }
     for place in &findings.set_aside {
-        writeln!(output, "{place}: it belongs to no job and no upload and was set aside; delete it when you do not need it")?;
+        writeln!(
+            output,
+            "{place}: it belongs to no job and no upload and was set aside; delete it when you do not need it"
+        )?;
     }
     let fsck::Findings { jobs, files, wrong, .. } = findings;
     writeln!(output, "{jobs} jobs and {files} files checked, {} errors", wrong.len())?;
@@ -206,18 +209,18 @@ fn check_data(data: &Path) -> Result<ExitCode, fsck::FsckError> {
 }
 
 fn make_token(name: &str, scopes: &str) -> ExitCode {
-    let is_name = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.@".contains(&b));
+    let is_name =
+        !name.is_empty() && name != ME && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.@".contains(&b));
     if !is_name || Scope::parse_list(scopes).is_none() {
         return fail(
-            &"a name may have letters, digits and -_.@ only; scopes are read, submit, control, separated by commas",
+            &"a name may have letters, digits and -_.@ only, and is not `me`; scopes are read, submit, control, admin, separated by commas",
         );
     }
-    let mut secret = [0_u8; 32];
-    let drawn = std::fs::File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut secret));
-    if let Err(error) = drawn {
-        return fail(&error);
-    }
-    let token = format!("mns_{}", base64::engine::general_purpose::URL_SAFE_NO_PAD.encode(secret));
+    let secret = match access::secret() {
+        Ok(secret) => secret,
+        Err(error) => return fail(&error),
+    };
+    let token = format!("mns_{secret}");
     let line = format!("{name} {scopes} sha256:{}", digest::of_bytes(token.as_bytes()));
     let shown = writeln!(std::io::stdout(), "{token}\n{line}");
     shown.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)

@@ -1,13 +1,14 @@
 //! Configuration of the service: flags of the command line, else a TOML file with the same names, else defaults.
 
-use crate::access::{AccessRules, TokenFileError};
+use crate::access::{AccessRules, AccessSources, SharedAccess, TokenFileError};
+use crate::base_path;
 use crate::rate_limit::RateLimiter;
 use clap::Args;
 use meniscus_jobs::service::supervisor::{DISK_RESERVE_BYTES, Settings};
 use meniscus_jobs::spec::body::Allowance;
 use meniscus_jobs::system::process;
 use serde::Deserialize;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -18,9 +19,10 @@ pub struct Choices {
     /// Data directory; created if it does not exist.
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// Address to listen on, 127.0.0.1:8080 by default; port 0 picks a free port. Addresses other than loopback need tokens.
+    /// Address or name and port to listen on, 127.0.0.1:8080 by default; port 0 picks a free port. Addresses other than loopback
+    /// need tokens.
     #[arg(long)]
-    pub bind: Option<SocketAddr>,
+    pub bind: Option<String>,
     /// Jobs that run at the same time; cores / threads by default.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1024))]
     pub slots: Option<u64>,
@@ -34,6 +36,13 @@ pub struct Choices {
     #[arg(long)]
     #[serde(default)]
     pub allow_host: Vec<String>,
+    /// Origins whose pages may use the service, such as https://lab.example; none but its own by default.
+    #[arg(long)]
+    #[serde(default)]
+    pub allow_origin: Vec<String>,
+    /// Path below which the service answers, such as /meniscus, where a proxy hands on a part of its addresses.
+    #[arg(long)]
+    pub base_path: Option<String>,
     /// Days after which ended jobs are deleted; never by default.
     #[arg(long)]
     pub retention_days: Option<u32>,
@@ -73,8 +82,12 @@ pub struct Config {
     pub slots: usize,
     /// Threads of a job, both default and maximum.
     pub threads: usize,
-    /// Tokens and host names.
-    pub access: AccessRules,
+    /// Tokens, host names and origins.
+    pub access: SharedAccess,
+    /// File of the tokens.
+    pub token_file: Option<PathBuf>,
+    /// Path below which the service answers; empty for its whole address.
+    pub base_path: String,
     /// Creations of each client per minute.
     pub rate_limiter: RateLimiter,
     /// Days after which ended jobs are deleted; None for never.
@@ -99,6 +112,17 @@ pub enum ConfigError {
     /// Without tokens the service would be open to the network.
     #[error("{0} is not a loopback address: give --token-file (`meniscus token NAME` makes tokens), or bind 127.0.0.1")]
     Public(SocketAddr),
+    /// The address cannot be read.
+    #[error("--bind {text} cannot be used: {cause}; give ADDRESS:PORT, such as 127.0.0.1:8080 or localhost:8080")]
+    Bind {
+        /// The address as given.
+        text: String,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// The base path cannot be used.
+    #[error("{0}")]
+    BasePath(String),
     /// The data directory is missing.
     #[error("the data directory is missing: give --data DIR, or `data` in the configuration file")]
     NoData,
@@ -139,6 +163,8 @@ impl Choices {
             threads: self.threads.or(other.threads),
             token_file: self.token_file.or(other.token_file),
             allow_host: if self.allow_host.is_empty() { other.allow_host } else { self.allow_host },
+            allow_origin: if self.allow_origin.is_empty() { other.allow_origin } else { self.allow_origin },
+            base_path: self.base_path.or(other.base_path),
             retention_days: self.retention_days.or(other.retention_days),
             creations_per_minute: self.creations_per_minute.or(other.creations_per_minute),
             most_unfinished: self.most_unfinished.or(other.most_unfinished),
@@ -151,17 +177,36 @@ impl Choices {
     }
 }
 
+/// Access rules from settings. Without tokens only this machine is served.
+fn access_rules(choices: &Choices, bind: SocketAddr) -> Result<AccessRules, ConfigError> {
+    let sources = AccessSources {
+        token_file: choices.token_file.as_deref(),
+        hosts: &choices.allow_host,
+        origins: &choices.allow_origin,
+    };
+    let access = AccessRules::new(&sources, bind.ip())?;
+    if !bind.ip().is_loopback() && !access.has_tokens() {
+        return Err(ConfigError::Public(bind));
+    }
+    Ok(access)
+}
+
+/// The address of a text such as `127.0.0.1:8080` or `localhost:8080`. Of several, an IPv4 address comes first.
+fn resolve(text: &str) -> Result<SocketAddr, ConfigError> {
+    let wrong = |cause: String| ConfigError::Bind { text: text.to_owned(), cause };
+    let found: Vec<SocketAddr> = text.to_socket_addrs().map_err(|error| wrong(error.to_string()))?.collect();
+    let first = found.iter().find(|address| address.is_ipv4()).or_else(|| found.first());
+    first.copied().ok_or_else(|| wrong("the name has no address".to_owned()))
+}
+
 impl Config {
     /// Checks settings and fills in defaults: one thread per job and one job per core.
     ///
     /// # Errors
     /// [`ConfigError`].
     pub fn new(choices: &Choices) -> Result<Self, ConfigError> {
-        let bind = choices.bind.unwrap_or_else(|| SocketAddr::from(([127, 0, 0, 1], 8080)));
-        let access = AccessRules::new(choices.token_file.as_deref(), &choices.allow_host, bind.ip())?;
-        if !bind.ip().is_loopback() && !access.has_tokens() {
-            return Err(ConfigError::Public(bind));
-        }
+        let bind = choices.bind.as_deref().map_or(Ok(SocketAddr::from(([127, 0, 0, 1], 8080))), resolve)?;
+        let access = access_rules(choices, bind)?;
         let small = |number: Option<u64>| number.map(|n| n as usize);
         let (slots, threads) = (small(choices.slots), small(choices.threads));
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -172,7 +217,10 @@ impl Config {
             bind,
             slots,
             threads,
-            access,
+            access: SharedAccess::new(access),
+            token_file: choices.token_file.clone(),
+            base_path: base_path::parse(choices.base_path.as_deref().unwrap_or_default())
+                .map_err(ConfigError::BasePath)?,
             rate_limiter: RateLimiter::new(choices.creations_per_minute),
             retention_days: choices.retention_days,
             most_unfinished: choices.most_unfinished,
@@ -182,6 +230,15 @@ impl Config {
             adopt: choices.adopt,
             calibrate: !choices.no_calibration,
         })
+    }
+
+    /// Reads tokens, host names and origins again. What is wrong leaves the rules as they are.
+    ///
+    /// # Errors
+    /// [`ConfigError`].
+    pub fn reload(&self, choices: &Choices) -> Result<(), ConfigError> {
+        self.access.replace(access_rules(choices, self.bind)?);
+        Ok(())
     }
 
     /// What a job may ask for: four fifths of the memory shared among the slots.
@@ -220,8 +277,21 @@ mod tests {
     }
 
     #[test]
+    fn names_are_addresses_too() {
+        let bind = |text: &str| {
+            let choices = Choices { data: Some("/d".into()), bind: Some(text.to_owned()), ..Choices::default() };
+            Config::new(&choices).map(|config| config.bind.to_string()).map_err(|error| error.to_string())
+        };
+        assert_eq!(bind("localhost:8081").as_deref(), Ok("127.0.0.1:8081"));
+        for wrong in ["localhost", "8080", "127.0.0.1:99999"] {
+            let said = bind(wrong).unwrap_err();
+            assert!(said.contains(wrong) && said.contains("localhost:8080"), "{said}");
+        }
+    }
+
+    #[test]
     fn nothing_public_without_tokens() {
-        let choices = Choices { data: Some("/d".into()), bind: "0.0.0.0:80".parse().ok(), ..Choices::default() };
+        let choices = Choices { data: Some("/d".into()), bind: Some("0.0.0.0:80".to_owned()), ..Choices::default() };
         assert!(matches!(Config::new(&choices), Err(ConfigError::Public(_))));
     }
 

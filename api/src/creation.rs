@@ -69,7 +69,7 @@ impl Creation {
 /// # Errors
 /// [`ApiError::TooMany`].
 pub fn spend(state: &AppState, client: &Client) -> Result<Option<Budget>, ApiError> {
-    state.config.rate_limiter.spend(&client.0).map_err(ApiError::TooMany)
+    state.config.rate_limiter.spend(&client.name).map_err(ApiError::TooMany)
 }
 
 /// Bytes that are free on the disk beyond the reserve.

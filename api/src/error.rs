@@ -12,6 +12,7 @@
 //!
 //! Status codes, titles and explanations stand in [`crate::problems`].
 
+use crate::base_path::address;
 use crate::problems::{self, ProblemType};
 use crate::rate_limit::Budget;
 use axum::Json;
@@ -87,8 +88,6 @@ pub enum ApiError {
     },
     /// The disk is full.
     DiskFull,
-    /// As many requests of this kind as allowed are in progress.
-    Busy,
     /// The path exists, but not with this method.
     MethodNotAllowed,
     /// The state of the object forbids the request; the text names the state and what to do.
@@ -97,6 +96,12 @@ pub enum ApiError {
     TooLarge(u64),
     /// The body has a media type that is not accepted.
     UnsupportedMedia,
+    /// The body has a content encoding that is not accepted.
+    UnsupportedEncoding,
+    /// The object belongs to another client; the text is its name.
+    NotOwner(String),
+    /// The object has another revision than the one that the change was made for.
+    Changed,
     /// The request carries no token, or an unknown one.
     Unauthorized,
     /// The token lacks this scope.
@@ -139,11 +144,13 @@ impl ApiError {
             Self::BadRequest => &problems::BAD_REQUEST,
             Self::NoSpace { .. } => &problems::NO_SPACE,
             Self::DiskFull => &problems::DISK_FULL,
-            Self::Busy => &problems::BUSY,
             Self::MethodNotAllowed => &problems::METHOD_NOT_ALLOWED,
             Self::Conflict(_) => &problems::CONFLICT,
             Self::TooLarge(_) => &problems::TOO_LARGE,
             Self::UnsupportedMedia => &problems::UNSUPPORTED_MEDIA,
+            Self::UnsupportedEncoding => &problems::UNSUPPORTED_ENCODING,
+            Self::NotOwner(_) => &problems::NOT_OWNER,
+            Self::Changed => &problems::CHANGED,
             Self::Unauthorized => &problems::UNAUTHORIZED,
             Self::Forbidden(_) => &problems::FORBIDDEN,
             Self::UnknownHost => &problems::UNKNOWN_HOST,
@@ -170,11 +177,13 @@ impl ApiError {
             Self::DiskFull => "Existing results can be read. Paused jobs continue when space is free.".to_owned(),
             Self::TooLarge(limit) => format!("At most {limit} bytes are accepted."),
             Self::UnsupportedMedia => "Send the bytes of the file: curl --data-binary @FILE.".to_owned(),
+            Self::UnsupportedEncoding => "Send the body as it is, or compressed by gzip.".to_owned(),
+            Self::NotOwner(owner) => format!("It belongs to {owner}."),
+            Self::Changed => "Read the object again, and repeat the change with its present ETag.".to_owned(),
             Self::Unauthorized => "Send the header Authorization: Bearer TOKEN.".to_owned(),
             Self::Forbidden(scope) => format!("The scope {scope} is needed."),
-            Self::UnknownHost | Self::ForeignOrigin => {
-                "The operator allows host names with --allow-host NAME.".to_owned()
-            }
+            Self::UnknownHost => "The operator allows host names with --allow-host NAME.".to_owned(),
+            Self::ForeignOrigin => "The operator allows origins with --allow-origin ORIGIN.".to_owned(),
             Self::TooMany(budget) => {
                 format!("{} creations per minute are allowed. Try again in {} s.", budget.quota, budget.next_s)
             }
@@ -183,7 +192,7 @@ impl ApiError {
             }
             Self::RangeNotSatisfiable(size) => format!("The file has {size} bytes."),
             Self::Unwritable => "Existing jobs and files can be read. The log of the service has the cause.".to_owned(),
-            Self::BadRequest | Self::Busy | Self::MethodNotAllowed | Self::NotReady | Self::Internal(_) => return None,
+            Self::BadRequest | Self::MethodNotAllowed | Self::NotReady | Self::Internal(_) => return None,
         })
     }
 
@@ -196,6 +205,7 @@ impl ApiError {
         };
         put(header::CONTENT_TYPE, "application/problem+json".to_owned());
         match self {
+            Self::UnsupportedEncoding => put(header::ACCEPT_ENCODING, "gzip, identity".to_owned()),
             Self::Unauthorized => put(header::WWW_AUTHENTICATE, "Bearer realm=\"meniscus\"".to_owned()),
             Self::Forbidden(scope) => {
                 let challenge = format!("Bearer realm=\"meniscus\", error=\"insufficient_scope\", scope=\"{scope}\"");
@@ -228,7 +238,7 @@ impl IntoResponse for ApiError {
         let detail = self.detail();
         let errors = if let Self::Invalid(items) = self { items } else { Vec::new() };
         let body = Problem {
-            r#type: format!("/problems/{kind}"),
+            r#type: address(&format!("/problems/{kind}")),
             title: title.to_owned(),
             status: status.as_u16(),
             detail,

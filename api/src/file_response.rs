@@ -1,6 +1,7 @@
 //! Answers with the content of a file: Range, If-Range, If-None-Match, and strong entity tags from digests.
 
 use crate::error::ApiError;
+use crate::layers::encoding::Verbatim;
 use axum::body::Body;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::Response;
@@ -134,6 +135,9 @@ fn answer(
         {
             builder = builder.header(header::CONTENT_DISPOSITION, name);
         }
+    }
+    if facts.sha256.is_some() || range.is_some() {
+        builder = builder.extension(Verbatim);
     }
     if let Some(range) = range {
         builder = builder.header(header::CONTENT_RANGE, range);

@@ -33,7 +33,7 @@ pub fn key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
 /// The request under a key: the same one has the same method, target and body.
 #[must_use]
 pub fn keyed_request(client: Client, key: String, request: &[&[u8]]) -> IdempotencyKey {
-    IdempotencyKey { owner: client.0, key, fingerprint: digest::of_bytes(&request.join(&b'\n')) }
+    IdempotencyKey { owner: client.name, key, fingerprint: digest::of_bytes(&request.join(&b'\n')) }
 }
 
 /// An answer as its receipt has it. Receipts are kept for days: the names stay what they are.

@@ -4,9 +4,12 @@
 
 pub mod accept;
 pub mod access;
+pub mod archive;
+pub mod base_path;
 pub mod calibration;
 pub mod cli;
 pub mod config;
+pub mod connections;
 pub mod creation;
 pub mod error;
 pub mod file_response;
@@ -25,6 +28,7 @@ pub mod response_cache;
 pub mod router;
 pub mod routes;
 pub mod serve;
+pub mod signals;
 pub mod state;
 pub mod store_sources;
 pub mod telemetry;

@@ -1,8 +1,10 @@
 //! Pages of lists. A page begins behind the id of the last entry before it, so new objects never shift pages.
 
+use crate::base_path::address;
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::Response;
 use serde::de::{Deserialize, Deserializer, Error, Unexpected};
+use ulid::Ulid;
 
 /// Entries on a page, 1 to 500; 50 by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +45,24 @@ impl<'de> Deserialize<'de> for PageSize {
     }
 }
 
+/// `next` of the page before: the id of its last entry. Anything else would quietly begin or end the list somewhere.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cursor(pub String);
+
+/// What begins the ids of objects that are listed.
+const PREFIXES: [&str; 3] = ["job_", "std_", "upl_"];
+
+impl<'de> Deserialize<'de> for Cursor {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let number = PREFIXES.iter().find_map(|prefix| text.strip_prefix(prefix));
+        match number.and_then(|number| number.parse::<Ulid>().ok()) {
+            Some(_) => Ok(Self(text)),
+            None => Err(D::Error::invalid_type(Unexpected::Str(&text), &"`next` of the page before")),
+        }
+    }
+}
+
 /// Which page of a list.
 #[derive(Debug, Clone, Default, serde::Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -53,7 +73,8 @@ pub struct PageQuery {
     #[param(value_type = Option<u64>, minimum = 1, maximum = 500, default = 50)]
     pub limit: PageSize,
     /// `next` of the page before.
-    pub cursor: Option<String>,
+    #[param(value_type = Option<String>)]
+    pub cursor: Option<Cursor>,
 }
 
 /// Links to the next page: the same query with another cursor.
@@ -64,7 +85,7 @@ pub fn link_next(response: &mut Response, uri: &Uri, cursor: &str) {
     });
     let cursor = format!("cursor={cursor}");
     let query: Vec<&str> = others.chain([cursor.as_str()]).collect();
-    let link = format!("<{}?{}>; rel=\"next\"", uri.path(), query.join("&"));
+    let link = format!("<{}?{}>; rel=\"next\"", address(uri.path()), query.join("&"));
     if let Ok(link) = HeaderValue::from_str(&link) {
         response.headers_mut().insert(header::LINK, link);
     }
@@ -94,6 +115,15 @@ mod tests {
             let errors = read(text).unwrap_err();
             assert_eq!((errors[0].pointer.as_str(), errors[0].code.as_str(), errors.len()), ("limit", code, 1));
             assert_eq!(errors[0].got, text);
+        }
+    }
+
+    #[test]
+    fn damaged_cursors_are_refused() {
+        let read = |text: &str| query::parse::<PageQuery>(vec![("cursor".to_owned(), text.to_owned())]);
+        assert!(read("job_01JZZZZZZZZZZZZZZZZZZZZZZZ").is_ok());
+        for text in ["", "junk", "job_", "job_01JZ", "\0", "ckpt_01JZZZZZZZZZZZZZZZZZZZZZZZ"] {
+            assert_eq!(read(text).unwrap_err()[0].pointer, "cursor", "{text:?}");
         }
     }
 

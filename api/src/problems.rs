@@ -70,20 +70,27 @@ problem_types! {
          uploads with --upload-bytes.";
     UNSUPPORTED_MEDIA = "unsupported-media", UNSUPPORTED_MEDIA_TYPE, "The body has a media type that is not accepted",
         "An upload is the bytes of one file, without a form around them: curl --data-binary @FILE.";
+    UNSUPPORTED_ENCODING = "unsupported-encoding", UNSUPPORTED_MEDIA_TYPE, "The body has an encoding that is not accepted",
+        "A body is sent as it is, or compressed by gzip with the header Content-Encoding: gzip.";
+    NOT_OWNER = "not-owner", FORBIDDEN, "The object belongs to another client",
+        "With tokens, jobs, studies and uploads belong to the token that made them. Others may read them. To change what others \
+         made, a token needs the scope admin.";
+    CHANGED = "changed", PRECONDITION_FAILED, "The object was changed in the meantime",
+        "The header If-Match names another revision than the object has now.";
     RANGE = "range", RANGE_NOT_SATISFIABLE, "The range lies outside the file",
         "No byte of the requested range exists. The Content-Range header of the answer has the size of the file.";
     UNAUTHORIZED = "unauthorized", UNAUTHORIZED, "A token is needed",
         "The request carries no token, or an unknown one. Send the header `Authorization: Bearer TOKEN`. The operator \
          makes tokens with `meniscus token NAME`.";
     FORBIDDEN = "forbidden", FORBIDDEN, "The token does not allow this",
-        "The token lacks a scope. The detail names it. The scopes are read, submit and control; the operator makes \
+        "The token lacks a scope. The detail names it. The scopes are read, submit, control and admin; the operator makes \
          tokens with other scopes with `meniscus token NAME --scopes LIST`.";
     UNKNOWN_HOST = "unknown-host", MISDIRECTED_REQUEST, "The service does not answer under this host name",
         "The service answers under localhost, the address that it listens on, and the names that the operator allows \
          with --allow-host NAME.";
     FOREIGN_ORIGIN = "foreign-origin", FORBIDDEN, "Requests from pages of other origins are not allowed",
-        "The Origin header names a host under which the service does not answer. The operator allows names with \
-         --allow-host NAME.";
+        "The Origin header names a page that is not the service's own. The operator allows origins with \
+         --allow-origin ORIGIN.";
     TOO_MANY = "too-many", TOO_MANY_REQUESTS, "Too many objects were created in the last minute",
         "The service limits the jobs, studies and uploads that a client creates per minute. Wait for the seconds in \
          the Retry-After header. The operator sets the limit with --creations-per-minute.";
@@ -96,9 +103,6 @@ problem_types! {
     DISK_FULL = "disk-full", INSUFFICIENT_STORAGE, "The disk is full",
         "Nothing can be written until space is free. Existing results can still be read. Jobs that paused because of \
          missing space continue by themselves.";
-    BUSY = "busy", SERVICE_UNAVAILABLE, "Too many requests of this kind are in progress",
-        "The service streams a limited number of archives at the same time. Try again after the seconds in the \
-         Retry-After header.";
     NOT_READY = "not-ready", SERVICE_UNAVAILABLE, "The service is starting or stopping",
         "After a start the service recovers its jobs before it accepts requests. Try again after the seconds in the \
          Retry-After header. GET /readyz answers 200 as soon as the service is ready.";

@@ -33,5 +33,7 @@ pub async fn read(headers: &HeaderMap, body: Body, limit: usize) -> Result<Vec<u
 /// # Errors
 /// [`ApiError::Unparsable`].
 pub fn parse_json(bytes: &[u8]) -> Result<Value, ApiError> {
-    strict_json::parse(bytes).map_err(|error| ApiError::Unparsable(error.to_string()))
+    // Some editors begin a text with a byte order mark.
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    strict_json::parse(text).map_err(|error| ApiError::Unparsable(error.to_string()))
 }

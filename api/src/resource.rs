@@ -1,5 +1,6 @@
 //! Objects that clients list, read and delete by id: jobs, studies, uploads, checkpoints.
 
+use crate::access::Client;
 use crate::error::ApiError;
 use crate::pagination::{PageSize, link_next};
 use crate::state::AppState;
@@ -26,6 +27,12 @@ pub trait Resource: Sized + Send + 'static {
     /// # Errors
     /// [`StoreError`].
     fn find(store: &Store, id: &str) -> Result<Option<Self>, StoreError>;
+
+    /// The client that made it; None where it belongs to all.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    fn owner(&self, store: &Store) -> Result<Option<String>, StoreError>;
 
     /// Deletes the object with its files, unless its state or its use forbids that.
     ///
@@ -64,12 +71,33 @@ pub async fn get<R: Resource>(state: &AppState, id: String) -> Result<Json<R::Vi
     Ok(Json(find::<R>(state, id).await?.into()))
 }
 
+/// The object that a path names, if the client may change it.
+///
+/// # Errors
+/// As [`find`]; [`ApiError::NotOwner`].
+pub async fn find_own<R: Resource>(state: &AppState, client: &Client, id: String) -> Result<R, ApiError> {
+    let object = find::<R>(state, id).await?;
+    check_owner(client, object.owner(&state.store)?)?;
+    Ok(object)
+}
+
+/// Refuses clients that may not change what an owner made.
+///
+/// # Errors
+/// [`ApiError::NotOwner`].
+pub fn check_owner(client: &Client, owner: Option<String>) -> Result<(), ApiError> {
+    match owner {
+        Some(owner) if !client.may_change(Some(&owner)) => Err(ApiError::NotOwner(owner)),
+        _ => Ok(()),
+    }
+}
+
 /// The answer to `DELETE` of an object.
 ///
 /// # Errors
-/// As [`find`]; [`ApiError::Conflict`] if it cannot be deleted.
-pub async fn delete<R: Resource>(state: &AppState, id: String) -> Result<StatusCode, ApiError> {
-    let object = find::<R>(state, id).await?;
+/// As [`find_own`]; [`ApiError::Conflict`] if it cannot be deleted.
+pub async fn delete<R: Resource>(state: &AppState, client: &Client, id: String) -> Result<StatusCode, ApiError> {
+    let object = find_own::<R>(state, client, id).await?;
     match state.with_store(move |store| Ok::<_, ApiError>(object.delete(store)?)).await? {
         Deletion::Done => Ok(StatusCode::NO_CONTENT),
         Deletion::Refused(why) => Err(ApiError::Conflict(why)),

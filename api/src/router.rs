@@ -1,18 +1,27 @@
 //! Every route, and the layers that every request passes through.
 
+use crate::base_path;
 use crate::error::ApiError;
-use crate::layers::{access, readiness, request_id, request_log, security_headers};
+use crate::layers::encoding::IsText;
+use crate::layers::{access, encoding, readiness, request_id, request_log, security_headers};
 use crate::openapi::{self, Document};
 use crate::routes::{
-    checkpoints, estimates, events, files, jobs, metrics, problems, results, scenes, service, studies, uploads,
+    checkpoints, estimates, events, files, job_changes, jobs, metrics, problems, results, scenes, service, studies,
+    tickets, uploads,
 };
 use crate::state::AppState;
 use axum::Router;
 use axum::body::Bytes;
-use axum::http::header;
+use axum::http::request::Parts;
+use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::response::IntoResponse;
+use std::time::Duration;
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
+use tower_http::cors::{AllowHeaders, AllowOrigin, CorsLayer};
+use tower_http::decompression::RequestDecompressionLayer;
+use tower_http::timeout::RequestBodyTimeoutLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -29,7 +38,9 @@ fn documented() -> OpenApiRouter<AppState> {
         .routes(routes!(scenes::get))
         .routes(routes!(estimates::estimate))
         .routes(routes!(jobs::submit, jobs::list))
-        .routes(routes!(jobs::get, jobs::delete))
+        .routes(routes!(job_changes::act))
+        .routes(routes!(jobs::get, jobs::delete, job_changes::change))
+        .routes(routes!(job_changes::retry))
         .routes(routes!(jobs::cancel))
         .routes(routes!(jobs::pause))
         .routes(routes!(jobs::resume))
@@ -44,6 +55,7 @@ fn documented() -> OpenApiRouter<AppState> {
         .routes(routes!(checkpoints::latest))
         .routes(routes!(checkpoints::get, checkpoints::delete))
         .routes(routes!(checkpoints::content))
+        .routes(routes!(tickets::issue))
         .routes(routes!(uploads::submit, uploads::list))
         .routes(routes!(uploads::get, uploads::delete))
         .routes(routes!(studies::submit, studies::list))
@@ -58,23 +70,68 @@ fn documented() -> OpenApiRouter<AppState> {
         .routes(routes!(studies::retry))
 }
 
-/// The whole service. A request passes the layers from the last line to the first.
+/// The whole service, below its base path. A request passes the layers from the last line to the first.
 pub fn router(state: AppState) -> Router {
     let (routes, document) = documented().split_for_parts();
     // Serialized once, since every request would clone the document.
     let document = Bytes::from(openapi::complete(openapi::publish(document)).to_string());
     let document = ([(header::CONTENT_TYPE, "application/json")], document);
-    routes
+    let routes = routes
         .route("/openapi.json", axum::routing::get(move || async move { document }))
         .fallback(|| async { ApiError::NotFound("resource") })
         .method_not_allowed_fallback(|| async { ApiError::MethodNotAllowed })
         .layer(from_fn_with_state(state.clone(), readiness::check))
         .layer(from_fn_with_state(state.clone(), access::check))
+        .layer(RequestBodyTimeoutLayer::new(BODY_PAUSE))
+        .layer(RequestDecompressionLayer::new().gzip(true).pass_through_unaccepted(true))
+        .layer(from_fn(encoding::check))
+        .layer(cors(&state))
+        .layer(CompressionLayer::new().gzip(true).compress_when(IsText))
         .layer(CatchPanicLayer::custom(|_| ApiError::Internal("a handler panicked".to_owned()).into_response()))
         .layer(from_fn(request_log::record))
         .layer(from_fn(security_headers::add))
         .layer(from_fn(request_id::attach))
+        .with_state(state.clone());
+    if base_path::get().is_empty() {
+        return routes;
+    }
+    // Probes come without the proxy and do not know its path.
+    Router::new()
+        .route("/healthz", axum::routing::get(service::health))
+        .route("/readyz", axum::routing::get(service::ready))
         .with_state(state)
+        .nest(base_path::get(), routes)
+        .fallback(|| async { ApiError::NotFound("resource; the service answers below its base path") })
+}
+
+/// Longest pause within the body of a request.
+const BODY_PAUSE: Duration = Duration::from_secs(30);
+/// Time for which a browser remembers what it may send.
+const CORS_MEMORY: Duration = Duration::from_secs(3600);
+
+/// Lets pages of the origins that the operator allows read answers.
+fn cors(state: &AppState) -> CorsLayer {
+    let access = state.config.access.clone();
+    let is_allowed = move |origin: &HeaderValue, _: &Parts| {
+        origin.to_str().is_ok_and(|origin| access.current().is_known_origin(origin))
+    };
+    let exposed = [
+        header::ETAG,
+        header::LOCATION,
+        header::LINK,
+        header::RETRY_AFTER,
+        header::CONTENT_RANGE,
+        header::CONTENT_DISPOSITION,
+        HeaderName::from_static("x-request-id"),
+        HeaderName::from_static("repr-digest"),
+        HeaderName::from_static("idempotent-replayed"),
+    ];
+    CorsLayer::new()
+        .allow_origin(AllowOrigin::predicate(is_allowed))
+        .allow_methods([Method::GET, Method::HEAD, Method::POST, Method::PATCH, Method::DELETE])
+        .allow_headers(AllowHeaders::mirror_request())
+        .expose_headers(exposed)
+        .max_age(CORS_MEMORY)
 }
 
 #[cfg(test)]

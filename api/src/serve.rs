@@ -1,8 +1,11 @@
 //! The service from start to end: store, supervisor, listener.
 
+use crate::base_path;
 use crate::calibration;
-use crate::config::Config;
+use crate::config::{Choices, Config};
+use crate::connections;
 use crate::router;
+use crate::signals::{Asked, Signals};
 use crate::state::{AppState, Handles, ServicePhase};
 use crate::telemetry;
 use meniscus_jobs::service::data_directory::{DataDirectory, DataDirectoryError};
@@ -12,7 +15,6 @@ use meniscus_jobs::service::inspector;
 use meniscus_jobs::service::store::{self, Store, StoreError};
 use meniscus_jobs::service::supervisor::Supervisor;
 use metrics_exporter_prometheus::PrometheusHandle;
-use std::future::IntoFuture;
 use std::io::{self, Write};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -20,7 +22,6 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
-use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
 /// Why the service could not run.
@@ -56,7 +57,9 @@ pub enum ServeError {
 /// What helps where an address cannot be used.
 fn advice(error: &io::Error) -> &'static str {
     match error.kind() {
-        io::ErrorKind::AddrInUse => "another program listens there: stop it, or give --bind another port (port 0 picks a free one)",
+        io::ErrorKind::AddrInUse => {
+            "another program listens there: stop it, or give --bind another port (port 0 picks a free one)"
+        }
         io::ErrorKind::PermissionDenied => "ports below 1024 need a privilege: give --bind a higher port",
         io::ErrorKind::AddrNotAvailable => "this machine does not have the address: give --bind one of its own",
         _ => "give --bind another address",
@@ -67,6 +70,8 @@ fn advice(error: &io::Error) -> &'static str {
 const LOG_INTERVAL: Duration = Duration::from_millis(250);
 /// Time between two tries whether the store can be written.
 const WRITE_INTERVAL: Duration = Duration::from_secs(2);
+/// Time between two looks at the token file.
+const TOKEN_INTERVAL: Duration = Duration::from_secs(1);
 /// Time that open answers have to end after the supervisor has ended.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
@@ -74,32 +79,28 @@ const LAST_ANSWERS: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// [`ServeError`].
-pub async fn serve(config: Config) -> Result<(), ServeError> {
+pub async fn serve(config: Config, reloading: Reloading) -> Result<(), ServeError> {
+    base_path::set(&config.base_path);
     let directory = DataDirectory::open(&config.data)?;
     let config = Config { data: directory.path().to_owned(), ..config };
     let bind = config.bind;
-    let listener =
-        TcpListener::bind(bind).await.map_err(|error| ServeError::Bind { address: bind, error })?;
+    let listener = TcpListener::bind(bind).await.map_err(|error| ServeError::Bind { address: bind, error })?;
     let store = Arc::new(open_store(&directory, config.adopt)?);
     let (stop, stopping) = watch::channel(false);
     let (state, supervisor) = build(config, &store, stopping)?;
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut interrupt = signal(SignalKind::interrupt())?;
+    let mut signals = Signals::new()?;
     announce(&listener.local_addr()?.to_string())?;
     let supervision = start_supervision(supervisor, state.phase.clone())?;
     tidy_up(&state.store, state.metrics.clone(), state.phase.clone())?;
+    if let Some(file) = state.config.token_file.clone() {
+        watch_tokens(file, state.config.clone(), reloading.clone(), state.phase.clone())?;
+    }
     if state.config.calibrate {
         calibration::start_where_needed(&state.store, state.config.threads)?;
     }
-    let mut stopped = state.stopping.clone();
-    let until_stopped = async move {
-        let _ = stopped.wait_for(|stopped| *stopped).await;
-    };
-    let server = axum::serve(listener, router::router(state.clone())).with_graceful_shutdown(until_stopped);
-    let answers = tokio::spawn(server.into_future());
-    tokio::select! {
-        _ = terminate.recv() => {}
-        _ = interrupt.recv() => {}
+    let answers = tokio::spawn(connections::serve(listener, router::router(state.clone()), state.stopping.clone()));
+    while signals.next().await == Asked::Reload {
+        reload(&state.config, &reloading);
     }
     tracing::info!("stopping: running jobs write a checkpoint and return to the queue");
     state.phase.set_draining();
@@ -114,6 +115,25 @@ pub async fn serve(config: Config) -> Result<(), ServeError> {
     let _ = tokio::time::timeout(LAST_ANSWERS, answers).await;
     store.close();
     Ok(())
+}
+
+/// Where settings come from when they are read again.
+#[derive(Debug, Clone, Default)]
+pub struct Reloading {
+    /// The flags of the command line.
+    pub flags: Choices,
+    /// The configuration file.
+    pub file: Option<PathBuf>,
+}
+
+/// Reads tokens, host names and origins again. What is wrong leaves everything as it is.
+fn reload(config: &Config, Reloading { flags, file }: &Reloading) {
+    let read = file.as_deref().map(Choices::from_file).transpose();
+    let read = read.map(|file| flags.clone().or(file.unwrap_or_default()));
+    match read.and_then(|choices| config.reload(&choices)) {
+        Ok(()) => tracing::info!("tokens, host names and origins are read again; other settings need a restart"),
+        Err(error) => tracing::error!(%error, "settings could not be read again; the ones before stay"),
+    }
 }
 
 /// Opens the store, if it knows everything that is on the disk. With `adopt`, what it does not know comes back into it.
@@ -190,6 +210,24 @@ fn tidy_up(store: &Arc<Store>, metrics: PrometheusHandle, phase: ServicePhase) -
             if tried.elapsed() >= interval {
                 tried = Instant::now();
                 try_writing(&store, &phase);
+            }
+        }
+    })?;
+    Ok(())
+}
+
+/// Reads the tokens again when their file has changed, on a thread of its own.
+fn watch_tokens(file: PathBuf, config: Arc<Config>, reloading: Reloading, phase: ServicePhase) -> io::Result<()> {
+    let look = move || std::fs::metadata(&file).and_then(|meta| Ok((meta.modified()?, meta.len()))).ok();
+    let mut known = look();
+    std::thread::Builder::new().name("tokens".to_owned()).spawn(move || {
+        while !phase.is_draining() {
+            std::thread::sleep(TOKEN_INTERVAL);
+            let found = look();
+            // A file that is being replaced is not there for a moment.
+            if found.is_some() && found != known {
+                known = found;
+                reload(&config, &reloading);
             }
         }
     })?;

@@ -1,5 +1,6 @@
 //! What every handler can reach: store, supervisor, configuration. Nothing here knows a route or an error of the API.
 
+use crate::access::tickets::Tickets;
 use crate::config::Config;
 use crate::response_cache::ResponseCache;
 use meniscus_jobs::service::inspector::InspectorHandle;
@@ -8,11 +9,8 @@ use meniscus_jobs::service::supervisor::SupervisorHandle;
 use metrics_exporter_prometheus::PrometheusHandle;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 use tokio::task::JoinError;
-
-/// Archives that may be streamed at the same time.
-const ARCHIVES: usize = 6;
 
 /// State of the service, shared by all handlers. A clone is cheap and refers to the same service.
 #[derive(Clone)]
@@ -31,8 +29,8 @@ pub struct AppState {
     pub phase: ServicePhase,
     /// Serialized jobs.
     pub response_cache: ResponseCache,
-    /// A permit for each archive that may be streamed: a stream holds a thread for as long as its reader takes.
-    pub archives: Arc<Semaphore>,
+    /// Tickets that are good now.
+    pub tickets: Tickets,
     /// Turns true when the service stops; streams and long polls end then.
     pub stopping: watch::Receiver<bool>,
 }
@@ -106,7 +104,7 @@ impl AppState {
             config: Arc::new(config),
             phase: ServicePhase::default(),
             response_cache: ResponseCache::default(),
-            archives: Arc::new(Semaphore::new(ARCHIVES)),
+            tickets: Tickets::default(),
             stopping,
         }
     }

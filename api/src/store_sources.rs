@@ -1,8 +1,8 @@
-//! Checkpoints and uploads that bodies name, looked up in the store.
+//! Checkpoints, uploads and jobs that bodies name, looked up in the store.
 
 use crate::error::ApiError;
 use meniscus_jobs::service::store::{Store, StoreError};
-use meniscus_jobs::spec::body::{self, Allowance, JobBody, RestartSource, Sources};
+use meniscus_jobs::spec::body::{self, Allowance, JobBody, JobSource, RestartSource, Sources};
 use meniscus_jobs::spec::calibration::Calibration;
 use meniscus_jobs::spec::uploads::Purpose;
 use serde_json::Value;
@@ -35,6 +35,10 @@ impl Sources for StoreSources<'_> {
 
     fn checkpoint(&self, id: &str) -> Result<Option<RestartSource>, StoreError> {
         self.store.restart_source(id)
+    }
+
+    fn job(&self, id: &str) -> Result<Option<JobSource>, StoreError> {
+        self.store.job_source(id)
     }
 
     fn uploaded_checkpoint(&self, id: &str) -> Result<Option<RestartSource>, StoreError> {

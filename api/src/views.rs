@@ -26,8 +26,10 @@ mod health;
 pub use collections::{DryRunView, EstimateView, StudyList, StudyView, UploadList, UploadView};
 pub use health::{FindingView, HealthView, QuantityView, ReportView};
 
+use crate::base_path::address;
 use meniscus_jobs::service::store::{CheckpointRow, Event, FileRow, JobRow};
 use meniscus_jobs::spec::records::{Progress, Usage};
+use meniscus_jobs::spec::states::State;
 use meniscus_jobs::system::build;
 use serde::Serialize;
 use serde_json::Value;
@@ -67,6 +69,12 @@ pub struct JobView {
     pub attempt: u64,
     /// Resources used so far.
     pub usage: UsageView,
+    /// What a queued job waits for.
+    pub waiting_for: Option<String>,
+    /// Ids of jobs that must have succeeded before it starts.
+    pub after: Vec<String>,
+    /// Name of the token that made it; null without tokens.
+    pub owner: Option<String>,
     /// Objects that the job was made from.
     pub lineage: LineageView,
     /// Build and instruction set, on which the last digits of results depend.
@@ -233,7 +241,7 @@ pub struct ServiceView {
     /// Limits of requests and jobs.
     pub limits: ServiceLimits,
     /// Addresses of related resources.
-    pub links: BTreeMap<&'static str, &'static str>,
+    pub links: BTreeMap<&'static str, String>,
 }
 
 /// Limits of requests and jobs.
@@ -281,6 +289,37 @@ list! {
     SceneKindList of SceneKindView, next: "Always null: the list is whole."
 }
 
+/// What an action on many jobs came to.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ActionView {
+    /// Jobs that the filter matches.
+    pub matched: u64,
+    /// Jobs that were changed, or would be.
+    pub changed: u64,
+    /// Whether nothing was changed.
+    pub dry_run: bool,
+    /// Jobs that were left as they are, a thousand at most.
+    pub skipped: Vec<SkippedView>,
+}
+
+/// A job that an action left as it is.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct SkippedView {
+    /// Id of the job.
+    pub job: String,
+    /// Why it was left.
+    pub reason: String,
+}
+
+/// A ticket.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct TicketView {
+    /// The value of `?ticket=`.
+    pub ticket: String,
+    /// Time from which on it is not accepted any more (RFC 3339, UTC).
+    pub expires_at: String,
+}
+
 /// Answer of a health check.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct StatusView {
@@ -298,8 +337,8 @@ fn links(base: String, parts: &[&'static str]) -> BTreeMap<&'static str, String>
 
 impl From<JobRow> for JobView {
     fn from(job: JobRow) -> Self {
-        let parts = ["cancel", "pause", "resume", "events", "log", "series", "report", "files", "checkpoints"];
-        let links = links(format!("/v1/jobs/{}", job.id), &parts);
+        let parts = ["cancel", "pause", "resume", "retry", "events", "log", "series", "report", "files", "checkpoints"];
+        let links = links(address(&format!("/v1/jobs/{}", job.id)), &parts);
         let Progress {
             fraction,
             time,
@@ -316,6 +355,12 @@ impl From<JobRow> for JobView {
         // Speed and remaining time have a meaning only while a worker runs.
         let is_running = job.state.has_worker();
         let Usage { wall_s, cpu_s, peak_memory_bytes, disk_bytes } = job.usage;
+        let waiting_for = (job.state == State::Queued).then(|| match (job.waits_for, &job.hint) {
+            (0, Some(_)) => "another try to start it (see hint)".to_owned(),
+            (0, None) => "a free slot, its memory and its disk space".to_owned(),
+            (1, _) => "one job of `after` to succeed".to_owned(),
+            (count, _) => format!("{count} jobs of `after` to succeed"),
+        });
         let end_time = if end_time > 0.0 { end_time } else { job.forecast.steps as f64 * job.forecast.time_step };
         Self {
             rev: job.rev,
@@ -341,6 +386,9 @@ impl From<JobRow> for JobView {
             health: HealthView::new(health, job.health, job.findings),
             warnings: job.warnings.into_iter().map(FindingView::from).collect(),
             attempt: job.attempt,
+            waiting_for,
+            after: job.predecessors,
+            owner: job.owner,
             usage: UsageView { wall_s, cpu_s, peak_memory_bytes, disk_bytes },
             lineage: LineageView { study: job.study, restarted_from: job.restarted_from, retry_of: job.retry_of },
             deterministic: DeterministicView { build: build::name(), isa: build::isa() },
@@ -371,11 +419,11 @@ impl From<CheckpointRow> for CheckpointView {
     fn from(row: CheckpointRow) -> Self {
         let CheckpointRow { id, job, attempt: _, path: _, step, time, size_bytes, sha256, created_at, isa, build } =
             row;
-        let base = format!("/v1/checkpoints/{id}");
+        let base = address(&format!("/v1/checkpoints/{id}"));
         let links = BTreeMap::from([
             ("content", format!("{base}/content")),
             ("self", base),
-            ("job", format!("/v1/jobs/{job}")),
+            ("job", address(&format!("/v1/jobs/{job}"))),
         ]);
         Self { id, job, step, time, size_bytes, sha256, created_at, isa, build, links }
     }

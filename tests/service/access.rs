@@ -114,9 +114,7 @@ fn old_jobs_expire_and_metrics_count() {
     ] {
         assert!(text.contains(name), "{name}");
     }
-    service.with_store(|store| {
-        store.execute("UPDATE jobs SET ended_s = ended_s - 8 * 86400.0 WHERE id = ?1", [&old])
-    });
+    service.with_store(|store| store.execute("UPDATE jobs SET ended_s = ended_s - 8 * 86400.0 WHERE id = ?1", [&old]));
     assert!(service.stop());
     service.restart();
     crate::support::eventually("the old one is gone", std::time::Duration::from_secs(10), || {

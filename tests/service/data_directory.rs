@@ -31,8 +31,7 @@ fn a_directory_of_others_is_refused_and_left_as_it_is() {
     std::fs::create_dir_all(foreign.parent().unwrap()).unwrap();
     std::fs::write(&foreign, "years of work").unwrap();
     for command in ["serve", "fsck"] {
-        let output =
-            Command::new(program()).args([command, "--data"]).arg(directory.path()).output().unwrap();
+        let output = Command::new(program()).args([command, "--data"]).arg(directory.path()).output().unwrap();
         let text = String::from_utf8(output.stderr).unwrap();
         assert!(!output.status.success(), "{command}");
         assert!(text.contains(directory.path().to_str().unwrap()), "{text}");
@@ -83,8 +82,8 @@ fn a_lost_database_refuses_the_start_and_jobs_come_back_from_their_files() {
     let done = service.submit(&json!({"name": "done", "labels": {"a": "b"},
         "scene": {"kind": "vortex", "spacing": 0.05, "end_time": 0.4}, "output": {"every_time": 0.1}}));
     service.wait_for(&done, &["succeeded"]);
-    let failed = service.submit(&json!({"scene": {"kind": "droplet", "spacing": 0.0625, "end_time": 1.0,
-        "time_step": 0.05, "sound_speed": 1.0}}));
+    let failed = service.submit(&json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 2000,
+        "problem": {"type": "poisson"}, "solver": {"type": "bicgstab", "max_iterations": 2}}}));
     eventually("it fails", Duration::from_secs(60), || (service.job(&failed)["state"] == "failed").then_some(()));
     let canceled = service.submit(&endless_job());
     service.worker_eventually(&canceled);

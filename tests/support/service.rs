@@ -70,7 +70,17 @@ fn launch(
     variables: &[(String, String)],
     log: &tempfile::NamedTempFile,
 ) -> (Child, String) {
-    let mut child = Command::new(program())
+    // `prlimit` takes the limits of a process and the program that runs under them.
+    let limit = variables.iter().find(|(name, _)| name == "MENISCUS_TEST_PRLIMIT").map(|(_, limit)| limit);
+    let mut command = match limit {
+        Some(limit) => {
+            let mut command = Command::new("prlimit");
+            command.args(limit.split(' ')).arg(program());
+            command
+        }
+        None => Command::new(program()),
+    };
+    let mut child = command
         .envs(variables.iter().cloned())
         .args(["serve", "--bind", "127.0.0.1:0", "--no-calibration", "--data"])
         .arg(data)

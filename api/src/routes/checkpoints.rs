@@ -1,15 +1,17 @@
 //! Checkpoints of jobs.
 
+use crate::access::Client;
+use crate::base_path::address;
 use crate::error::{ApiError, Problem};
 use crate::file_response::{FileFacts, file_response};
 use crate::path::Path;
 use crate::resource::{self, Deletion, Resource};
 use crate::state::AppState;
 use crate::views::{CheckpointList, CheckpointView, JobView};
-use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Redirect, Response};
+use axum::{Extension, Json};
 use meniscus_jobs::service::store::{CheckpointRow, JobRow, Store, StoreError};
 use meniscus_jobs::spec::attempt_files::HDF5_MEDIA_TYPE;
 use meniscus_jobs::spec::attempt_files::attempt_directory;
@@ -26,8 +28,12 @@ pub async fn list(State(state): State<AppState>, Path(id): Path<String>) -> Resu
 /// Requests a checkpoint at the end of the current step.
 #[utoipa::path(post, path = "/v1/jobs/{id}/checkpoints", operation_id = "request_checkpoint", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn request(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    let row = resource::find::<JobRow>(&state, id).await?;
+pub async fn request(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    let row = resource::find_own::<JobRow>(&state, &client, id).await?;
     if row.state != JobState::Running {
         let why = format!("The job is {}. Only running jobs write checkpoints.", row.state.word());
         return Err(ApiError::Conflict(why));
@@ -42,7 +48,7 @@ pub async fn request(State(state): State<AppState>, Path(id): Path<String>) -> R
 pub async fn latest(State(state): State<AppState>, Path(id): Path<String>) -> Result<Redirect, ApiError> {
     let rows = checkpoints_of(&state, id).await?;
     let newest = rows.first().ok_or(ApiError::NotFound("checkpoint"))?;
-    Ok(Redirect::temporary(&format!("/v1/checkpoints/{}/content", newest.id)))
+    Ok(Redirect::temporary(&address(&format!("/v1/checkpoints/{}/content", newest.id))))
 }
 
 /// The checkpoints of a job, newest first.
@@ -62,6 +68,10 @@ impl Resource for CheckpointRow {
 
     fn find(store: &Store, id: &str) -> Result<Option<Self>, StoreError> {
         store.checkpoint(id)
+    }
+
+    fn owner(&self, store: &Store) -> Result<Option<String>, StoreError> {
+        Ok(store.job(&self.job)?.and_then(|job| job.owner))
     }
 
     /// A download that is in progress keeps its file open and completes.
@@ -88,8 +98,12 @@ pub async fn get(State(state): State<AppState>, Path(id): Path<String>) -> Resul
 /// Deletes a checkpoint of a job that has ended, unless an unfinished job restarts from it.
 #[utoipa::path(delete, path = "/v1/checkpoints/{id}", operation_id = "delete_checkpoint", tag = "checkpoints", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    resource::delete::<CheckpointRow>(&state, id).await
+pub async fn delete(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, ApiError> {
+    resource::delete::<CheckpointRow>(&state, &client, id).await
 }
 
 /// The file of a checkpoint, or a part of it.

@@ -8,7 +8,7 @@ use crate::state::AppState;
 use crate::views::{EventList, EventView};
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::sse::{Event as SseEvent, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use meniscus_jobs::service::store::{JobRow, Store, StudyRow};
@@ -109,7 +109,9 @@ async fn answer(state: AppState, source: Source, query: EventQuery, headers: &He
     let limit = query.limit.unwrap_or(PAGE.0).clamp(1, PAGE.1);
     let has_ended = source.has_ended(&state).await?;
     if text(header::ACCEPT.as_str()).is_some_and(|accept| accept.contains("text/event-stream")) {
-        let after = text(LAST_EVENT_ID).map(last_event_id).transpose()?.or(query.after).unwrap_or(0);
+        // A client that has received nothing yet may send an empty header.
+        let last = text(LAST_EVENT_ID).filter(|text| !text.trim().is_empty());
+        let after = last.map(last_event_id).transpose()?.or(query.after).unwrap_or(0);
         if has_ended && source.page(&state, after, 1).await?.is_empty() {
             return Ok(StatusCode::NO_CONTENT.into_response());
         }
@@ -140,7 +142,9 @@ fn stream(state: AppState, source: Source, after: u64) -> Response {
         metrics::gauge!("meniscus_event_streams").decrement(1.0);
     });
     let keep_alive = KeepAlive::new().interval(Duration::from_secs(15));
-    Sse::new(ReceiverStream::new(receiver)).keep_alive(keep_alive).into_response()
+    // Proxies hold answers back until they are whole, unless they are told not to.
+    let unbuffered = [(HeaderName::from_static("x-accel-buffering"), HeaderValue::from_static("no"))];
+    (unbuffered, Sse::new(ReceiverStream::new(receiver)).keep_alive(keep_alive)).into_response()
 }
 
 /// Sends existing events and waits for new ones, until all jobs have ended, the client disconnects, or the service stops.

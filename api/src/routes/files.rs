@@ -1,5 +1,6 @@
 //! The published files of a job.
 
+use crate::archive::{self, Content, Entry};
 use crate::error::{ApiError, Problem};
 use crate::file_response::{FileFacts, bytes_response, file_response};
 use crate::path::Path;
@@ -7,15 +8,13 @@ use crate::resource;
 use crate::state::AppState;
 use crate::views::{FileList, FileView};
 use axum::Json;
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::Response;
 use meniscus_jobs::service::store::{FileRow, JobRow, Store};
 use meniscus_jobs::spec::attempt_files::attempt_directory;
-use std::io::{self, Write};
-use std::path::{self, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
@@ -71,48 +70,19 @@ pub async fn get(
     responses((status = 200, content_type = "application/x-tar"), (status = 404, body = Problem)))]
 pub async fn tar(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
     let files = files_of(&state, &id).await?;
-    let places: Vec<(FileRow, PathBuf)> = files.into_iter().map(|f| (f.clone(), location(&state, &id, &f))).collect();
-    // A slow reader occupies a thread, so the number of archives is limited.
-    let permit = Arc::clone(&state.archives).try_acquire_owned().map_err(|_| ApiError::Busy)?;
-    let (sender, receiver) = mpsc::channel::<Result<Bytes, io::Error>>(8);
-    let top = id.clone();
-    tokio::task::spawn_blocking(move || {
-        let _permit = permit;
-        let mut archive = ::tar::Builder::new(ChannelWriter(sender.clone()));
-        archive.mode(::tar::HeaderMode::Deterministic);
-        let written = places
-            .iter()
-            .try_for_each(|(file, place)| append(&mut archive, &format!("{top}/{}", file.path), file, place))
-            .and_then(|()| archive.finish());
-        if let Err(error) = written {
-            // The broken stream tells the client that the archive is incomplete.
-            let _ = sender.blocking_send(Err(error));
-        }
-    });
+    let entry = |file: FileRow| Entry {
+        name: format!("{id}/{}", file.path),
+        content: match &file.content {
+            Some(text) => Content::Text(text.clone()),
+            None => Content::File(location(&state, &id, &file)),
+        },
+    };
+    let entries = files.into_iter().map(entry).collect();
+    let (sender, receiver) = mpsc::channel(8);
+    tokio::spawn(archive::send(entries, sender));
     Response::builder()
         .header(header::CONTENT_TYPE, "application/x-tar")
         .header(header::CONTENT_DISPOSITION, format!("attachment; filename=\"{id}.tar\""))
         .body(Body::from_stream(ReceiverStream::new(receiver)))
         .map_err(|error| ApiError::Internal(error.to_string()))
-}
-
-fn append<W: Write>(archive: &mut ::tar::Builder<W>, name: &str, file: &FileRow, place: &path::Path) -> io::Result<()> {
-    let Some(content) = &file.content else { return archive.append_path_with_name(place, name) };
-    let mut header = ::tar::Header::new_gnu();
-    header.set_size(content.len() as u64);
-    header.set_mode(0o644);
-    archive.append_data(&mut header, name, content.as_bytes())
-}
-
-struct ChannelWriter(mpsc::Sender<Result<Bytes, io::Error>>);
-
-impl Write for ChannelWriter {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let sent = self.0.blocking_send(Ok(Bytes::copy_from_slice(bytes)));
-        sent.map(|()| bytes.len()).map_err(|_| io::Error::from(io::ErrorKind::BrokenPipe))
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }

@@ -1,9 +1,11 @@
 //! Jobs: submit, list, get, delete, cancel, pause, resume.
 
+use crate::access::{Client, ME};
+use crate::base_path::address;
 use crate::creation::{Creation, check_capacity};
 use crate::error::{ApiError, Problem};
 use crate::idempotency::stored_response;
-use crate::pagination::PageSize;
+use crate::pagination::{Cursor, PageSize};
 use crate::path::Path;
 use crate::query::QueryParameters;
 use crate::resource::{self, Deletion, Resource};
@@ -11,11 +13,11 @@ use crate::response_cache::Version;
 use crate::state::AppState;
 use crate::store_sources::StoreSources;
 use crate::views::{JobList, JobView};
-use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use meniscus_jobs::service::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store, StoreError};
 use meniscus_jobs::spec::health::HealthStatus;
 use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
@@ -46,9 +48,11 @@ pub async fn submit(State(state): State<AppState>, request: Request) -> Result<R
         let body = StoreSources::new(store).resolve(&spec, here.config.allowance(), &store.calibration()?)?;
         check_capacity(&here, store, 1, body.forecast.disk_bytes)?;
         let answer = |row: JobRow| {
-            stored_response(StatusCode::CREATED, Some(format!("/v1/jobs/{}", row.id)), &JobView::from(row))
+            stored_response(StatusCode::CREATED, Some(address(&format!("/v1/jobs/{}", row.id))), &JobView::from(row))
         };
-        creation.respond(store.submit(NewJob::from_body(&body), creation.keyed.clone(), answer)?)
+        let mut job = NewJob::from_body(&body);
+        job.owner.clone_from(&creation.owner);
+        creation.respond(store.submit(job, creation.keyed.clone(), answer)?)
     };
     let response = state.with_store(work).await?;
     state.supervisor.wake();
@@ -66,6 +70,10 @@ impl Resource for JobRow {
 
     fn find(store: &Store, id: &str) -> Result<Option<Self>, StoreError> {
         store.job(id)
+    }
+
+    fn owner(&self, _: &Store) -> Result<Option<String>, StoreError> {
+        Ok(self.owner.clone())
     }
 
     fn delete(&self, store: &Store) -> Result<Deletion, StoreError> {
@@ -94,6 +102,8 @@ pub struct JobQuery {
     study: Option<String>,
     /// Name, exactly.
     name: Option<String>,
+    /// Name of the token that made it; `me` for the client's own.
+    owner: Option<String>,
     /// Value of the label KEY, exactly.
     #[serde(default, rename = "label.KEY")]
     #[param(value_type = Option<String>)]
@@ -113,7 +123,8 @@ pub struct JobQuery {
     #[param(value_type = Option<u64>, minimum = 1, maximum = 500, default = 50)]
     limit: PageSize,
     /// `next` of the page before.
-    cursor: Option<String>,
+    #[param(value_type = Option<String>)]
+    cursor: Option<Cursor>,
 }
 
 /// Order of a list of jobs.
@@ -174,12 +185,13 @@ impl From<JobQuery> for JobFilter {
             kind: query.kind,
             study: query.study,
             name: query.name,
+            owner: query.owner,
             labels: query.labels.0,
             created_after: query.created_after.map(|time| time.0),
             created_before: query.created_before.map(|time| time.0),
             oldest_first: query.sort == Sort::OldestFirst,
             limit: 0,
-            cursor: query.cursor,
+            cursor: query.cursor.map(|cursor| cursor.0),
         }
     }
 }
@@ -189,21 +201,31 @@ impl From<JobQuery> for JobFilter {
     responses((status = 200, body = JobList, headers(("Link" = String))), (status = 422, body = Problem)))]
 pub async fn list(
     State(state): State<AppState>,
+    Extension(client): Extension<Client>,
     uri: Uri,
     QueryParameters(query): QueryParameters<JobQuery>,
 ) -> Result<Response, ApiError> {
-    page(&state, &uri, query).await
+    page(&state, &client, &uri, query).await
 }
 
 /// A page of the jobs that a query selects.
-pub(super) async fn page(state: &AppState, uri: &Uri, query: JobQuery) -> Result<Response, ApiError> {
+pub(super) async fn page(state: &AppState, client: &Client, uri: &Uri, query: JobQuery) -> Result<Response, ApiError> {
     let size = query.limit;
-    let filter = JobFilter::from(query);
+    let filter = query.filter(client);
     let read = move |store: &Store, limit| store.list(&JobFilter { limit, ..filter });
     resource::page::<JobRow, JobList>(state, uri, size, read).await
 }
 
 impl JobQuery {
+    /// The filter that the query means for a client.
+    pub(super) fn filter(self, client: &Client) -> JobFilter {
+        let mut filter = JobFilter::from(self);
+        if filter.owner.as_deref() == Some(ME) {
+            filter.owner = Some(client.name.clone());
+        }
+        filter
+    }
+
     /// The same query, of the jobs of one study.
     pub(super) fn with_study(self, study: &str) -> Self {
         Self { study: Some(study.to_owned()), ..self }
@@ -215,9 +237,14 @@ fn tag((rev, progress): Version) -> String {
     format!("\"{rev}-{progress}\"")
 }
 
+/// Whether one of the tags of `If-None-Match` is this one. The comparison is weak, as its standard says.
+fn matches_tag(known: &str, tag: &str) -> bool {
+    known.trim() == "*" || known.split(',').any(|one| one.trim().trim_start_matches("W/") == tag)
+}
+
 /// The revision of a tag `"REV-PROGRESS"`.
-fn tag_revision(tag: &str) -> Option<i64> {
-    tag.trim_start_matches("W/").trim_matches('"').split('-').next()?.parse().ok()
+pub(super) fn tag_revision(tag: &str) -> Option<i64> {
+    tag.trim().trim_start_matches("W/").trim_matches('"').split('-').next()?.parse().ok()
 }
 
 /// A job. With `If-None-Match` the answer is 304 if nothing has changed. With `Prefer: wait=N` as well, the answer comes
@@ -250,7 +277,7 @@ pub async fn get(
             }
         }
         version = read_version()?;
-    } else if known.as_deref() == Some(tag(version).as_str()) {
+    } else if known.as_deref().is_some_and(|known| matches_tag(known, &tag(version))) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag(version))]).into_response());
     }
     if let Some(bytes) = state.response_cache.get(&id, version) {
@@ -270,18 +297,24 @@ fn serialized(version: Version, bytes: Bytes) -> Response {
 /// Deletes a job that has ended, with its files. Never cancels.
 #[utoipa::path(delete, path = "/v1/jobs/{id}", operation_id = "delete_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    resource::delete::<JobRow>(&state, id).await
+pub async fn delete(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, ApiError> {
+    resource::delete::<JobRow>(&state, &client, id).await
 }
 
 /// Applies a trigger. A job that is already in the state that follows stays as it is.
 async fn request(
     state: &AppState,
+    client: &Client,
     id: String,
     trigger: Trigger,
     reason: Option<Reason>,
     already: &'static [JobState],
 ) -> Result<Response, ApiError> {
+    resource::find_own::<JobRow>(state, client, id.clone()).await?;
     let change = Change { reason, ..Change::default() };
     let work = move |store: &Store| match store.change(&id, trigger, &change) {
         Err(ChangeError::Illegal(state, _)) if already.contains(&state) => {
@@ -302,22 +335,34 @@ async fn request(
 /// Cancels a job. Repeating the request changes nothing.
 #[utoipa::path(post, path = "/v1/jobs/{id}/cancel", operation_id = "cancel_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn cancel(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
+pub async fn cancel(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
     let already = &[JobState::Canceling, JobState::Canceled];
-    request(&state, id, Trigger::Cancel, Some(Reason::UserCancel), already).await
+    request(&state, &client, id, Trigger::Cancel, Some(Reason::UserCancel), already).await
 }
 
 /// Pauses a job after a checkpoint at the end of its step. Repeating the request changes nothing.
 #[utoipa::path(post, path = "/v1/jobs/{id}/pause", operation_id = "pause_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn pause(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
+pub async fn pause(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
     let already = &[JobState::Pausing, JobState::Paused];
-    request(&state, id, Trigger::Pause, Some(Reason::UserPause), already).await
+    request(&state, &client, id, Trigger::Pause, Some(Reason::UserPause), already).await
 }
 
 /// Returns a paused job to the queue. Repeating the request changes nothing.
 #[utoipa::path(post, path = "/v1/jobs/{id}/resume", operation_id = "resume_job", tag = "jobs", params(("id" = String, Path)),
     responses((status = 202, body = JobView), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn resume(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    request(&state, id, Trigger::Resume, None, &[JobState::Queued, JobState::Running]).await
+pub async fn resume(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    request(&state, &client, id, Trigger::Resume, None, &[JobState::Queued, JobState::Running]).await
 }

@@ -1,5 +1,6 @@
 //! Version, limits and health of the service.
 
+use crate::base_path::address;
 use crate::error::{ApiError, Problem};
 use crate::routes::jobs::BODY_LIMIT;
 use crate::routes::studies;
@@ -27,13 +28,14 @@ pub async fn index(State(state): State<AppState>) -> Json<ServiceView> {
             upload_bytes: state.config.upload_bytes,
         },
         links: BTreeMap::from([
-            ("scenes", "/v1/scenes"),
-            ("estimates", "/v1/estimates"),
-            ("jobs", "/v1/jobs"),
-            ("studies", "/v1/studies"),
-            ("uploads", "/v1/uploads"),
-            ("metrics", "/metrics"),
-            ("openapi", "/openapi.json"),
+            ("scenes", address("/v1/scenes")),
+            ("estimates", address("/v1/estimates")),
+            ("jobs", address("/v1/jobs")),
+            ("studies", address("/v1/studies")),
+            ("uploads", address("/v1/uploads")),
+            ("metrics", address("/metrics")),
+            ("openapi", address("/openapi.json")),
+            ("tickets", address("/v1/tickets")),
         ]),
     })
 }

@@ -1,6 +1,8 @@
 //! Studies: sweeps of jobs as one object.
 
 use crate::accept;
+use crate::access::Client;
+use crate::base_path::address;
 use crate::creation::{Creation, check_capacity};
 use crate::error::{ApiError, Problem};
 use crate::idempotency::stored_response;
@@ -12,11 +14,11 @@ use crate::routes::jobs::{self, JobQuery};
 use crate::state::AppState;
 use crate::store_sources::StoreSources;
 use crate::views::{DryRunView, JobList, StudyList, StudyView};
-use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use meniscus_jobs::service::store::{Change, NewJob, Store, StoreError, StudyRow};
+use axum::{Extension, Json};
+use meniscus_jobs::service::store::{Change, NewJob, NewStudy, Store, StoreError, StudyRow};
 use meniscus_jobs::service::{study_report, study_table};
 use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
 use meniscus_jobs::spec::study;
@@ -66,10 +68,11 @@ pub async fn submit(
         }
         check_capacity(&here, store, study.jobs.len() as u64, study.total.disk_bytes)?;
         let answer = |row: &StudyRow| {
-            let location = format!("/v1/studies/{}", row.id);
+            let location = address(&format!("/v1/studies/{}", row.id));
             stored_response(StatusCode::CREATED, Some(location), &StudyView::from(row.clone()))
         };
-        creation.respond(store.make_study(study.into(), creation.keyed.as_ref(), answer)?)
+        let study = NewStudy { owner: creation.owner.clone(), ..study.into() };
+        creation.respond(store.make_study(study, creation.keyed.as_ref(), answer)?)
     };
     let response = state.with_store(work).await?;
     state.supervisor.wake();
@@ -90,6 +93,10 @@ impl Resource for StudyRow {
         store.study(id)
     }
 
+    fn owner(&self, _: &Store) -> Result<Option<String>, StoreError> {
+        Ok(self.owner.clone())
+    }
+
     fn delete(&self, store: &Store) -> Result<Deletion, StoreError> {
         if store.delete_study(&self.id)? {
             return Ok(Deletion::Done);
@@ -106,7 +113,7 @@ pub async fn list(
     uri: Uri,
     QueryParameters(query): QueryParameters<PageQuery>,
 ) -> Result<Response, ApiError> {
-    let read = move |store: &Store, limit| store.studies(query.cursor.as_deref(), limit);
+    let read = move |store: &Store, limit| store.studies(query.cursor.as_ref().map(|cursor| cursor.0.as_str()), limit);
     resource::page::<StudyRow, StudyList>(&state, &uri, query.limit, read).await
 }
 
@@ -120,8 +127,12 @@ pub async fn get(State(state): State<AppState>, Path(id): Path<String>) -> Resul
 /// Deletes a study whose jobs have all ended, with those jobs and their files. Never cancels.
 #[utoipa::path(delete, path = "/v1/studies/{id}", operation_id = "delete_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Result<StatusCode, ApiError> {
-    resource::delete::<StudyRow>(&state, id).await
+pub async fn delete(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<StatusCode, ApiError> {
+    resource::delete::<StudyRow>(&state, &client, id).await
 }
 
 /// A page of the jobs of a study, including repeated ones. Filters and pages are those of `GET /v1/jobs`.
@@ -129,12 +140,13 @@ pub async fn delete(State(state): State<AppState>, Path(id): Path<String>) -> Re
     responses((status = 200, body = JobList, headers(("Link" = String))), (status = 404, body = Problem), (status = 422, body = Problem)))]
 pub async fn jobs_of(
     State(state): State<AppState>,
+    Extension(client): Extension<Client>,
     Path(id): Path<String>,
     uri: Uri,
     QueryParameters(query): QueryParameters<JobQuery>,
 ) -> Result<Response, ApiError> {
     let row = resource::find::<StudyRow>(&state, id).await?;
-    jobs::page(&state, &uri, query.with_study(&row.id)).await
+    jobs::page(&state, &client, &uri, query.with_study(&row.id)).await
 }
 
 /// Which rows of a table.
@@ -205,8 +217,14 @@ pub async fn report(
 }
 
 /// Applies a trigger to all jobs of a study that it concerns.
-async fn request(state: &AppState, id: String, trigger: Trigger, reason: Option<Reason>) -> Result<Response, ApiError> {
-    let row = resource::find::<StudyRow>(state, id).await?;
+async fn request(
+    state: &AppState,
+    client: &Client,
+    id: String,
+    trigger: Trigger,
+    reason: Option<Reason>,
+) -> Result<Response, ApiError> {
+    let row = resource::find_own::<StudyRow>(state, client, id).await?;
     let work = move |store: &Store| {
         store.change_study(&row.id, trigger, &Change { reason, ..Change::default() })?;
         store.study(&row.id)?.ok_or(ApiError::NotFound("study"))
@@ -219,22 +237,34 @@ async fn request(state: &AppState, id: String, trigger: Trigger, reason: Option<
 /// Cancels every job of a study that has not ended. Repeating the request changes nothing.
 #[utoipa::path(post, path = "/v1/studies/{id}/cancel", operation_id = "cancel_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 202, body = StudyView), (status = 404, body = Problem)))]
-pub async fn cancel(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    request(&state, id, Trigger::Cancel, Some(Reason::UserCancel)).await
+pub async fn cancel(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    request(&state, &client, id, Trigger::Cancel, Some(Reason::UserCancel)).await
 }
 
 /// Pauses every queued or running job of a study. Repeating the request changes nothing.
 #[utoipa::path(post, path = "/v1/studies/{id}/pause", operation_id = "pause_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 202, body = StudyView), (status = 404, body = Problem)))]
-pub async fn pause(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    request(&state, id, Trigger::Pause, Some(Reason::UserPause)).await
+pub async fn pause(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    request(&state, &client, id, Trigger::Pause, Some(Reason::UserPause)).await
 }
 
 /// Returns every paused job of a study to the queue. Repeating the request changes nothing.
 #[utoipa::path(post, path = "/v1/studies/{id}/resume", operation_id = "resume_study", tag = "studies", params(("id" = String, Path)),
     responses((status = 202, body = StudyView), (status = 404, body = Problem)))]
-pub async fn resume(State(state): State<AppState>, Path(id): Path<String>) -> Result<Response, ApiError> {
-    request(&state, id, Trigger::Resume, None).await
+pub async fn resume(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    request(&state, &client, id, Trigger::Resume, None).await
 }
 
 /// Creates new jobs for points that failed, and for points that were canceled because another point failed. A point whose
@@ -245,10 +275,11 @@ pub async fn resume(State(state): State<AppState>, Path(id): Path<String>) -> Re
         (status = 429, body = Problem), (status = 507, body = Problem)))]
 pub async fn retry(
     State(state): State<AppState>,
+    Extension(client): Extension<Client>,
     Path(id): Path<String>,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let row = resource::find::<StudyRow>(&state, id).await?;
+    let row = resource::find_own::<StudyRow>(&state, &client, id).await?;
     let mut creation = Creation::receive(&state, request, BODY_LIMIT).await?;
     let here = state.clone();
     let work = move |store: &Store| {
@@ -280,6 +311,7 @@ fn new_jobs(state: &AppState, store: &Store, study: &StudyRow) -> Result<Vec<New
         let mut job = NewJob::from_body(&body);
         job.study = Some((study.id.clone(), point.index));
         job.retry_of = Some(point.job);
+        job.owner.clone_from(&study.owner);
         new.push(job);
     }
     Ok(new)

@@ -1,6 +1,7 @@
 //! Uploads: checkpoints, points, surfaces and query points as files.
 
 use crate::access::Client;
+use crate::base_path::address;
 use crate::creation::{free_bytes, spend};
 use crate::error::{ApiError, Problem};
 use crate::idempotency::{self, stored_response};
@@ -11,12 +12,12 @@ use crate::request_body::announced_length;
 use crate::resource::{self, Deletion, Resource};
 use crate::state::AppState;
 use crate::views::{UploadList, UploadView};
-use axum::Json;
 use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::request::Parts;
 use axum::http::{StatusCode, Uri, header};
 use axum::response::Response;
+use axum::{Extension, Json};
 use meniscus_jobs::service::store::uploads::CONTENT;
 use meniscus_jobs::service::store::{Made, NewUpload, Store, StoreError, UploadRow};
 use meniscus_jobs::spec::uploads::Purpose;
@@ -81,7 +82,7 @@ pub async fn submit(
             key.map(|key| idempotency::keyed_request(client, key, &[b"POST", target.as_bytes(), sha256.as_bytes()]));
         let upload = NewUpload { id, purpose: query.r#as, name, size_bytes, sha256, owner };
         let answer = |row: &UploadRow| {
-            let location = format!("/v1/uploads/{}", row.id);
+            let location = address(&format!("/v1/uploads/{}", row.id));
             stored_response(StatusCode::CREATED, Some(location), &UploadView::from(row.clone()))
         };
         Ok(store.make_upload(&upload, keyed.as_ref(), answer)?)
@@ -185,6 +186,10 @@ impl Resource for UploadRow {
         store.upload(id)
     }
 
+    fn owner(&self, _: &Store) -> Result<Option<String>, StoreError> {
+        Ok(self.owner.clone())
+    }
+
     fn delete(&self, store: &Store) -> Result<Deletion, StoreError> {
         if store.delete_upload(&self.id)? {
             return Ok(Deletion::Done);
@@ -202,7 +207,7 @@ pub async fn list(
     uri: Uri,
     QueryParameters(query): QueryParameters<PageQuery>,
 ) -> Result<Response, ApiError> {
-    let read = move |store: &Store, limit| store.uploads(query.cursor.as_deref(), limit);
+    let read = move |store: &Store, limit| store.uploads(query.cursor.as_ref().map(|cursor| cursor.0.as_str()), limit);
     resource::page::<UploadRow, UploadList>(&state, &uri, query.limit, read).await
 }
 
@@ -216,6 +221,10 @@ pub async fn get(State(state): State<AppState>, UrlPath(id): UrlPath<String>) ->
 /// Deletes an upload that no unfinished job uses.
 #[utoipa::path(delete, path = "/v1/uploads/{id}", operation_id = "delete_upload", tag = "uploads", params(("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem), (status = 409, body = Problem)))]
-pub async fn delete(State(state): State<AppState>, UrlPath(id): UrlPath<String>) -> Result<StatusCode, ApiError> {
-    resource::delete::<UploadRow>(&state, id).await
+pub async fn delete(
+    State(state): State<AppState>,
+    Extension(client): Extension<Client>,
+    UrlPath(id): UrlPath<String>,
+) -> Result<StatusCode, ApiError> {
+    resource::delete::<UploadRow>(&state, &client, id).await
 }

@@ -1,6 +1,7 @@
 //! Views of studies, uploads and estimates.
 
 use super::FindingView;
+use crate::base_path::address;
 use meniscus_jobs::service::store::{StudyRow, UploadRow};
 use meniscus_jobs::spec::body::JobBody;
 use meniscus_jobs::spec::states::State;
@@ -38,6 +39,8 @@ pub struct StudyView {
     pub on_failure: String,
     /// Estimate of all points together.
     pub estimate: Value,
+    /// Name of the token that made it; null without tokens.
+    pub owner: Option<String>,
     /// Time of creation (RFC 3339, UTC).
     pub created_at: String,
     /// Addresses of related resources.
@@ -77,6 +80,8 @@ pub struct UploadView {
     pub size_bytes: u64,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
+    /// Name of the token that made it; null without tokens.
+    pub owner: Option<String>,
     /// Time of creation (RFC 3339, UTC).
     pub created_at: String,
     /// Time at which the examination ended (RFC 3339, UTC).
@@ -168,7 +173,7 @@ impl From<StudyRow> for StudyView {
             counts.insert("deleted".to_owned(), deleted);
         }
         let parts = ["jobs", "events", "table", "report", "cancel", "pause", "resume", "retry"];
-        let links = super::links(format!("/v1/studies/{}", row.id), &parts);
+        let links = super::links(address(&format!("/v1/studies/{}", row.id)), &parts);
         Self {
             state: state_of(&row.counts),
             fraction: (ended + deleted) as f64 / row.points.max(1) as f64,
@@ -183,6 +188,7 @@ impl From<StudyRow> for StudyView {
             max_parallel: row.max_parallel,
             on_failure: row.on_failure,
             estimate: serde_json::json!(row.forecast),
+            owner: row.owner,
             created_at: row.created_at,
             links,
         }
@@ -191,7 +197,7 @@ impl From<StudyRow> for StudyView {
 
 impl From<UploadRow> for UploadView {
     fn from(row: UploadRow) -> Self {
-        let links = BTreeMap::from([("self", format!("/v1/uploads/{}", row.id))]);
+        let links = BTreeMap::from([("self", address(&format!("/v1/uploads/{}", row.id)))]);
         Self {
             id: row.id,
             r#as: row.purpose.word(),
@@ -201,6 +207,7 @@ impl From<UploadRow> for UploadView {
             name: row.name,
             size_bytes: row.size_bytes,
             sha256: row.sha256,
+            owner: row.owner,
             created_at: row.created_at,
             checked_at: row.checked_at,
             links,

@@ -100,14 +100,16 @@ impl DataDirectory {
     pub fn open(path: &Path) -> Result<Self, DataDirectoryError> {
         let failed = |error| DataDirectoryError::Io { path: path.to_owned(), error };
         match std::fs::create_dir_all(path) {
-            Err(_) if path.exists() && !path.is_dir() => return Err(DataDirectoryError::NotADirectory(path.to_owned())),
+            Err(_) if path.exists() && !path.is_dir() => {
+                return Err(DataDirectoryError::NotADirectory(path.to_owned()));
+            }
             made => made.map_err(failed)?,
         }
         // Workers get paths that do not depend on a current directory.
         let path = std::fs::canonicalize(path).map_err(failed)?;
         let marker = recognize(&path)?;
-        let lock = DirectoryLock::take(&path)
-            .map_err(|cause| DataDirectoryError::Lock { directory: path.clone(), cause })?;
+        let lock =
+            DirectoryLock::take(&path).map_err(|cause| DataDirectoryError::Lock { directory: path.clone(), cause })?;
         mark(&path, marker)?;
         Ok(Self { path, _lock: lock })
     }
@@ -154,7 +156,8 @@ fn recognize(directory: &Path) -> Result<Option<Marker>, DataDirectoryError> {
     if is_our_database(&directory.join(store::FILE_NAME)) {
         return Ok(None);
     }
-    let found = foreign_entries(directory).map_err(|error| DataDirectoryError::Io { path: directory.to_owned(), error })?;
+    let found =
+        foreign_entries(directory).map_err(|error| DataDirectoryError::Io { path: directory.to_owned(), error })?;
     match found {
         None => Ok(None),
         Some(found) => Err(DataDirectoryError::NotOurs { directory: directory.to_owned(), found }),

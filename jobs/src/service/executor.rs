@@ -111,6 +111,9 @@ pub enum NotStarted {
     /// The system failed.
     #[error("{0}")]
     System(io::Error),
+    /// The job that it continues has no checkpoint any more.
+    #[error("the job that it continues has no checkpoint")]
+    NoCheckpoint,
     /// The job cannot be read from the store.
     #[error("{0}")]
     Unreadable(String),

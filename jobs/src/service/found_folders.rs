@@ -166,8 +166,7 @@ pub fn set_aside_so_far(directory: &Path) -> io::Result<Vec<PathBuf>> {
     if !place.is_dir() {
         return Ok(Vec::new());
     }
-    let mut all: Vec<PathBuf> =
-        std::fs::read_dir(place)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()?;
+    let mut all: Vec<PathBuf> = std::fs::read_dir(place)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()?;
     all.sort();
     Ok(all)
 }
@@ -182,7 +181,8 @@ fn folders_of_ours(parent: &Path, prefix: &str) -> io::Result<Vec<PathBuf>> {
     for entry in entries {
         let entry = entry?;
         let name = entry.file_name();
-        let number = name.to_str().and_then(|name| name.strip_prefix(prefix)).and_then(|rest| rest.parse::<Ulid>().ok());
+        let number =
+            name.to_str().and_then(|name| name.strip_prefix(prefix)).and_then(|rest| rest.parse::<Ulid>().ok());
         if number.is_some() && entry.file_type()?.is_dir() {
             folders.push(entry.path());
         }

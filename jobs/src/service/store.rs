@@ -7,6 +7,7 @@ mod adoption;
 pub mod idempotency;
 pub mod calibration;
 mod deletion;
+mod dependencies;
 pub mod statistics;
 pub mod events;
 pub mod ids;
@@ -34,12 +35,12 @@ pub use submission::{NewJob, START_CHECKPOINT};
 pub use transitions::{Change, ChangeError};
 pub use uploads::{NewUpload, UploadRow};
 
-use crate::spec::body::{Origin, RestartSource, resolved_scene};
+use crate::spec::body::{JobSource, Origin, RestartSource, resolved_scene};
 use crate::spec::states::State;
 use ids::RisingIds;
-use service_clock::ServiceClock;
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
+use service_clock::ServiceClock;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -295,6 +296,17 @@ impl Store {
         let Some(job) = rows::job(&connection, &row.job)? else { return Ok(None) };
         let (origin, scene) = (Origin::Checkpoint(row.id), resolved_scene(&job.resolved)?);
         Ok(Some(RestartSource { origin, scene, isa: row.isa, step: row.step }))
+    }
+
+    /// What a body that names a job needs to know of it; None where there is no such job.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn job_source(&self, id: &str) -> Result<Option<JobSource>, StoreError> {
+        let Some(row) = self.job(id)? else { return Ok(None) };
+        let newest = self.checkpoints(id)?.into_iter().next();
+        let checkpoint = newest.map(|newest| self.restart_source(&newest.id)).transpose()?.flatten();
+        Ok(Some(JobSource { state: row.state, scene: resolved_scene(&row.resolved)?, checkpoint }))
     }
 
     /// Deletes a job in a terminal state and its files; false where it is in another state.

@@ -1,12 +1,16 @@
 //! The body of a job: as a client writes it, and with every default.
 
+mod amendment;
 mod fields;
+mod predecessors;
 mod restart;
 mod sources;
 
+pub use amendment::{Amended, AmendmentSpec, amend};
 pub use fields::{Labels, Name, Priority};
+pub use predecessors::JobIds;
 pub use restart::RestartSpec;
-pub use sources::{BodyError, NoSources, Origin, RestartSource, Sources};
+pub use sources::{BodyError, JobSource, NoSources, Origin, RestartSource, Sources};
 
 use crate::spec::forecast::{self, Forecast, WORKER_BASE_BYTES};
 use crate::spec::run_options::{CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions};
@@ -36,6 +40,8 @@ meniscus::group! {
         limits: Option<LimitsSpec>;
         /// rank in the queue: higher goes first
         priority: Option<Priority>;
+        /// ids of jobs that must have succeeded before this one starts
+        after: Option<JobIds>;
     }
 }
 
@@ -107,6 +113,8 @@ pub struct JobBody {
     pub origin: Option<Origin>,
     /// The uploads that its scene names.
     pub uploads: Vec<String>,
+    /// Jobs that must have succeeded before it starts.
+    pub predecessors: Vec<String>,
 }
 
 /// From a client's JSON to a job.
@@ -140,6 +148,8 @@ pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Res
     if let (Some(source), Some(estimate)) = (&start.source, estimate) {
         errors.extend(check_end(source, &estimate));
     }
+    let mut predecessors = given.read(JobSpec::after()).flatten().unwrap_or_default().0;
+    predecessors::check(&predecessors, sources, &mut errors).map_err(BodyError::Lookup)?;
     let (Some(parsed), Some(scene), Some(estimate), Some(limits)) = (parsed, scene, estimate, limits) else {
         return Err(errors.into());
     };
@@ -157,7 +167,13 @@ pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Res
         priority: parsed.priority.unwrap_or_default().0,
     };
     let origin = start.source.map(|source| source.origin);
-    Ok(JobBody { spec: spec.clone(), kind: scene.kind().to_owned(), resolved, scene, forecast, origin, uploads })
+    if let Some(Origin::Job(job)) = &origin
+        && !predecessors.contains(job)
+    {
+        predecessors.push(job.clone());
+    }
+    let (spec, kind) = (spec.clone(), scene.kind().to_owned());
+    Ok(JobBody { spec, kind, resolved, scene, forecast, origin, uploads, predecessors })
 }
 
 /// Where the scene of a job comes from.

@@ -233,11 +233,15 @@ impl Reason {
     #[must_use]
     pub fn hint_without_checkpoint(self) -> &'static str {
         match self {
-            Self::UserPause => "paused on request before its first checkpoint; resumed, the job starts from the beginning",
+            Self::UserPause => {
+                "paused on request before its first checkpoint; resumed, the job starts from the beginning"
+            }
             Self::ServerRestart => {
                 "the service stopped before the first checkpoint of the job; it starts from the beginning"
             }
-            Self::WorkerEvicted => "the cluster took the node back before the first checkpoint; the job starts from the beginning",
+            Self::WorkerEvicted => {
+                "the cluster took the node back before the first checkpoint; the job starts from the beginning"
+            }
             other => other.hint(),
         }
     }

@@ -122,7 +122,8 @@ fn attempt(
     })?;
     let threads = options.threads();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| if process::is_shortage(&e) { Failure::Unstarted(e.to_string()) } else { internal(&e) })?;
+    let pool =
+        pool.map_err(|e| if process::is_shortage(&e) { Failure::Unstarted(e.to_string()) } else { internal(&e) })?;
     log.line(&format!("attempt {} of {} on {} threads", spec.epoch, spec.job, threads));
     // Time that a lost attempt spent after its checkpoint was spent all the same: the service's count leads.
     let mut progress = ProgressMeter::new(spec.usage, spec.time.clone());

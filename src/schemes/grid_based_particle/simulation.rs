@@ -147,12 +147,12 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
 
     fn measure(&mut self) -> Result<(), StepError> {
         let to = self.clock();
-            let Self { exact, ball, system, course, .. } = self;
-            let FrontConfig { grid, interrupt, .. } = &system.config;
-            let moment = Moment { feet: &system.feet, grid, time: to.time, interrupt };
-            let found = course.phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
-            self.errors.extend(found);
-            self.find_open_ends(to);
+        let Self { exact, ball, system, course, .. } = self;
+        let FrontConfig { grid, interrupt, .. } = &system.config;
+        let moment = Moment { feet: &system.feet, grid, time: to.time, interrupt };
+        let found = course.phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
+        self.errors.extend(found);
+        self.find_open_ends(to);
         self.measured_at = Some(to.time);
         Ok(())
     }

@@ -9,16 +9,28 @@ use std::time::{Duration, Instant};
 /// Jobs of a few seconds, each with one long part: a step, a measurement, a set-up, an output or an end.
 fn bodies() -> Vec<(&'static str, Value)> {
     vec![
-        ("measurement", json!({"scene": {"kind": "vortex", "spacing": 0.006, "end_time": 0.8}, "output": {"series_every_steps": 1}})),
-        ("frames", json!({"scene": {"kind": "vortex", "spacing": 0.03, "flow": "vortex_3d", "end_time": 0.2,
-            "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15}}, "output": {"every_time": 0.02}})),
+        (
+            "measurement",
+            json!({"scene": {"kind": "vortex", "spacing": 0.006, "end_time": 0.8}, "output": {"series_every_steps": 1}}),
+        ),
+        (
+            "frames",
+            json!({"scene": {"kind": "vortex", "spacing": 0.03, "flow": "vortex_3d", "end_time": 0.2,
+            "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15}}, "output": {"every_time": 0.02}}),
+        ),
         ("step", json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.03125, "repeat": 3}})),
         ("front", json!({"scene": {"kind": "front", "dimension": 2, "spacing": 0.01}})),
         ("droplet", json!({"scene": {"kind": "droplet", "spacing": 0.0625, "end_time": 0.5}})),
-        ("set-up", json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 60_000,
-            "problem": {"type": "laplace_beltrami", "field": "plane_wave"}}, "output": {"operators": "matrix_market"}})),
-        ("solve", json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 20_000,
-            "problem": {"type": "eigenvalues", "count": 20}}})),
+        (
+            "set-up",
+            json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 60_000,
+            "problem": {"type": "laplace_beltrami", "field": "plane_wave"}}, "output": {"operators": "matrix_market"}}),
+        ),
+        (
+            "solve",
+            json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 20_000,
+            "problem": {"type": "eigenvalues", "count": 20}}}),
+        ),
     ]
 }
 

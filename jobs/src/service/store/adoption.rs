@@ -39,7 +39,8 @@ impl Store {
                 tracing::warn!(job = spec.job, study, "the study of an adopted job is lost; the job stands alone");
                 job.study = None;
             }
-            let lost: Vec<String> = job.uploads.iter().filter(|id| !knows("uploads", id).unwrap_or(false)).cloned().collect();
+            let lost: Vec<String> =
+                job.uploads.iter().filter(|id| !knows("uploads", id).unwrap_or(false)).cloned().collect();
             job.uploads.retain(|id| !lost.contains(id));
             let place = submission::Place { id: &spec.job, clock_s };
             submission::insert(transaction, &place, &job, start.and_then(|start| start.sha256.as_deref()))?;
@@ -74,8 +75,8 @@ impl Store {
     /// Brings a waiting job to the attempt whose records are to be taken.
     fn begin_replay(&self, job: &str, attempt: u64) -> Result<(), StoreError> {
         let begun: Result<(), ChangeError> = self.write(|transaction| {
-            let paused: bool = transaction
-                .query_row("SELECT state = 'paused' FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
+            let paused: bool =
+                transaction.query_row("SELECT state = 'paused' FROM jobs WHERE id = ?1", [job], |row| row.get(0))?;
             if paused {
                 apply(transaction, job, Trigger::Resume, &Change::default())?;
             }

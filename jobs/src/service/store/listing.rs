@@ -17,6 +17,8 @@ pub struct JobFilter {
     pub study: Option<String>,
     /// With this name.
     pub name: Option<String>,
+    /// Made by this token.
+    pub owner: Option<String>,
     /// With this health.
     pub health: Option<HealthStatus>,
     /// With all these labels.
@@ -54,6 +56,7 @@ impl Store {
             ("kind = ?", &filter.kind),
             ("study = ?", &filter.study),
             ("name = ?", &filter.name),
+            ("owner = ?", &filter.owner),
             ("created_at > ?", &filter.created_after),
             ("created_at < ?", &filter.created_before),
             (if filter.oldest_first { "id > ?" } else { "id < ?" }, &filter.cursor),
@@ -75,7 +78,7 @@ impl Store {
         }
         let order = if filter.oldest_first { "ASC" } else { "DESC" };
         let sql =
-            format!("SELECT * FROM jobs WHERE {} ORDER BY id {order} LIMIT {}", conditions.join(" AND "), filter.limit);
+            rows::select_jobs(&format!("{} ORDER BY id {order} LIMIT {}", conditions.join(" AND "), filter.limit));
         let connection = self.read();
         let mut statement = connection.prepare_cached(&sql)?;
         let rows = statement.query_map(params_from_iter(values), rows::job_of)?;

@@ -200,6 +200,7 @@ const MIGRATIONS: &[&str] = &[
     ALTER TABLE uploads ADD COLUMN owner TEXT;
     CREATE INDEX jobs_by_owner ON jobs (owner, id) WHERE owner IS NOT NULL;
     ALTER TABLE jobs ADD COLUMN predecessors TEXT NOT NULL DEFAULT '[]';
+    ALTER TABLE jobs ADD COLUMN restart_job TEXT;
     CREATE TABLE dependencies (
         job TEXT NOT NULL,
         predecessor TEXT NOT NULL,

@@ -90,6 +90,10 @@ pub struct JobRow {
     pub owner: Option<String>,
     /// Jobs that it starts after.
     pub predecessors: Vec<String>,
+    /// How many of them have not succeeded yet.
+    pub waits_for: u64,
+    /// Job whose last checkpoint it begins with, which is taken when it starts.
+    pub restart_job: Option<String>,
     /// Errors and cost, once it has succeeded.
     pub results: Option<Results>,
 }
@@ -220,12 +224,21 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         retry_of: row.get("retry_of")?,
         owner: row.get("owner")?,
         predecessors: json(row, "predecessors")?,
+        waits_for: row.get::<_, i64>("waits_for")? as u64,
+        restart_job: row.get("restart_job")?,
         results: json(row, "results")?,
     })
 }
 
+/// A query of whole rows of jobs.
+pub(super) fn select_jobs(which: &str) -> String {
+    format!(
+        "SELECT jobs.*, (SELECT COUNT(*) FROM dependencies WHERE dependencies.job = jobs.id) AS waits_for FROM jobs WHERE {which}"
+    )
+}
+
 pub(super) fn job(connection: &Connection, id: &str) -> Result<Option<JobRow>, StoreError> {
-    Ok(connection.prepare_cached("SELECT * FROM jobs WHERE id = ?1")?.query_row([id], job_of).optional()?)
+    Ok(connection.prepare_cached(&select_jobs("id = ?1"))?.query_row([id], job_of).optional()?)
 }
 
 fn checkpoint_of(row: &Row) -> rusqlite::Result<CheckpointRow> {

@@ -23,8 +23,9 @@ impl ServiceClock {
     /// # Errors
     /// [`StoreError`].
     pub(super) fn open(connection: &Connection) -> Result<Self, StoreError> {
-        let (saved_s, wall_ms): (f64, i64) = connection
-            .query_row("SELECT seconds, wall_ms FROM service_clock", [], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        let (saved_s, wall_ms): (f64, i64) =
+            connection
+                .query_row("SELECT seconds, wall_ms FROM service_clock", [], |row| Ok((row.get(0)?, row.get(1)?)))?;
         let queue_s: Option<f64> = connection.query_row(
             "SELECT MAX(rank + priority * ?1) FROM jobs WHERE state = 'queued'",
             [super::submission::AGING_S],

@@ -1,7 +1,7 @@
 //! Making jobs: one, or all of a study, together with the answer to the request.
 
 use super::idempotency::{self, IdempotencyKey, Made, Receipt};
-use super::{JobRow, Store, StoreError, events, remove_directory, rows};
+use super::{JobRow, Store, StoreError, dependencies, events, remove_directory, rows};
 use crate::spec::attempt_files::attempt_directory;
 use crate::spec::attempt_spec::{AttemptSpec, Submission};
 use crate::spec::body::{JobBody, Origin, ResolvedBody};
@@ -9,6 +9,7 @@ use crate::spec::states::State;
 use rusqlite::{Transaction, params};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// A job to be made, as it will stand in the store.
 #[derive(Debug, Clone)]
@@ -33,6 +34,8 @@ pub struct NewJob {
     pub retry_of: Option<String>,
     /// Name of the token that makes it; None without tokens.
     pub owner: Option<String>,
+    /// Jobs that must have succeeded before it starts.
+    pub predecessors: Vec<String>,
 }
 
 impl NewJob {
@@ -55,6 +58,7 @@ impl NewJob {
             study: None,
             retry_of: None,
             owner: None,
+            predecessors: body.predecessors.clone(),
         }
     }
 
@@ -83,6 +87,7 @@ impl NewJob {
             study,
             retry_of,
             owner,
+            predecessors: Vec::new(),
         })
     }
 }
@@ -132,7 +137,8 @@ impl Store {
     /// its digest. None for a job that begins afresh.
     pub(super) fn prepare_start(&self, id: &str, job: &NewJob) -> Result<Option<String>, StoreError> {
         let (source, sha256) = match &job.origin {
-            None => return Ok(None),
+            // The last checkpoint of a job that has not ended is linked when this job starts.
+            None | Some(Origin::Job(_)) => return Ok(None),
             Some(Origin::Checkpoint(checkpoint)) => {
                 let row = self.checkpoint(checkpoint)?.ok_or(StoreError::CheckpointGone)?;
                 let attempt = attempt_directory(&self.job_directory(&row.job), row.attempt);
@@ -143,16 +149,48 @@ impl Store {
                 (self.upload_directory(upload).join(super::uploads::CONTENT), row.sha256)
             }
         };
+        self.link_start(id, &source)?;
+        Ok(Some(sha256))
+    }
+
+    /// Links a checkpoint into the directory of the job that begins with it.
+    fn link_start(&self, id: &str, source: &Path) -> Result<(), StoreError> {
         let folder = self.job_directory(id);
         std::fs::create_dir_all(&folder)?;
         let target = folder.join(START_CHECKPOINT);
         // Its row may have been there a moment ago and its file be gone by now.
-        if std::fs::hard_link(&source, &target).is_err() && std::fs::copy(&source, &target).is_err() {
+        if std::fs::hard_link(source, &target).is_err() && std::fs::copy(source, &target).is_err() {
             remove_directory(&folder)?;
             return Err(StoreError::CheckpointGone);
         }
-        crate::system::artifacts::sync_directory(&folder)?;
-        Ok(Some(sha256))
+        Ok(crate::system::artifacts::sync_directory(&folder)?)
+    }
+
+    /// Gives a job that begins with the last checkpoint of another one that checkpoint, when it starts.
+    ///
+    /// # Errors
+    /// [`StoreError::CheckpointGone`] where there is none any more.
+    pub fn take_last_checkpoint(&self, job: &JobRow) -> Result<JobRow, StoreError> {
+        let Some(predecessor) = job.restart_job.as_ref().filter(|_| job.restarted_from.is_none()) else {
+            return Ok(job.clone());
+        };
+        let newest = self.checkpoints(predecessor)?.into_iter().next().ok_or(StoreError::CheckpointGone)?;
+        let target = self.job_directory(&job.id).join(START_CHECKPOINT);
+        if target.exists() {
+            std::fs::remove_file(&target)?;
+        }
+        self.link_start(
+            &job.id,
+            &attempt_directory(&self.job_directory(predecessor), newest.attempt).join(&newest.path),
+        )?;
+        self.write(|transaction| -> Result<(), StoreError> {
+            transaction.execute(
+                "UPDATE jobs SET restarted_from = ?2, restart_sha256 = ?3 WHERE id = ?1",
+                params![job.id, newest.id, newest.sha256],
+            )?;
+            Ok(())
+        })?;
+        self.job(&job.id)?.ok_or(StoreError::CheckpointGone)
     }
 }
 
@@ -177,8 +215,9 @@ pub(super) fn insert(
         .prepare_cached(
             "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
                  restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings,
-                 owner)
-             VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)",
+                 owner, predecessors, restart_job)
+             VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19,
+                 ?20, ?21)",
         )?
         .execute(params![
             id,
@@ -190,7 +229,7 @@ pub(super) fn insert(
             job.estimate,
             job.priority,
             crate::system::clock::now(),
-            job.origin.as_ref().map(Origin::id),
+            job.origin.as_ref().filter(|origin| !matches!(origin, Origin::Job(_))).map(Origin::id),
             start_sha256,
             study,
             index,
@@ -200,6 +239,8 @@ pub(super) fn insert(
             i64::try_from(job.disk_bytes).unwrap_or(i64::MAX),
             job.warnings,
             job.owner,
+            serde_json::to_string(&job.predecessors)?,
+            job.origin.as_ref().filter(|origin| matches!(origin, Origin::Job(_))).map(Origin::id),
         ])?;
     for upload in &job.uploads {
         let known = transaction
@@ -214,7 +255,7 @@ pub(super) fn insert(
     }
     let data = json!({"from": Value::Null, "to": State::Queued.word()});
     events::append(transaction, id, study.map(String::as_str), 0, "state", &data)?;
-    Ok(())
+    dependencies::enter(transaction, id, &job.predecessors)
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! Changing the state of a job: the table of [`crate::spec::states`] applied as a compare-and-set.
 
-use super::{JobRow, Store, StoreError, events, rows, study_limits};
+use super::submission::AGING_S;
+use super::{JobRow, Store, StoreError, dependencies, events, rows, study_limits};
+use crate::spec::body::Amended;
 use crate::spec::states::{Reason, State, Trigger};
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
@@ -72,7 +74,9 @@ impl Store {
             let full = study_limits::without_a_free_place(&connection)?;
             // The index of the queue has every column that is asked for.
             let mut statement = connection.prepare_cached(
-                "SELECT id, study, memory_bytes, disk_bytes FROM jobs WHERE state = 'queued' ORDER BY rank, id",
+                "SELECT id, study, memory_bytes, disk_bytes FROM jobs
+                     WHERE state = 'queued' AND NOT EXISTS (SELECT 1 FROM dependencies WHERE job = jobs.id)
+                     ORDER BY rank, id",
             )?;
             let mut found = None;
             let mut rows = statement.query([])?;
@@ -114,9 +118,9 @@ impl Store {
     /// [`StoreError`].
     pub fn unfinished_attempts(&self) -> Result<Vec<JobRow>, StoreError> {
         let connection = self.read();
-        let mut statement = connection.prepare_cached(
-            "SELECT * FROM jobs WHERE state IN ('running', 'pausing', 'canceling', 'interrupted') ORDER BY id",
-        )?;
+        let mut statement = connection.prepare_cached(&rows::select_jobs(
+            "state IN ('running', 'pausing', 'canceling', 'interrupted') ORDER BY id",
+        ))?;
         let rows = statement.query_map([], rows::job_of)?;
         Ok(rows.collect::<Result<_, _>>()?)
     }
@@ -128,7 +132,7 @@ impl Store {
     pub fn paused_for(&self, reason: Reason) -> Result<Vec<JobRow>, StoreError> {
         let connection = self.read();
         let mut statement =
-            connection.prepare_cached("SELECT * FROM jobs WHERE state = 'paused' AND reason = ?1 ORDER BY id")?;
+            connection.prepare_cached(&rows::select_jobs("state = 'paused' AND reason = ?1 ORDER BY id"))?;
         let rows = statement.query_map([reason.word()], rows::job_of)?;
         Ok(rows.collect::<Result<_, _>>()?)
     }
@@ -241,6 +245,9 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => reason_word).increment(1);
     let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
     events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
+    if to.is_terminal() {
+        dependencies::settle(transaction, id, to)?;
+    }
     if to == State::Failed
         && let Some(study) = &job.study
     {
@@ -284,4 +291,36 @@ fn current(transaction: &Transaction, id: &str) -> Result<Option<Current>, Chang
         })
         .optional()?;
     Ok(found)
+}
+
+impl Store {
+    /// Changes name, labels, priority and limits of a job that waits; `rev` is the revision that the change was made for.
+    ///
+    /// # Errors
+    /// [`ChangeError::Stale`] where the job has another revision or does not wait any more.
+    pub fn amend(&self, id: &str, rev: i64, amended: &Amended) -> Result<JobRow, ChangeError> {
+        let Amended { spec, resolved } = amended;
+        self.write(|transaction| {
+            let changed = transaction
+                .prepare_cached(
+                    "UPDATE jobs SET rev = rev + 1, name = ?3, labels = ?4, spec = ?5, resolved = ?6,
+                         rank = rank + (priority - ?7) * ?8, priority = ?7
+                     WHERE id = ?1 AND rev = ?2 AND state IN ('queued', 'paused')",
+                )?
+                .execute(params![
+                    id,
+                    rev,
+                    resolved.name,
+                    json!(resolved.labels).to_string(),
+                    spec.to_string(),
+                    resolved.to_json().to_string(),
+                    resolved.priority,
+                    AGING_S,
+                ])?;
+            if changed != 1 {
+                return Err(ChangeError::Stale);
+            }
+            rows::job(transaction, id)?.ok_or(ChangeError::NotFound)
+        })
+    }
 }

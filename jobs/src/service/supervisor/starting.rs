@@ -31,6 +31,10 @@ impl Supervisor {
                 let change = Change { reason: Some(Reason::Internal), message, ..Change::default() };
                 self.change(&job.id, Trigger::Fail, &change)?;
             }
+            NotStarted::NoCheckpoint => {
+                let change = Change::because(Reason::CheckpointNoneValid);
+                self.change(&job.id, Trigger::Fail, &change)?;
+            }
             NotStarted::OutOfSpace(_) => {
                 tracing::error!(job = job.id, %error, "a worker could not be started");
                 self.change(&job.id, Trigger::Pause, &Change::because(Reason::StorageEnospc))?;
@@ -69,6 +73,10 @@ impl Supervisor {
             std::fs::remove_dir_all(&directory)?;
         }
         std::fs::create_dir_all(&directory)?;
+        let job = &self.store.take_last_checkpoint(job).map_err(|error| match error {
+            StoreError::CheckpointGone => NotStarted::NoCheckpoint,
+            error => NotStarted::System(io::Error::other(error)),
+        })?;
         let spec = self.attempt_spec(job).map_err(io::Error::other)?;
         let text = serde_json::to_vec_pretty(&spec).map_err(io::Error::from)?;
         artifacts::write(&directory.join(attempt_files::ATTEMPT_SPEC), &text)?;

@@ -101,7 +101,9 @@ impl Parameter for Priority {
     fn any() {}
 
     fn parse(given: &Json, (): (), place: &str, errors: &mut Vec<Violation>) -> Option<Self> {
-        let number = given.as_i64().filter(|number| PRIORITIES.contains(number));
+        // A whole number may be written 1.0.
+        let whole = |number: f64| (number.fract() == 0.0 && number.abs() < 1e9).then_some(number as i64);
+        let number = given.as_i64().or_else(|| whole(given.as_f64()?)).filter(|number| PRIORITIES.contains(number));
         if number.is_none() {
             let detail = "a priority is a whole number";
             errors.push(Violation::new(place, "range", detail, given.clone(), Self::allowed(())));

@@ -1,6 +1,6 @@
 //! `restart`: a scene taken from a checkpoint, with overrides of restart-safe fields.
 
-use super::sources::{RestartSource, Sources};
+use super::sources::{JobSource, Origin, RestartSource, Sources};
 use meniscus::spec::{Given, Json, Object, Parameter, Violation, escape};
 use serde_json::json;
 
@@ -11,6 +11,8 @@ meniscus::group! {
         checkpoint: Option<String>;
         /// id of an upload that was made as a checkpoint and is ready
         upload: Option<String>;
+        /// id of a job whose last checkpoint is taken; where it has not ended, this job starts after it
+        job: Option<String>;
         /// new values of fields that a restart may change, by JSON pointers into the scene
         overrides: Option<Overrides>;
         /// whether a checkpoint of another instruction set may be used; results are then not bit-identical
@@ -62,6 +64,7 @@ pub(super) fn scene<S: Sources>(
     let spec = RestartSpec {
         checkpoint: given.read(RestartSpec::checkpoint()).flatten(),
         upload: given.read(RestartSpec::upload()).flatten(),
+        job: given.read(RestartSpec::job()).flatten(),
         overrides: given.read(RestartSpec::overrides()).flatten(),
         allow_other_isa: given.read(RestartSpec::allow_other_isa()).flatten(),
     };
@@ -97,23 +100,47 @@ fn overridden(spec: &RestartSpec, source: RestartSource, errors: &mut Vec<Violat
 
 fn source<S: Sources>(spec: &RestartSpec, sources: &S) -> Result<Result<RestartSource, Violation>, S::Error> {
     let by_checkpoint = "the id of a checkpoint, ckpt_…";
-    Ok(match (&spec.checkpoint, &spec.upload) {
-        (Some(id), None) => sources.checkpoint(id)?.ok_or_else(|| {
+    Ok(match (&spec.checkpoint, &spec.upload, &spec.job) {
+        (Some(id), None, None) => sources.checkpoint(id)?.ok_or_else(|| {
             let detail = "there is no such checkpoint";
             Violation::new("/restart/checkpoint", "not_found", detail, id.as_str(), by_checkpoint)
         }),
-        (None, Some(id)) => sources.uploaded_checkpoint(id)?.ok_or_else(|| {
+        (None, Some(id), None) => sources.uploaded_checkpoint(id)?.ok_or_else(|| {
             let detail = "there is no such upload, or it is no checkpoint that passed its check";
             let allowed = "the id of an upload that was made as a checkpoint and is ready, upl_…";
             Violation::new("/restart/upload", "not_found", detail, id.as_str(), allowed)
         }),
-        (None, None) => {
-            let detail = "a restart names a checkpoint or an upload";
+        (None, None, Some(id)) => last_checkpoint(id, sources.job(id)?),
+        (None, None, None) => {
+            let detail = "a restart names a checkpoint, an upload or a job";
             Err(Violation::new("/restart/checkpoint", "required", detail, Json::Null, by_checkpoint))
         }
-        (Some(_), Some(id)) => {
-            let detail = "a restart begins with a checkpoint or with an upload; give one of them";
-            Err(Violation::new("/restart/upload", "conflict", detail, id.as_str(), Json::Null))
+        (_, upload, job) => {
+            let detail = "a restart begins with a checkpoint, an upload or a job; give one of them";
+            let (at, id) = match (upload, job) {
+                (_, Some(id)) => ("/restart/job", id.as_str()),
+                (upload, None) => ("/restart/upload", upload.as_deref().unwrap_or_default()),
+            };
+            Err(Violation::new(at, "conflict", detail, id, Json::Null))
         }
     })
+}
+
+/// The last checkpoint of a job, or the one that it will have when it has succeeded.
+fn last_checkpoint(id: &str, job: Option<JobSource>) -> Result<RestartSource, Violation> {
+    let refused = |code, detail: &str| {
+        Violation::new(
+            "/restart/job",
+            code,
+            detail,
+            id,
+            "the id of a job with a checkpoint, or of one that may still succeed",
+        )
+    };
+    let job = job.ok_or_else(|| refused("not_found", "there is no such job"))?;
+    if job.state.is_terminal() {
+        return job.checkpoint.ok_or_else(|| refused("conflict", "the job has ended and has no checkpoint"));
+    }
+    let (origin, isa) = (Origin::Job(id.to_owned()), crate::system::build::isa());
+    Ok(RestartSource { origin, scene: job.scene, isa, step: 0 })
 }

@@ -1,5 +1,6 @@
-//! What a body may name beside itself: checkpoints and uploads.
+//! What a body may name beside itself: checkpoints, uploads and jobs.
 
+use crate::spec::states::State;
 use crate::spec::uploads::Purpose;
 use meniscus::scene::{CloudReference, CloudSource};
 use meniscus::spec::Violation;
@@ -13,6 +14,8 @@ pub enum Origin {
     Checkpoint(String),
     /// Among the uploads.
     Upload(String),
+    /// With a job that has not ended: the last one that it will have.
+    Job(String),
 }
 
 impl Origin {
@@ -20,9 +23,20 @@ impl Origin {
     #[must_use]
     pub fn id(&self) -> &str {
         match self {
-            Self::Checkpoint(id) | Self::Upload(id) => id,
+            Self::Checkpoint(id) | Self::Upload(id) | Self::Job(id) => id,
         }
     }
+}
+
+/// A job that a body names, as the store knows it.
+#[derive(Debug, Clone)]
+pub struct JobSource {
+    /// State of the job.
+    pub state: State,
+    /// Its resolved scene.
+    pub scene: Value,
+    /// Its last checkpoint so far.
+    pub checkpoint: Option<RestartSource>,
 }
 
 /// The checkpoint that a restart begins with, as the store knows it.
@@ -38,7 +52,7 @@ pub struct RestartSource {
     pub step: u64,
 }
 
-/// Looks up the checkpoints and uploads that bodies name.
+/// Looks up the checkpoints, uploads and jobs that bodies name.
 pub trait Sources {
     /// Why a look-up failed. It does not say that there is no such id.
     type Error;
@@ -48,6 +62,12 @@ pub trait Sources {
     /// # Errors
     /// When the look-up fails.
     fn checkpoint(&self, id: &str) -> Result<Option<RestartSource>, Self::Error>;
+
+    /// A job; None where there is no such job.
+    ///
+    /// # Errors
+    /// When the look-up fails.
+    fn job(&self, id: &str) -> Result<Option<JobSource>, Self::Error>;
 
     /// The same of an uploaded checkpoint that has passed its inspection.
     ///
@@ -62,7 +82,7 @@ pub trait Sources {
     fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, Self::Error>;
 }
 
-/// No checkpoints and no uploads.
+/// No checkpoints, no uploads and no jobs.
 #[derive(Debug, Clone, Copy)]
 pub struct NoSources;
 
@@ -70,6 +90,10 @@ impl Sources for NoSources {
     type Error = Infallible;
 
     fn checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
+        Ok(None)
+    }
+
+    fn job(&self, _: &str) -> Result<Option<JobSource>, Infallible> {
         Ok(None)
     }
 

@@ -1,5 +1,6 @@
-use super::{Allowance, BodyError, JobBody, NoSources, Origin, RestartSource, Sources};
+use super::{Allowance, BodyError, JobBody, JobSource, NoSources, Origin, RestartSource, Sources};
 use crate::spec::run_options::RunOptions;
+use crate::spec::states::State;
 use crate::spec::uploads::Purpose;
 use meniscus::spec::Violation;
 use serde_json::{Value, json};
@@ -27,6 +28,15 @@ impl Sources for OneCheckpoint {
         Ok(Some(RestartSource { origin, scene, isa: crate::system::build::isa(), step: 240 }))
     }
 
+    fn job(&self, id: &str) -> Result<Option<JobSource>, Infallible> {
+        let states = [("job_running", State::Running), ("job_failed", State::Failed), ("job_done", State::Succeeded)];
+        let state = states.into_iter().find(|(known, _)| *known == id).map(|(_, state)| state);
+        let checkpoint = self.checkpoint("ckpt_1")?;
+        let scene = checkpoint.as_ref().unwrap().scene.clone();
+        let checkpoint = checkpoint.filter(|_| state == Some(State::Succeeded));
+        Ok(state.map(|state| JobSource { state, scene, checkpoint }))
+    }
+
     fn uploaded_checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
         Ok(None)
     }
@@ -51,6 +61,10 @@ impl Sources for Broken {
         Err("the store failed")
     }
 
+    fn job(&self, _: &str) -> Result<Option<JobSource>, &'static str> {
+        Err("the store failed")
+    }
+
     fn uploaded_checkpoint(&self, _: &str) -> Result<Option<RestartSource>, &'static str> {
         Err("the store failed")
     }
@@ -66,6 +80,8 @@ fn a_failed_lookup_is_no_violation() {
     for body in [
         json!({"restart": {"checkpoint": "ckpt_1"}}),
         json!({"restart": {"upload": "upl_1"}}),
+        json!({"restart": {"job": "job_1"}}),
+        json!({"after": ["job_1"], "scene": {"kind": "vortex"}}),
         json!({"scene": {"kind": "redistance", "spacing": 0.05, "shape": points}}),
     ] {
         assert!(matches!(super::parse(&body, ALLOWANCE, &Broken), Err(BodyError::Lookup("the store failed"))));
@@ -183,4 +199,25 @@ fn restarts_change_only_what_is_safe() {
     assert_eq!(parse(&body, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "not_restart_safe");
     let body = json!({"restart": {"checkpoint": "ckpt_1", "overrides": {"/end_time": 4.0}}});
     assert_eq!(parse(&body, ALLOWANCE, &OneCheckpoint).err().unwrap()[0].code, "range");
+}
+
+#[test]
+fn jobs_that_a_body_names_must_be_there_and_able_to_succeed() {
+    let places = |body: &Value| {
+        let errors = parse(body, ALLOWANCE, &OneCheckpoint).err().unwrap();
+        errors.into_iter().map(|error| (error.pointer, error.code)).collect::<Vec<_>>()
+    };
+    let body = json!({"after": ["job_running", "job_gone", "job_failed"], "scene": {"kind": "vortex"}});
+    let expected = [("/after/1".to_owned(), "not_found"), ("/after/2".to_owned(), "conflict")];
+    assert_eq!(places(&body), expected);
+    for (job, code) in [("job_gone", "not_found"), ("job_failed", "conflict")] {
+        assert_eq!(places(&json!({"restart": {"job": job}})), [("/restart/job".to_owned(), code)]);
+    }
+    let done = parse(&json!({"restart": {"job": "job_done"}}), ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(done.origin, Some(Origin::Checkpoint("ckpt_1".into())));
+    // A job that runs is waited for.
+    let body = json!({"restart": {"job": "job_running"}, "after": ["job_done"]});
+    let waiting = parse(&body, ALLOWANCE, &OneCheckpoint).ok().unwrap();
+    assert_eq!(waiting.origin, Some(Origin::Job("job_running".into())));
+    assert_eq!(waiting.predecessors, ["job_done", "job_running"]);
 }
