@@ -4,7 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use flate2::read::GzDecoder;
-use meniscus_jobs::spec::body::{self, Allowance, BodyError, NoSources, Origin, RestartSource, Sources};
+use meniscus_jobs::spec::body::{self, Allowance, BodyError, JobSource, NoSources, Origin, RestartSource, Sources};
 use meniscus_jobs::spec::calibration::Calibration;
 use meniscus_jobs::spec::study;
 use meniscus_jobs::spec::uploads::Purpose;
@@ -40,6 +40,10 @@ impl Sources for Known {
         let source =
             first.map(|first| RestartSource { origin, scene: first.resolved.scene, isa: build::isa(), step: 240 });
         Ok(source.filter(|_| id == "ckpt_1"))
+    }
+
+    fn job(&self, _: &str) -> Result<Option<JobSource>, Self::Error> {
+        Ok(None)
     }
 
     fn uploaded_checkpoint(&self, _: &str) -> Result<Option<RestartSource>, Infallible> {
