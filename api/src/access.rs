@@ -67,7 +67,7 @@ impl Scope {
     }
 }
 
-/// Who sent a request, by the token that it carries. Without tokens everybody is the same client, which may do everything.
+/// The client that sent a request, by the token that it carries. Without tokens there is one client, which may do everything.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Client {
     /// Name of the token; empty while the service has no tokens. Idempotency keys and budgets are kept apart by it.

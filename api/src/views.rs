@@ -335,10 +335,21 @@ fn links(base: String, parts: &[&'static str]) -> BTreeMap<&'static str, String>
     links
 }
 
+/// What a queued job waits for.
+fn waiting_for(job: &JobRow) -> Option<String> {
+    (job.state == State::Queued).then(|| match (job.waits_for, &job.hint) {
+        (0, Some(_)) => "another try to start it (see hint)".to_owned(),
+        (0, None) => "a free slot, its memory and its disk space".to_owned(),
+        (1, _) => "one job of `after` to succeed".to_owned(),
+        (count, _) => format!("{count} jobs of `after` to succeed"),
+    })
+}
+
 impl From<JobRow> for JobView {
     fn from(job: JobRow) -> Self {
         let parts = ["cancel", "pause", "resume", "retry", "events", "log", "series", "report", "files", "checkpoints"];
         let links = links(address(&format!("/v1/jobs/{}", job.id)), &parts);
+        let waiting_for = waiting_for(&job);
         let Progress {
             fraction,
             time,
@@ -355,12 +366,6 @@ impl From<JobRow> for JobView {
         // Speed and remaining time have a meaning only while a worker runs.
         let is_running = job.state.has_worker();
         let Usage { wall_s, cpu_s, peak_memory_bytes, disk_bytes } = job.usage;
-        let waiting_for = (job.state == State::Queued).then(|| match (job.waits_for, &job.hint) {
-            (0, Some(_)) => "another try to start it (see hint)".to_owned(),
-            (0, None) => "a free slot, its memory and its disk space".to_owned(),
-            (1, _) => "one job of `after` to succeed".to_owned(),
-            (count, _) => format!("{count} jobs of `after` to succeed"),
-        });
         let end_time = if end_time > 0.0 { end_time } else { job.forecast.steps as f64 * job.forecast.time_step };
         Self {
             rev: job.rev,

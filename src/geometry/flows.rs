@@ -43,6 +43,11 @@ pub trait Flow<const D: usize>: Send + Sync {
     /// steps.
     fn top_speed(&self, low: &Vector<D>, high: &Vector<D>) -> f64;
 
+    /// Whether the flow has no divergence, so that it keeps the area or volume inside a surface.
+    fn keeps_volume(&self) -> bool {
+        false
+    }
+
     /// Position that a rigid motion gives `x` after `duration`, by its formula; None where the motion is not rigid.
     fn rigid_path(&self, _x: &Vector<D>, _duration: f64) -> Option<Vector<D>> {
         None

@@ -1,5 +1,6 @@
 //! A level set carried by particles through a prescribed flow (PCP, section 4.2).
 
+mod enclosed_watch;
 mod errors;
 mod format_1;
 pub mod frame_fields;

@@ -28,6 +28,7 @@ mod fixtures;
 mod foot_points;
 mod format_1;
 pub mod frame_fields;
+mod front_watch;
 mod gaps;
 mod grid;
 pub mod laws;

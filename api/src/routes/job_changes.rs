@@ -3,7 +3,7 @@
 use crate::access::Client;
 use crate::base_path::address;
 use crate::creation::{Creation, check_capacity};
-use crate::error::{ApiError, Problem};
+use crate::error::{ApiError, Problem, ProblemItem};
 use crate::idempotency::stored_response;
 use crate::path::Path;
 use crate::query;
@@ -15,14 +15,14 @@ use crate::store_sources::StoreSources;
 use crate::views::{ActionView, JobView, SkippedView};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use axum::{Extension, Json};
-use meniscus::spec::suggest;
+use meniscus::spec::Word;
 use meniscus_jobs::service::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store};
+use meniscus_jobs::spec::action::{self, Action, ActionSpec};
 use meniscus_jobs::spec::body;
 use meniscus_jobs::spec::forecast::WORKER_BASE_BYTES;
 use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
-use serde_json::{Value, json};
 
 /// Changes name, labels, priority or limits of a job that waits, by a JSON merge patch. With `If-Match` only the given revision
 /// is changed.
@@ -114,47 +114,31 @@ pub async fn retry(
     Ok(response)
 }
 
-/// What may be done to all jobs that a filter matches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Action {
-    Cancel,
-    Pause,
-    Resume,
-    Delete,
+/// Does an action to one job; the reason why not.
+fn act_on(store: &Store, action: Action, job: &JobRow) -> Result<Option<String>, ApiError> {
+    let (trigger, reason) = match action {
+        Action::Cancel => (Trigger::Cancel, Some(Reason::UserCancel)),
+        Action::Pause => (Trigger::Pause, Some(Reason::UserPause)),
+        Action::Resume => (Trigger::Resume, None),
+        Action::Delete if store.delete(&job.id)? => return Ok(None),
+        Action::Delete => return Ok(Some(format!("a job that is {} has not ended", job.state.word()))),
+    };
+    match store.change(&job.id, trigger, &Change { reason, ..Change::default() }) {
+        Ok(_) => Ok(None),
+        Err(ChangeError::Store(error)) => Err(error.into()),
+        Err(error) => Ok(Some(error.to_string())),
+    }
 }
 
-impl Action {
-    const WORDS: [(&'static str, Self); 4] =
-        [("cancel", Self::Cancel), ("pause", Self::Pause), ("resume", Self::Resume), ("delete", Self::Delete)];
-
-    /// Does it to one job; the reason why not.
-    fn act(self, store: &Store, job: &JobRow) -> Result<Option<String>, ApiError> {
-        let trigger = match self {
-            Self::Cancel => (Trigger::Cancel, Some(Reason::UserCancel)),
-            Self::Pause => (Trigger::Pause, Some(Reason::UserPause)),
-            Self::Resume => (Trigger::Resume, None),
-            Self::Delete if store.delete(&job.id)? => return Ok(None),
-            Self::Delete => return Ok(Some(format!("the job is {} and has not ended", job.state.word()))),
-        };
-        let change = Change { reason: trigger.1, ..Change::default() };
-        match store.change(&job.id, trigger.0, &change) {
-            Ok(_) => Ok(None),
-            Err(ChangeError::Store(error)) => Err(error.into()),
-            Err(error) => Ok(Some(error.to_string())),
-        }
-    }
-
-    /// Whether it would be done to a job in this state; the reason why not.
-    fn refusal(self, state: JobState) -> Option<String> {
-        let can = match self {
-            Self::Cancel => state.after(Trigger::Cancel).is_some(),
-            Self::Pause => state.after(Trigger::Pause).is_some(),
-            Self::Resume => state.after(Trigger::Resume).is_some(),
-            Self::Delete => state.is_terminal(),
-        };
-        let word = Self::WORDS.iter().find(|(_, action)| *action == self).map_or("", |(word, _)| word);
-        (!can).then(|| format!("a job that is {} cannot {word}", state.word()))
-    }
+/// Whether an action would be done to a job in this state; the reason why not.
+fn refusal(action: Action, state: JobState) -> Option<String> {
+    let can = match action {
+        Action::Cancel => state.after(Trigger::Cancel).is_some(),
+        Action::Pause => state.after(Trigger::Pause).is_some(),
+        Action::Resume => state.after(Trigger::Resume).is_some(),
+        Action::Delete => state.is_terminal(),
+    };
+    (!can).then(|| format!("a job that is {} cannot {}", state.word(), action.word()))
 }
 
 /// Jobs that are read at once.
@@ -174,8 +158,14 @@ pub async fn act(
 ) -> Result<Json<ActionView>, ApiError> {
     let (parts, body) = request.into_parts();
     let body = request_body::parse_json(&request_body::read(&parts.headers, body, BODY_LIMIT).await?)?;
-    let Wish { action, filter, dry_run } = parse(&body)?;
-    let filter = filter.filter(&client);
+    let ActionSpec { action, filter, dry_run } = action::parse(&body)?;
+    let below_filter = |mut item: ProblemItem| {
+        item.pointer = format!("/filter/{}", item.pointer);
+        item
+    };
+    let query = query::parse::<JobQuery>(filter.0);
+    let query = query.map_err(|found| ApiError::Invalid(found.into_iter().map(below_filter).collect()))?;
+    let filter = query.filter(&client);
     let work = move |store: &Store| act_on_all(store, &client, action, &filter, dry_run);
     let view = state.with_store(work).await?;
     state.supervisor.wake();
@@ -197,8 +187,8 @@ fn act_on_all(
             view.matched += 1;
             let refusal = match resource::check_owner(client, job.owner.clone()) {
                 Err(_) => Some(format!("it belongs to {}", job.owner.as_deref().unwrap_or_default())),
-                Ok(()) if dry_run => action.refusal(job.state),
-                Ok(()) => action.act(store, job)?,
+                Ok(()) if dry_run => refusal(action, job.state),
+                Ok(()) => act_on(store, action, job)?,
             };
             match refusal {
                 None => view.changed += 1,
@@ -212,110 +202,5 @@ fn act_on_all(
             Some(last) => filter.cursor = Some(last.id.clone()),
             None => return Ok(view),
         }
-    }
-}
-
-/// The body of an action.
-struct Wish {
-    action: Action,
-    filter: JobQuery,
-    dry_run: bool,
-}
-
-/// Names of the fields of the body.
-const NAMES: [&str; 3] = ["action", "filter", "dry_run"];
-/// Parameters of lists that mean nothing here.
-const PAGING: [&str; 3] = ["sort", "limit", "cursor"];
-
-fn parse(body: &Value) -> Result<Wish, ApiError> {
-    let mut errors = Vec::new();
-    let mut add = |pointer: &str, code: &'static str, detail: &str, got: &Value, allowed: Value| {
-        if let ApiError::Invalid(found) = ApiError::invalid(pointer, code, detail, got, allowed) {
-            errors.extend(found);
-        }
-    };
-    let Some(object) = body.as_object() else {
-        return Err(ApiError::invalid("", "type", "an action is an object", body, json!(NAMES)));
-    };
-    for (name, value) in object.iter().filter(|(name, _)| !NAMES.contains(&name.as_str())) {
-        let similar = suggest(name, &NAMES).map(|name| format!(" (did you mean {name}?)")).unwrap_or_default();
-        add(&format!("/{name}"), "unknown_field", &format!("there is no such field{similar}"), value, json!(NAMES));
-    }
-    let words: Vec<&str> = Action::WORDS.iter().map(|(word, _)| *word).collect();
-    let sent = object.get("action").unwrap_or(&Value::Null);
-    let action = Action::WORDS.iter().find(|(word, _)| sent == word).map(|(_, action)| *action);
-    if action.is_none() {
-        add("/action", "unknown", "there is no such action", sent, json!(words));
-    }
-    let dry_run = match object.get("dry_run") {
-        None => Some(false),
-        Some(value) => value.as_bool(),
-    };
-    if dry_run.is_none() {
-        add("/dry_run", "type", "true or false is needed", &object["dry_run"], json!([true, false]));
-    }
-    let filter = object.get("filter").and_then(Value::as_object).filter(|filter| !filter.is_empty());
-    let filter = match filter {
-        None => {
-            let detail = "a filter that is not empty is needed, so that no slip acts on all jobs";
-            let got = object.get("filter").unwrap_or(&Value::Null);
-            add("/filter", "required", detail, got, json!({"state": "queued", "label.KEY": "VALUE"}));
-            None
-        }
-        Some(filter) => {
-            let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-            let pairs: Vec<(String, String)> = filter
-                .iter()
-                .flat_map(|(name, value)| match value {
-                    Value::Array(values) => values.iter().map(|value| (name.clone(), text(value))).collect(),
-                    value => vec![(name.clone(), text(value))],
-                })
-                .collect();
-            for (name, value) in filter.iter().filter(|(name, _)| PAGING.contains(&name.as_str())) {
-                add(&format!("/filter/{name}"), "unknown_field", "an action has no pages", value, Value::Null);
-            }
-            query::parse::<JobQuery>(pairs)
-                .map_err(|found| {
-                    errors.extend(found.into_iter().map(|mut item| {
-                        item.pointer = format!("/filter/{}", item.pointer);
-                        item
-                    }));
-                })
-                .ok()
-        }
-    };
-    match (action, filter, dry_run) {
-        (Some(action), Some(filter), Some(dry_run)) if errors.is_empty() => Ok(Wish { action, filter, dry_run }),
-        _ => Err(ApiError::Invalid(errors)),
-    }
-}
-
-impl IntoResponse for ActionView {
-    fn into_response(self) -> Response {
-        Json(self).into_response()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::parse;
-    use crate::error::ApiError;
-    use serde_json::json;
-
-    #[test]
-    fn all_that_is_wrong_with_an_action_comes_at_once() {
-        let Err(ApiError::Invalid(errors)) =
-            parse(&json!({"action": "stop", "filters": {}, "filter": {"stat": "queued", "limit": 3}, "dry_run": 1}))
-        else {
-            panic!("it was taken")
-        };
-        let places: Vec<&str> = errors.iter().map(|error| error.pointer.as_str()).collect();
-        for place in ["/filters", "/action", "/dry_run", "/filter/stat", "/filter/limit"] {
-            assert!(places.contains(&place), "{place}: {places:?}");
-        }
-        for filter in [json!({}), json!(null), json!([])] {
-            assert!(parse(&json!({"action": "cancel", "filter": filter})).is_err());
-        }
-        assert!(parse(&json!({"action": "cancel", "filter": {"state": ["queued", "paused"], "label.a": "b"}})).is_ok());
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A folder with a sound record of its own that the database does not know means that the database was lost or is older: then
 //! the start is refused, or the folders are adopted. Folders with our names and without such a record are set aside. Anything
-//! else in the data directory is somebody else's and stays as it is.
+//! else in the data directory belongs to others and stays as it is.
 
 use crate::service::data_directory::ORPHANS;
 use crate::service::store::uploads::{CONTENT, UploadRecord};

@@ -52,6 +52,8 @@ pub struct Submission {
     pub warnings: Vec<Finding>,
     /// Time at which it was made.
     pub created_at: Option<String>,
+    /// Time at which it first started.
+    pub started_at: Option<String>,
     /// Name of the token that made it.
     pub owner: Option<String>,
     /// Study that it is a point of, with the number of the point.

@@ -81,6 +81,11 @@ impl<E: Into<ObserverError>> From<E> for Failure {
 }
 
 impl Failure {
+    /// Whether work was dropped on request.
+    fn is_interruption(&self) -> bool {
+        matches!(self, Self::Run(RunError::Step(StepError::Interrupted)))
+    }
+
     fn verdict(self, directory: &Path) -> Verdict {
         match self {
             Self::Paused => Verdict::Paused { reason: None },
@@ -134,23 +139,10 @@ fn attempt(
         progress.continue_phases(start.counters.phases.clone());
         let mut observers = prepare(spec, directory, &options, control, sink, &start, (progress, log))?;
         let step = simulation.clock().step;
-        observers.sink.put(
-            &Record::Started {
-                step,
-                frames: start.counters.frames.len() as u64,
-                from_checkpoint: start.is_own,
-                pid: std::process::id(),
-            },
-            true,
-        )?;
-        if !start.is_own {
-            for finding in &start.counters.findings {
-                observers.sink.put(&Record::Finding(finding.clone()), false)?;
-            }
-        }
+        tell_start(&mut observers, &start, step)?;
         log.line(&format!("start at step {step}, {} particles", simulation.particle_count()));
         let ending = match run(simulation.as_mut(), &mut observers) {
-            Err(RunError::Step(StepError::Interrupted)) if control.is_pausing() && !control.is_canceled() => {
+            Err(RunError::Step(StepError::Interrupted)) if control.is_only_pausing() => {
                 observers.rescue()?;
                 return Ok(Verdict::Paused { reason: None });
             }
@@ -164,9 +156,7 @@ fn attempt(
             Ending::Finished => {
                 let operators = match write_operators(directory, &options, simulation.as_mut(), &mut observers) {
                     // The checkpoint of the end stands; they are made when the job goes on.
-                    Err(Failure::Run(RunError::Step(StepError::Interrupted)))
-                        if control.is_pausing() && !control.is_canceled() =>
-                    {
+                    Err(failure) if failure.is_interruption() && control.is_only_pausing() => {
                         return Ok(Verdict::Paused { reason: None });
                     }
                     written => written?,
@@ -178,6 +168,25 @@ fn attempt(
             }
         }
     })
+}
+
+/// Records what an attempt goes on from.
+fn tell_start(observers: &mut Observers, start: &Start, step: u64) -> Result<(), Failure> {
+    observers.sink.put(
+        &Record::Started {
+            step,
+            frames: start.counters.frames.len() as u64,
+            from_checkpoint: start.is_own,
+            pid: std::process::id(),
+        },
+        true,
+    )?;
+    if !start.is_own {
+        for finding in &start.counters.findings {
+            observers.sink.put(&Record::Finding(finding.clone()), false)?;
+        }
+    }
+    Ok(())
 }
 
 /// The simulation at the start of its scene, with the points that it takes from files.

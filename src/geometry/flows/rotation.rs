@@ -20,6 +20,10 @@ impl<const D: usize> Flow<D> for Rotation<D> {
         u
     }
 
+    fn keeps_volume(&self) -> bool {
+        true
+    }
+
     fn top_speed(&self, low: &Vector<D>, high: &Vector<D>) -> f64 {
         // The corner of the box that is farthest from the axis; points keep their distance from it.
         let farthest = |d: usize| (low[d] - self.center[d]).abs().max((high[d] - self.center[d]).abs());

@@ -20,6 +20,10 @@ impl Flow<2> for SingleVortex {
         Vector::<2>::new(-0.5 * strength * (1.0 - cos_x) * sin_y, 0.5 * strength * (1.0 - cos_y) * sin_x)
     }
 
+    fn keeps_volume(&self) -> bool {
+        true
+    }
+
     fn top_speed(&self, _low: &Vector<2>, _high: &Vector<2>) -> f64 {
         // Reached in the middle of each side of the unit square; a carried point may come anywhere.
         1.0

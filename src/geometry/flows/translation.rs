@@ -14,6 +14,10 @@ impl<const D: usize> Flow<D> for Translation<D> {
         self.velocity
     }
 
+    fn keeps_volume(&self) -> bool {
+        true
+    }
+
     fn top_speed(&self, _low: &Vector<D>, _high: &Vector<D>) -> f64 {
         self.velocity.iter().map(|v| v * v).sum::<f64>().sqrt()
     }

@@ -20,6 +20,10 @@ impl Flow<3> for Vortex3d {
         Vector::<3>::new((1.0 - cx) * sy * sz, -0.5 * sx * (1.0 - cy) * sz, -0.5 * sx * sy * (1.0 - cz)) * strength
     }
 
+    fn keeps_volume(&self) -> bool {
+        true
+    }
+
     fn top_speed(&self, _low: &Vector<3>, _high: &Vector<3>) -> f64 {
         // |u₁| ≤ 2 where the others vanish; a carried point may come anywhere.
         2.0

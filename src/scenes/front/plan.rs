@@ -228,7 +228,8 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         let start = self.start()?;
         let ball = start.ball.clone();
         let exact = self.law.exact_motion(start);
-        Ok(Box::new(GridBasedParticles::new(system, exact, ball, *fixed, context.cpu_clock, labels)))
+        let simulation = GridBasedParticles::new(system, exact, ball, *fixed, context.cpu_clock, labels);
+        Ok(Box::new(simulation.with_stretch(self.stretch().most)))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Transport and redistancing step by step.
 
+use super::enclosed_watch::{self, EnclosedWatch};
 use super::errors::{DistanceErrors, MeasuredErrors};
 use super::format_1;
 use super::frame_fields;
@@ -15,7 +16,7 @@ use crate::simulation::components::{load_particles, save_particles};
 use crate::simulation::course::{check_finite_vectors, first_broken, is_finite};
 use crate::simulation::fields::SURFACE_FIELDS;
 use crate::simulation::{
-    Check, Course, CpuClock, Fields, Health, LoadError, Observables, OutputPlan, Phases, Report, Section, Selection,
+    Course, CpuClock, Fields, Health, LoadError, Observables, OutputPlan, Phases, Report, Section, Selection,
     Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
@@ -33,6 +34,7 @@ pub struct AdvectedLevelSet<const D: usize> {
     measured: u64,
     /// Enclosed area or volume at time 0.
     initial_measure: f64,
+    enclosed_watch: EnclosedWatch,
     max_cfl: f64,
     errors: Vec<MeasuredErrors>,
     course: Course,
@@ -66,6 +68,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
             initial_measure: measure,
             measure,
             measured: 0,
+            enclosed_watch: EnclosedWatch::default(),
             max_cfl: 0.0,
             errors: Vec::new(),
             course: Course::new(fixed.into(), Phases::new(cpu_clock), method),
@@ -132,6 +135,20 @@ impl<const D: usize> AdvectedLevelSet<D> {
         Ok(MeasuredErrors { time, measure_relative, distances })
     }
 
+    /// Relative change of the enclosed area or volume when it was last measured.
+    fn drift(&self) -> f64 {
+        (self.measure - self.initial_measure) / self.initial_measure
+    }
+
+    /// Looks at the enclosed area or volume that was just measured.
+    fn watch_enclosed(&mut self, now: Clock) -> Result<(), StepError> {
+        if self.system.motion.flow().keeps_volume() {
+            let found = self.enclosed_watch.look::<D>(self.drift(), now)?;
+            self.course.findings.extend(found);
+        }
+        Ok(())
+    }
+
     /// Takes the errors of this moment: of the particles as they are where they were just redistanced, else of a copy,
     /// so that asking for an error never becomes part of the physics.
     fn take_errors(&mut self, now: Clock) -> Result<(), StepError> {
@@ -149,6 +166,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
             // reported.
             self.system.redistancing.fit_diagnostics_mut().merge(surface.fit_diagnostics());
             (self.measure, self.measured) = (measure, now.step);
+            self.watch_enclosed(now)?;
             measured
         };
         self.errors.push(measured);
@@ -184,13 +202,17 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             }
             first_broken(self.system.columns.find_broken(&self.system.particles), next)?;
             self.redistanced = Some(next.step);
-            if self.is_error_due(next.step) || self.plan.is_series_due(&self.course.fixed(), next.step) {
+            let is_row_due = self.plan.is_series_due(&self.course.fixed(), next.step);
+            // What is redistanced for output alone is rare enough to be watched each time.
+            let is_for_output = self.system.parts.when == RedistanceWhen::ForOutput;
+            if self.is_error_due(next.step) || is_row_due || is_for_output {
                 let system = &self.system;
                 self.measure = self
                     .course
                     .phases
                     .measure("measure", || enclosed_area_or_volume(&system.redistancing, &system.interrupt))?;
                 self.measured = next.step;
+                self.watch_enclosed(next)?;
             }
         }
         self.course.step = next.step;
@@ -207,7 +229,6 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     }
 
     fn observables(&self) -> Observables {
-        let exact = self.initial_measure;
         let step = self.course.step;
         let band = self.system.particles.flag(self.system.columns.in_band);
         // Between redistancings the surface is not known, and a stale number would look like knowledge.
@@ -218,7 +239,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             (&TIME, self.clock().time),
             (&TIME_STEP, self.course.pace.time_step),
             (if D == 2 { &AREA } else { &VOLUME }, known(is_measured, self.measure)),
-            (&VOLUME_DRIFT, known(is_measured, (self.measure - exact) / exact)),
+            (&VOLUME_DRIFT, known(is_measured, self.drift())),
             (&BAND_PARTICLES, in_band),
             (&CFL, self.max_cfl),
             (&RESCUED_FITS, rescued(&self.system.redistancing.fit_diagnostics().counts) as f64),
@@ -254,6 +275,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         });
         state.put_real("max_cfl", self.max_cfl);
         state.put_list("errors", &self.errors);
+        self.enclosed_watch.save(state);
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
@@ -263,11 +285,12 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let (measure, measured) =
             state.section("enclosed_measure", |section| Ok((section.real("value")?, section.count("at_step")?)))?;
         let (max_cfl, errors) = (state.real("max_cfl")?, state.list("errors")?);
+        let enclosed_watch = EnclosedWatch::load(state)?;
         state.section("particles", |section| load_particles(&mut self.system.particles, section))?;
         // From here on nothing fails.
         *self.system.redistancing.fit_diagnostics_mut() = soundness;
         (self.redistanced, self.measure, self.measured) = (redistanced, measure, measured);
-        (self.max_cfl, self.errors) = (max_cfl, errors);
+        (self.max_cfl, self.errors, self.enclosed_watch) = (max_cfl, errors, enclosed_watch);
         self.course.step = clock.step;
         Ok(())
     }
@@ -286,14 +309,12 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     }
 
     fn health(&self) -> Health {
-        let exact = self.initial_measure;
-        let volume_drift = Some((self.measure - exact) / exact);
-        let name = if D == 2 { "area_drift" } else { "volume_drift" };
+        let volume_drift = Some(self.drift());
         Health {
             finite: self.system.particles.positions().iter().all(is_finite),
             max_cfl: self.max_cfl,
             volume_drift,
-            checks: vec![Check::watched(name, volume_drift, "")],
+            checks: vec![enclosed_watch::check::<D>(volume_drift, self.system.motion.flow().keeps_volume())],
         }
     }
 

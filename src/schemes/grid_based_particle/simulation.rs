@@ -6,6 +6,7 @@ use super::exact_front::{ExactFrontMotion, Moment};
 use super::foot_points::FootPoints;
 use super::format_1;
 use super::frame_fields;
+use super::front_watch::FrontWatch;
 use super::quantities;
 use super::removals::Removals;
 use super::system::FrontSystem;
@@ -13,7 +14,7 @@ use crate::geometry::surfaces::Ball;
 use crate::schemes::measured_errors::entry;
 use crate::simulation::course::is_finite;
 use crate::simulation::{
-    Check, Course, CpuClock, Fields, Finding, Health, LoadError, Mark, Observables, Phases, Report, Section, Selection,
+    Course, CpuClock, Fields, Finding, Health, LoadError, Mark, Observables, Phases, Report, Section, Selection,
     Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
@@ -33,9 +34,10 @@ pub struct GridBasedParticles<const D: usize, const M: usize> {
     vanished: Option<f64>,
     /// Errors at the times where they were due so far.
     errors: Vec<FrontErrors>,
+    watch: FrontWatch,
     /// Time of the last measurement.
     measured_at: Option<f64>,
-    /// Particles at open ends, found in the last measurement.
+    /// Particles at open ends, where they were looked for in the last step.
     ends: Vec<usize>,
     course: Course,
 }
@@ -59,6 +61,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
             max_cfl: 0.0,
             vanished: None,
             errors: Vec::new(),
+            watch: FrontWatch::new(None, f64::INFINITY),
             measured_at: None,
             ends: Vec::new(),
             course: Course::new(fixed.into(), Phases::new(cpu_clock), method),
@@ -71,15 +74,22 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
         step == self.course.pace.last || turn.is_some_and(|turn| self.course.fixed().reaches(step, 0.5 * turn))
     }
 
-    /// The growth of the front since the start and its bound, where its law has one.
-    fn growth(&self) -> Option<(f64, f64)> {
-        let most = self.system.config.law.most_growth()?;
-        Some((self.system.area_or_length() / self.start_area, most))
+    /// The same, of a motion that makes the front at most so many times as large.
+    #[must_use]
+    pub fn with_stretch(mut self, most: f64) -> Self {
+        self.watch = FrontWatch::new(self.system.config.law.most_growth(), most);
+        self
+    }
+
+    /// Growth of the front since the start.
+    fn growth(&self) -> f64 {
+        self.system.area_or_length() / self.start_area
     }
 
     /// Fails where the front has grown more than its law allows.
-    fn check_growth(&self, Clock { step, time }: Clock) -> Result<(), StepError> {
-        let Some((growth, most)) = self.growth() else { return Ok(()) };
+    fn check_growth(&self, now: Clock) -> Result<(), StepError> {
+        let growth = self.growth();
+        let Some(most) = self.system.config.law.most_growth() else { return self.watch.look_at_growth(growth, now) };
         if growth <= most {
             return Ok(());
         }
@@ -88,15 +98,20 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
              step ({}) is too long, the particles of a reconstruction are too few, or the spacing is too coarse",
             self.course.pace.time_step
         );
-        Err(StepError::Unsolved { reason, step, time })
+        Err(StepError::Unsolved { reason, step: now.step, time: now.time })
+    }
+
+    /// Counts the open ends of a front that must stay closed.
+    fn count_open_ends(&mut self, now: Clock) -> Result<(), StepError> {
+        if self.system.config.law.keeps_fronts_closed() && !self.system.feet.is_empty() {
+            self.ends = self.system.open_ends();
+            self.watch.look_at_ends(self.ends.len(), self.system.feet.len(), now)?;
+        }
+        Ok(())
     }
 
     /// Reports open ends of a front that must stay closed.
-    fn find_open_ends(&mut self, Clock { step, time }: Clock) {
-        if !self.system.config.law.keeps_fronts_closed() {
-            return;
-        }
-        self.ends = self.system.open_ends();
+    fn tell_open_ends(&mut self, Clock { step, time }: Clock) {
         let ends = &self.ends;
         if let Some(first) = ends.first() {
             let place: Vec<String> = self.system.feet.positions[*first].iter().map(|c| format!("{c:.4}")).collect();
@@ -129,6 +144,9 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
             let displacement = self.system.advance(from, to, self.course.pace.time_step, &mut self.course.phases)?;
             self.max_cfl = self.max_cfl.max(displacement);
             self.check_growth(to)?;
+            if FrontWatch::is_look_due(to.step) {
+                self.count_open_ends(to)?;
+            }
             if self.system.feet.is_empty() {
                 self.vanished = Some(to.time);
                 let counts = self.system.removals.entries().map(|(name, count)| format!("{name} {count}")).join(", ");
@@ -152,7 +170,8 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         let moment = Moment { feet: &system.feet, grid, time: to.time, interrupt };
         let found = course.phases.measure("errors", || front_errors(exact.as_ref(), ball.as_ref(), &moment))?;
         self.errors.extend(found);
-        self.find_open_ends(to);
+        self.count_open_ends(to)?;
+        self.tell_open_ends(to);
         self.measured_at = Some(to.time);
         Ok(())
     }
@@ -234,12 +253,11 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
     }
 
     fn health(&self) -> Health {
-        let growth = self.growth().map(|(growth, most)| Check::at_most("front_growth", Some(growth), most, ""));
         Health {
             finite: self.system.feet.positions.iter().all(is_finite),
             max_cfl: self.max_cfl,
             volume_drift: None,
-            checks: growth.into_iter().collect(),
+            checks: self.watch.checks(self.growth()),
         }
     }
 

@@ -45,8 +45,8 @@ impl Store {
             let place = submission::Place { id: &spec.job, clock_s };
             submission::insert(transaction, &place, &job, start.and_then(|start| start.sha256.as_deref()))?;
             transaction.execute(
-                "UPDATE jobs SET restarted_from = ?2, created_at = COALESCE(?3, created_at) WHERE id = ?1",
-                params![spec.job, start.map(|start| &start.id), submitted.created_at],
+                "UPDATE jobs SET restarted_from = ?2, created_at = COALESCE(?3, created_at), started_at = ?4 WHERE id = ?1",
+                params![spec.job, start.map(|start| &start.id), submitted.created_at, submitted.started_at],
             )?;
             Ok(())
         })
@@ -69,7 +69,7 @@ impl Store {
             self.replay(job, attempt)?;
         }
         self.drop_missing_files(job)?;
-        self.set_times(job, last)
+        self.set_end(job, last)
     }
 
     /// Brings a waiting job to the attempt whose records are to be taken.
@@ -122,21 +122,16 @@ impl Store {
         })
     }
 
-    /// Start and end of an adopted job, as its records tell.
-    fn set_times(&self, job: &str, last: u64) -> Result<(), StoreError> {
-        let at = |attempt: u64, pick: fn(&[String]) -> Option<&String>| -> Result<Option<String>, StoreError> {
-            let lines = records::read_from(&attempt_directory(&self.job_directory(job), attempt), 0)?;
-            let times: Vec<String> = lines.into_iter().filter_map(|(line, _)| Some(line?.at)).collect();
-            Ok(pick(&times).cloned())
-        };
-        let (start, end) = (at(1, <[String]>::first)?, at(last, <[String]>::last)?);
-        let is_terminal = self.state(job)?.is_some_and(State::is_terminal);
+    /// End of an adopted job, as its records tell.
+    fn set_end(&self, job: &str, last: u64) -> Result<(), StoreError> {
+        let lines = records::read_from(&attempt_directory(&self.job_directory(job), last), 0)?;
+        let end = lines.into_iter().rev().find_map(|(line, _)| Some(line?.at));
+        if !self.state(job)?.is_some_and(State::is_terminal) {
+            return Ok(());
+        }
         self.write(|transaction| {
-            transaction.execute(
-                "UPDATE jobs SET started_at = COALESCE(?2, started_at),
-                     finished_at = CASE WHEN ?4 THEN COALESCE(?3, finished_at) END WHERE id = ?1",
-                params![job, start, end, is_terminal],
-            )?;
+            transaction
+                .execute("UPDATE jobs SET finished_at = COALESCE(?2, finished_at) WHERE id = ?1", params![job, end])?;
             Ok(())
         })
     }

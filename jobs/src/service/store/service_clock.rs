@@ -7,6 +7,9 @@ use super::{Store, StoreError};
 use rusqlite::{Connection, params};
 use std::time::Instant;
 
+/// Seconds of waiting that weigh as much as one point of priority: nothing waits for ever behind what is more urgent.
+pub const AGING_S: f64 = 600.0;
+
 /// Most seconds that pass while no service runs.
 const LONGEST_GAP_S: f64 = 86_400.0;
 
@@ -28,7 +31,7 @@ impl ServiceClock {
                 .query_row("SELECT seconds, wall_ms FROM service_clock", [], |row| Ok((row.get(0)?, row.get(1)?)))?;
         let queue_s: Option<f64> = connection.query_row(
             "SELECT MAX(rank + priority * ?1) FROM jobs WHERE state = 'queued'",
-            [super::submission::AGING_S],
+            [AGING_S],
             |row| row.get(0),
         )?;
         let gap_s = (crate::system::clock::milliseconds() as f64 - wall_ms as f64) * 1e-3;

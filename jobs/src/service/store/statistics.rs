@@ -1,6 +1,6 @@
 //! Counts of jobs and uploads by state, and the size of the store.
 
-use super::submission::AGING_S;
+use super::service_clock::AGING_S;
 use super::{FILE_NAME, Store, StoreError};
 use crate::spec::states::State;
 use std::collections::BTreeMap;

@@ -1,6 +1,8 @@
 //! Making jobs: one, or all of a study, together with the answer to the request.
 
 use super::idempotency::{self, IdempotencyKey, Made, Receipt};
+use super::service_clock::AGING_S;
+use super::transitions::{self, ChangeError};
 use super::{JobRow, Store, StoreError, dependencies, events, remove_directory, rows};
 use crate::spec::attempt_files::attempt_directory;
 use crate::spec::attempt_spec::{AttemptSpec, Submission};
@@ -97,9 +99,6 @@ impl NewJob {
 struct SceneWord {
     kind: String,
 }
-
-/// Seconds of waiting that weigh as much as one point of priority: nothing waits for ever behind what is more urgent.
-pub const AGING_S: f64 = 600.0;
 
 /// Name of a restart's checkpoint in the new job's directory.
 pub const START_CHECKPOINT: &str = "start.h5";
@@ -255,7 +254,12 @@ pub(super) fn insert(
     }
     let data = json!({"from": Value::Null, "to": State::Queued.word()});
     events::append(transaction, id, study.map(String::as_str), 0, "state", &data)?;
-    dependencies::enter(transaction, id, &job.predecessors)
+    if let Some(lost) = dependencies::enter(transaction, id, &job.predecessors)?
+        && let Err(ChangeError::Store(error)) = transitions::give_up(transaction, id, &lost)
+    {
+        return Err(error);
+    }
+    Ok(())
 }
 
 #[cfg(test)]

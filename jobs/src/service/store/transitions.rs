@@ -1,6 +1,6 @@
 //! Changing the state of a job: the table of [`crate::spec::states`] applied as a compare-and-set.
 
-use super::submission::AGING_S;
+use super::service_clock::AGING_S;
 use super::{JobRow, Store, StoreError, dependencies, events, rows, study_limits};
 use crate::spec::body::Amended;
 use crate::spec::states::{Reason, State, Trigger};
@@ -200,14 +200,7 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     let reason = if plain { None } else { change.reason.or(job.reason) };
     let reason = if trigger == Trigger::Resume { None } else { reason };
     let message = if plain || trigger == Trigger::Resume { None } else { change.message.clone().or(job.message) };
-    let has_checkpoint: bool = transaction
-        .prepare_cached(
-            "SELECT EXISTS (SELECT 1 FROM checkpoints WHERE job = ?1)
-                 OR EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND restarted_from IS NOT NULL)",
-        )?
-        .query_row([id], |row| row.get(0))?;
-    let hint_of = if has_checkpoint { Reason::hint } else { Reason::hint_without_checkpoint };
-    let hint = change.hint.clone().or_else(|| reason.map(|reason| hint_of(reason).to_owned()));
+    let hint = hint(transaction, id, reason, change)?;
     // An attempt whose worker could not be started does not count.
     let attempt = if is_claim { job.attempt + 1 } else { job.attempt - u64::from(trigger == Trigger::Miss) };
     // Three deaths in a row count; a person's resume begins a new row.
@@ -246,7 +239,7 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
     events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
     if to.is_terminal() {
-        dependencies::settle(transaction, id, to)?;
+        tell_waiting_jobs(transaction, id, to)?;
     }
     if to == State::Failed
         && let Some(study) = &job.study
@@ -254,6 +247,45 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
         study_limits::note_failure(transaction, study)?;
     }
     Ok(())
+}
+
+/// What a user can do: the hint of the change, or that of the reason.
+fn hint(
+    transaction: &Transaction,
+    id: &str,
+    reason: Option<Reason>,
+    change: &Change,
+) -> Result<Option<String>, ChangeError> {
+    let (None, Some(reason)) = (&change.hint, reason) else { return Ok(change.hint.clone()) };
+    let has_checkpoint: bool = transaction
+        .prepare_cached(
+            "SELECT EXISTS (SELECT 1 FROM checkpoints WHERE job = ?1)
+                 OR EXISTS (SELECT 1 FROM jobs WHERE id = ?1 AND restarted_from IS NOT NULL)",
+        )?
+        .query_row([id], |row| row.get(0))?;
+    let hint = if has_checkpoint { reason.hint() } else { reason.hint_without_checkpoint() };
+    Ok(Some(hint.to_owned()))
+}
+
+/// Lets the jobs that wait for one start, or cancels them where it has not succeeded.
+fn tell_waiting_jobs(transaction: &Transaction, id: &str, state: State) -> Result<(), ChangeError> {
+    for dependent in dependencies::release(transaction, id)? {
+        if state == State::Succeeded {
+            continue;
+        }
+        match give_up(transaction, &dependent, id) {
+            // It has ended before.
+            Ok(()) | Err(ChangeError::Illegal(..)) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+/// Cancels a job because one that it waits for has not succeeded.
+pub(super) fn give_up(transaction: &Transaction, job: &str, predecessor: &str) -> Result<(), ChangeError> {
+    let message = Some(format!("{predecessor} of `after` has not succeeded"));
+    apply(transaction, job, Trigger::Cancel, &Change { message, ..Change::because(Reason::DependencyFailed) })
 }
 
 /// The columns of a job that a transition reads: a study changes ten thousand jobs at once.

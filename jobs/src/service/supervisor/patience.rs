@@ -1,7 +1,7 @@
 //! Time as the supervisor experiences it, by which leases and grace periods are judged.
 //!
-//! Where this process or the whole machine stood still (SIGSTOP, a suspended laptop, a frozen virtual machine), nobody could
-//! send a heartbeat or follow a request. A round that comes late counts as one second.
+//! Where this process or the whole machine stood still (SIGSTOP, a suspended laptop, a frozen virtual machine), no heartbeat
+//! could be sent and no request followed. A round that comes late counts as one second.
 
 use std::time::{Duration, Instant};
 

@@ -154,6 +154,7 @@ impl Supervisor {
                 forecast: job.forecast.clone(),
                 warnings: job.warnings.clone(),
                 created_at: Some(job.created_at.clone()),
+                started_at: job.started_at.clone(),
                 owner: job.owner.clone(),
                 study: job.study.clone().zip(job.study_index),
                 retry_of: job.retry_of.clone(),

@@ -53,6 +53,12 @@ impl Control {
         self.canceled.load(Ordering::Relaxed)
     }
 
+    /// Whether the run is to end with its state kept.
+    #[must_use]
+    pub fn is_only_pausing(&self) -> bool {
+        self.is_pausing() && !self.is_canceled()
+    }
+
     /// The flag that solvers poll: the step in progress is dropped.
     #[must_use]
     pub fn interrupt(&self) -> &Interrupt {
