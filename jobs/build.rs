@@ -1,24 +1,33 @@
-//! Lists the verification cases of `tests/validation/cases` with their text, so that the program has them without a repository.
+//! Lists the verification cases and bad runs of `tests/validation` with their text, so that the program has them without a repository.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 fn main() -> io::Result<()> {
-    let root = variable("CARGO_MANIFEST_DIR")?.join("../tests/validation/cases");
-    println!("cargo:rerun-if-changed={}", root.display());
+    let mut text = String::new();
+    for (name, folder) in [("FILES", "cases"), ("BAD_FILES", "bad")] {
+        let root = variable("CARGO_MANIFEST_DIR")?.join("../tests/validation").join(folder);
+        println!("cargo:rerun-if-changed={}", root.display());
+        list(name, &root, &mut text)?;
+    }
+    fs::write(variable("OUT_DIR")?.join("verification_cases.rs"), text)
+}
+
+/// Writes a table of the files below a directory.
+fn list(name: &str, root: &Path, text: &mut String) -> io::Result<()> {
     let mut files = Vec::new();
-    collect(&root, &mut files)?;
+    collect(root, &mut files)?;
     files.sort();
-    let mut text = String::from("pub static FILES: &[(&str, &str)] = &[\n");
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "pub static {name}: &[(&str, &str)] = &[");
     for file in &files {
-        let name = file.strip_prefix(&root).map_err(io::Error::other)?;
-        // Writing to a String cannot fail.
+        let name = file.strip_prefix(root).map_err(io::Error::other)?;
         let _ =
             writeln!(text, "    ({:?}, include_str!({:?})),", name.display().to_string(), file.display().to_string());
     }
     text.push_str("];\n");
-    fs::write(variable("OUT_DIR")?.join("verification_cases.rs"), text)
+    Ok(())
 }
 
 /// A path that cargo hands to build scripts. At run time, so that a script built in another folder serves this one too.

@@ -25,9 +25,14 @@ pub fn start_where_needed(store: &Arc<Store>, threads: usize) -> io::Result<()> 
 }
 
 fn measure(store: &Store, threads: usize) -> io::Result<usize> {
+    let scratch = store.directory().join("calibration");
+    // What a measurement that was cut short has left.
+    if scratch.exists() {
+        std::fs::remove_dir_all(&scratch)?;
+    }
     let mut child = Command::new("/proc/self/exe")
         .args(["calibrate", "--threads", &threads.to_string(), "--scratch"])
-        .arg(store.directory().join("calibration"))
+        .arg(&scratch)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())

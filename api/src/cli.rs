@@ -68,6 +68,9 @@ enum Command {
         /// Include long targets, and write documents and plots of the results.
         #[arg(long)]
         full: bool,
+        /// Verify the checks of runs instead: bad runs must be refused, end or be doubtful, and no check may end a good one.
+        #[arg(long)]
+        checks: bool,
         /// Directory of cases, KIND/NAME.json; those of the program by default.
         #[arg(long)]
         cases: Option<PathBuf>,
@@ -163,7 +166,15 @@ pub fn main() -> ExitCode {
         Command::Resume { checkpoint, out, threads } => {
             foreground::resume(&checkpoint, &out, threads).unwrap_or_else(|error| fail(&error))
         }
-        Command::Verify { only, full, cases, runs, results } => {
+        Command::Verify { only, full, checks: true, cases, runs, results } => {
+            let request = verify::Request { only, full, cases, runs, results };
+            match verify::checks::run(&request, |line| writeln!(std::io::stdout(), "{line}")) {
+                Ok(true) => ExitCode::SUCCESS,
+                Ok(false) => ExitCode::FAILURE,
+                Err(error) => fail(&error),
+            }
+        }
+        Command::Verify { only, full, checks: false, cases, runs, results } => {
             let request = verify::Request { only, full, cases, runs, results };
             let show = |outcome: &verify::Outcome| writeln!(std::io::stdout(), "{outcome}");
             match verify::verify(&request, show) {
@@ -238,6 +249,10 @@ fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
     process::be_nice();
     if let Err(error) = worker::process::end_with_input() {
         return fail(&error);
+    }
+    // It is emptied in the end: only a new or empty directory will do.
+    if std::fs::read_dir(scratch).is_ok_and(|mut entries| entries.next().is_some()) {
+        return fail(&format!("{} is not empty", scratch.display()));
     }
     let found = match worker::calibration::measure_here(scratch, threads) {
         Ok(found) => found,

@@ -35,6 +35,9 @@ pub fn metrics() -> std::io::Result<PrometheusHandle> {
     describe_gauge!("meniscus_disk_reserve_bytes", "bytes that jobs leave free");
     describe_gauge!("meniscus_resident_bytes", "resident memory of the service in bytes");
     describe_gauge!("meniscus_memory_available_bytes", "bytes of memory available to new workers");
+    describe_gauge!("meniscus_slots", "jobs that run at the same time");
+    describe_gauge!("meniscus_connections", "open connections of clients");
+    describe_gauge!("meniscus_cpu_seconds", "CPU seconds of the service so far");
     describe_counter!("meniscus_transitions_total", "changes of the state of jobs, by new state and reason");
     Ok(handle)
 }

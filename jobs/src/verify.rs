@@ -1,8 +1,10 @@
 //! `verify`: runs the verification cases and compares their values with the targets. Runs are jobs of one thread in a
 //! directory of their own; those of this build that are already there are not repeated.
 
+pub mod bad_case;
 pub mod case;
 pub mod catalog;
+pub mod checks;
 mod document;
 pub mod measure;
 mod outcome;

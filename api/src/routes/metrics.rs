@@ -26,7 +26,7 @@ pub async fn metrics(State(state): State<AppState>) -> Result<Response, ApiError
     gauge!("meniscus_disk_free_bytes").set(free as f64);
     gauge!("meniscus_disk_reserve_bytes").set(state.config.disk_reserve_bytes as f64);
     gauge!("meniscus_resident_bytes").set(process::resident_bytes(std::process::id()).unwrap_or(0) as f64);
-    gauge!("meniscus_cpu_seconds_total").set(process::cpu_seconds());
+    gauge!("meniscus_cpu_seconds").set(process::cpu_seconds());
     gauge!("meniscus_memory_available_bytes").set(process::available_memory().unwrap_or(0) as f64);
     let text = state.metrics.render();
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())

@@ -23,6 +23,12 @@ pub fn built_in_files() -> &'static [(&'static str, &'static str)] {
     built_in::FILES
 }
 
+/// The same of the bad runs, by the name below `tests/validation/bad`.
+#[must_use]
+pub fn built_in_bad_files() -> &'static [(&'static str, &'static str)] {
+    built_in::BAD_FILES
+}
+
 /// The file that says which kinds share a document.
 const DOCUMENTS: &str = "documents.json";
 

@@ -1,11 +1,14 @@
 //! Where the runs of a verification are kept. Runs of this build that are already there are not repeated.
 
+use super::bad_case::Fate;
+use super::checks;
 use super::measure::FinishedRun;
 use crate::spec::attempt_files;
+use crate::spec::records::Verdict;
 use crate::spec::report::RunReport;
 use crate::system::build;
 use crate::system::digest;
-use crate::worker::local_run::{self, Keep};
+use crate::worker::local_run::{self, Keep, Refused};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,10 +33,32 @@ impl Workspace {
         FinishedRun::new(body, report)
     }
 
+    /// What becomes of a run, and its report where it comes to its end.
+    pub(super) fn fate(&self, body: &Value, expected: Option<&Fate>) -> (Fate, Option<RunReport>) {
+        let directory = self.directory_of(body, Keep::Report);
+        if let Some(report) = read_report(&directory) {
+            return (checks::fate_of(&report, expected), Some(report));
+        }
+        let fate = match local_run::run_to_verdict(body, &directory, 1, Keep::Report) {
+            Err(Refused { pointer, .. }) => Fate::Refused(pointer),
+            Ok((_, Verdict::Failed { reason, .. })) => Fate::Ended(reason.word().to_owned()),
+            Ok(_) => match read_report(&directory) {
+                Some(report) => return (checks::fate_of(&report, expected), Some(report)),
+                None => Fate::Ended("no report".to_owned()),
+            },
+        };
+        (fate, None)
+    }
+
+    /// The directory of a run of this build.
+    fn directory_of(&self, body: &Value, keep: Keep) -> PathBuf {
+        let key = format!("{body} {keep:?}");
+        self.directory.join(&digest::of_bytes(key.as_bytes())[..16])
+    }
+
     /// The directory of a run of this build: an earlier one, or one made now.
     pub(super) fn run(&self, body: &Value, keep: Keep) -> Result<PathBuf, String> {
-        let key = format!("{body} {keep:?}");
-        let directory = self.directory.join(&digest::of_bytes(key.as_bytes())[..16]);
+        let directory = self.directory_of(body, keep);
         if read_report(&directory).is_none() {
             local_run::run(body, &directory, 1, keep)?;
         }

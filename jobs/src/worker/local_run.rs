@@ -22,22 +22,52 @@ pub enum Keep {
     Frames,
 }
 
+/// Why a body was not run.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct Refused {
+    /// The first place that is wrong; empty where the directory cannot be used.
+    pub pointer: String,
+    /// All that is wrong.
+    pub message: String,
+}
+
+impl From<io::Error> for Refused {
+    fn from(error: io::Error) -> Self {
+        Self { pointer: String::new(), message: error.to_string() }
+    }
+}
+
 /// Runs a job body into a directory, which is emptied before, and returns how it was understood.
 ///
 /// # Errors
 /// A sentence.
 pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<JobBody, String> {
-    let system = |error: io::Error| error.to_string();
-    if directory.exists() {
-        fs::remove_dir_all(directory).map_err(system)?;
+    let (body, verdict) = run_to_verdict(body, directory, threads, keep).map_err(|refused| refused.message)?;
+    match verdict {
+        Verdict::Succeeded => Ok(body),
+        Verdict::Failed { message, .. } => Err(message),
+        other => Err(format!("the run {other}")),
     }
-    fs::create_dir_all(directory).map_err(system)?;
+}
+
+/// The same to its verdict, whatever that is.
+///
+/// # Errors
+/// [`Refused`].
+pub fn run_to_verdict(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<(JobBody, Verdict), Refused> {
     let memory_bytes = process::total_memory().unwrap_or(4 << 30) / 5 * 4;
     let allowance = Allowance { threads, memory_bytes, local_files: false };
     let body = body::parse(body, allowance, &NoSources).map_err(|error| {
         let violations = error.violations();
-        violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect::<Vec<_>>().join("; ")
+        let lines: Vec<String> = violations.iter().map(|v| format!("{}: {}", v.pointer, v.detail)).collect();
+        let pointer = violations.first().map_or_else(String::new, |first| first.pointer.clone());
+        Refused { pointer, message: lines.join("; ") }
     })?;
+    if directory.exists() {
+        fs::remove_dir_all(directory)?;
+    }
+    fs::create_dir_all(directory)?;
     let spec = AttemptSpec {
         job: "local".to_owned(),
         epoch: 1,
@@ -51,17 +81,14 @@ pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<J
         usage: Usage::default(),
         submission: None,
     };
-    match attempt::run_attempt(&spec, directory, &Control::default(), &mut Silent) {
-        Verdict::Succeeded => {
-            let _ = fs::remove_dir_all(directory.join(attempt_files::CHECKPOINTS));
-            if keep == Keep::Report {
-                let _ = fs::remove_dir_all(directory.join(attempt_files::FRAMES));
-            }
-            Ok(body)
+    let verdict = attempt::run_attempt(&spec, directory, &Control::default(), &mut Silent);
+    if verdict == Verdict::Succeeded {
+        let _ = fs::remove_dir_all(directory.join(attempt_files::CHECKPOINTS));
+        if keep == Keep::Report {
+            let _ = fs::remove_dir_all(directory.join(attempt_files::FRAMES));
         }
-        Verdict::Failed { message, .. } => Err(message),
-        other => Err(format!("the run {other}")),
     }
+    Ok((body, verdict))
 }
 
 struct Silent;

@@ -53,7 +53,7 @@ pub static PROOFS: &[Proof] = &[
     Proof { name: "cuts_in_a_download", quick: 20, full: 200, batch: 20, run: clients::cut_downloads },
     Proof { name: "one_key_one_job", quick: 100, full: 1000, batch: 100, run: clients::one_key },
     Proof { name: "cancels", quick: 20, full: 1000, batch: 100, run: cancels::prompt },
-    Proof { name: "requests_at_random_moments", quick: 6, full: 20, batch: 20, run: moments::of_every_scene },
+    Proof { name: "requests_at_random_moments", quick: 4, full: 20, batch: 20, run: moments::of_every_scene },
     Proof { name: "mutated_scenes", quick: 20_000, full: 1_000_000, batch: 100_000, run: parsers::scenes },
     Proof { name: "mutated_bodies_of_studies", quick: 5_000, full: 1_000_000, batch: 100_000, run: parsers::studies },
     Proof { name: "mutated_structures", quick: 20_000, full: 1_000_000, batch: 100_000, run: parsers::structures },

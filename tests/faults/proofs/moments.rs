@@ -15,21 +15,21 @@ fn bodies() -> Vec<(&'static str, Value)> {
         ),
         (
             "frames",
-            json!({"scene": {"kind": "vortex", "spacing": 0.03, "flow": "vortex_3d", "end_time": 0.2,
+            json!({"scene": {"kind": "vortex", "spacing": 0.04, "flow": "vortex_3d", "end_time": 0.2, "steps": 60,
             "shape": {"type": "sphere", "center": [0.35, 0.35, 0.35], "radius": 0.15}}, "output": {"every_time": 0.02}}),
         ),
-        ("step", json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.03125, "repeat": 3}})),
-        ("front", json!({"scene": {"kind": "front", "dimension": 2, "spacing": 0.01}})),
+        ("step", json!({"scene": {"kind": "redistance", "dimension": 3, "spacing": 0.02, "repeat": 3}})),
+        ("front", json!({"scene": {"kind": "front", "shape": {"type": "sphere", "radius": 0.3}, "spacing": 0.02}})),
         ("droplet", json!({"scene": {"kind": "droplet", "spacing": 0.0625, "end_time": 0.5}})),
         (
             "set-up",
-            json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 60_000,
+            json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 200_000,
             "problem": {"type": "laplace_beltrami", "field": "plane_wave"}}, "output": {"operators": "matrix_market"}}),
         ),
         (
             "solve",
-            json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 20_000,
-            "problem": {"type": "eigenvalues", "count": 20}}}),
+            json!({"scene": {"kind": "surface_pde", "surface": "sphere", "count": 6_000,
+            "problem": {"type": "eigenvalues", "count": 10}}}),
         ),
     ]
 }
