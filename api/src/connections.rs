@@ -14,6 +14,7 @@ use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use rustix::process::{Resource, getrlimit};
 use stalling::Stalling;
+use socket2::SockRef;
 use std::collections::BTreeMap;
 use std::future::poll_fn;
 use std::io;
@@ -30,6 +31,8 @@ use tower_service::Service;
 const HEAD_TIME: Duration = Duration::from_secs(15);
 /// Time without any progress after which a connection that reads or writes is closed.
 const STALL_TIME: Duration = Duration::from_secs(20);
+/// Bytes that wait to be sent before a connection counts as full.
+const UNSENT_BYTES: u32 = 128 << 10;
 /// Time for the rest of a body that was refused to come in. Before it is read the answer could be lost.
 const LINGER_TIME: Duration = Duration::from_secs(2);
 /// Bytes of such a rest that are read at most.
@@ -134,6 +137,8 @@ async fn answer(
     mut stopping: watch::Receiver<bool>,
 ) -> io::Result<()> {
     stream.set_nodelay(true)?;
+    // A large buffer would hide for a long time that a slow reader goes on.
+    SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT_BYTES)?;
     // The router is always ready, and its future is boxed because hyper moves it.
     let service = service_fn(move |request: Request<Incoming>| Box::pin(router.clone().call(request.map(Body::new))));
     let io = TokioIo::new(Stalling::new(stream, STALL_TIME));

@@ -140,6 +140,13 @@ impl Service {
         self.restart();
     }
 
+    /// Stops it, and starts it again without `--adopt`.
+    pub fn restart_needs_no_adoption(&mut self) {
+        assert!(self.stop());
+        self.arguments.retain(|argument| argument != "--adopt");
+        self.restart();
+    }
+
     /// A start that is refused: what it says.
     pub fn refused_start(&self) -> String {
         let output = Command::new(program())

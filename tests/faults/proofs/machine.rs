@@ -196,3 +196,35 @@ pub fn clock_steps(count: u64, seed: u64) -> String {
     service.fsck();
     format!("{count} steps of the clock within ±1 day: ids rise, every job is listed once, all have succeeded")
 }
+
+/// Descriptors run out while jobs wait: none of them fails, and all run when there are some again.
+pub fn descriptor_shortage(count: u64, seed: u64) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    let service = Service::start(directory.path(), &["--slots", "2"]);
+    let limit = |soft: u64| {
+        let status = Command::new("prlimit")
+            .args(["--pid", &service.pid().to_string(), &format!("--nofile={soft}:")])
+            .status()
+            .unwrap();
+        assert!(status.success());
+    };
+    let (mut missed, mut jobs) = (0, 0);
+    for round in 0..count {
+        let open = std::fs::read_dir(format!("/proc/{}/fd", service.pid())).unwrap().count() as u64;
+        let blocker = service.submit(&endless_job());
+        let ids: Vec<String> =
+            (0..3).map(|_| service.submit(&json!({"scene": {"kind": "redistance", "spacing": 0.2}}))).collect();
+        // Enough for a client that asks, and for no worker's pipes.
+        limit(open + 2);
+        std::thread::sleep(Duration::from_secs_f64(0.5 + chance(seed, round)));
+        limit(1024);
+        service.act(&blocker, "cancel");
+        for id in &ids {
+            let job = service.wait_for(id, &["succeeded"]);
+            assert_eq!(job["attempt"], 1, "{job}");
+            missed += service.events(id).iter().filter(|event| event["data"]["hint"].is_string()).count();
+            jobs += 1;
+        }
+    }
+    format!("{jobs} jobs in {count} shortages of descriptors, {missed} missed starts, none failed")
+}

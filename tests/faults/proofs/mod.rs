@@ -4,6 +4,7 @@
 pub mod cancels;
 pub mod checkpoints;
 pub mod clients;
+pub mod directories;
 pub mod files;
 pub mod kills;
 pub mod machine;
@@ -53,6 +54,9 @@ pub static PROOFS: &[Proof] = &[
     Proof { name: "cuts_in_a_download", quick: 20, full: 200, batch: 20, run: clients::cut_downloads },
     Proof { name: "one_key_one_job", quick: 100, full: 1000, batch: 100, run: clients::one_key },
     Proof { name: "cancels", quick: 20, full: 1000, batch: 100, run: cancels::prompt },
+    Proof { name: "lost_databases", quick: 4, full: 200, batch: 20, run: directories::lost_databases },
+    Proof { name: "foreign_folders", quick: 4, full: 200, batch: 50, run: directories::foreign_folders },
+    Proof { name: "descriptor_shortage", quick: 2, full: 50, batch: 10, run: machine::descriptor_shortage },
     Proof { name: "requests_at_random_moments", quick: 4, full: 20, batch: 20, run: moments::of_every_scene },
     Proof { name: "mutated_scenes", quick: 20_000, full: 1_000_000, batch: 100_000, run: parsers::scenes },
     Proof { name: "mutated_bodies_of_studies", quick: 5_000, full: 1_000_000, batch: 100_000, run: parsers::studies },
