@@ -14,6 +14,7 @@ mod estimates;
 mod readers;
 mod requests;
 mod studies;
+mod upload_kinds;
 mod uploads;
 mod verify;
 

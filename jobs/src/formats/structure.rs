@@ -11,8 +11,8 @@
 //!
 //! After the HDF5 File Format Specification, version 3.0, and the layout version 5 of HDF5 2.0. Accepted are superblocks 0 to
 //! 3, object headers 1 and 2, groups as symbol tables, compact links and dense links (fractal heap and version 2 tree), and
-//! compact, contiguous and chunked layouts with every chunk index, behind deflate, shuffle and Fletcher-32. The check sums of
-//! metadata are not compared: every address and size is checked where it is used.
+//! compact, contiguous and chunked layouts with every chunk index, behind deflate, shuffle and Fletcher-32. Check sums are
+//! compared, of metadata and of chunks.
 
 mod array_index;
 mod checksum;
@@ -30,6 +30,7 @@ mod tree_2;
 pub use contents::{contents, integers, reals};
 pub use element::Element;
 
+use checksum::lookup_3;
 use chunk_index::ChunkIndex;
 use header::Message;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,6 +44,11 @@ pub trait Bytes {
 
     /// Fills a buffer from a place; false where the bytes end before.
     fn fill(&self, at: u64, buffer: &mut [u8]) -> bool;
+
+    /// Whether check sums of metadata are compared. Tests turn it off to reach what is behind them.
+    fn has_sums(&self) -> bool {
+        true
+    }
 }
 
 impl Bytes for [u8] {
@@ -170,6 +176,11 @@ const MOST_CHUNKS: u64 = 1 << 22;
 const MOST_NODES: usize = 1 << 17;
 /// Bytes of a data set at most.
 const LARGEST_DATA: u64 = 4 << 30;
+/// Bytes of a check sum, and of a superblock of version 2 or 3 before it.
+const SUM: u64 = 4;
+const NEW_SUPERBLOCK: u64 = 44;
+/// Marks of a superblock of version 3 that it is open for writing, alone or beside readers.
+const IS_OPEN: u8 = 5;
 /// Deflate, shuffle, Fletcher-32.
 const FILTERS: [u16; 3] = [1, 2, 3];
 
@@ -239,9 +250,24 @@ impl<'a, B: Bytes + ?Sized> Reader<'a, B> {
         if self.file.fill(at, &mut bytes) { Ok(bytes) } else { Err(self.damaged(place, at, "the file ends too soon")) }
     }
 
+    /// The bytes of a block behind which stands its check sum.
+    fn sealed(&self, place: &str, at: u64, size: u64) -> Result<Vec<u8>, Refusal> {
+        let mut bytes = self.bytes(place, at, size.saturating_add(SUM))?;
+        let sum = bytes.split_off(size as usize);
+        self.check_sum(place, at, &bytes, &sum)?;
+        Ok(bytes)
+    }
+
+    fn check_sum(&self, place: &str, at: u64, bytes: &[u8], sum: &[u8]) -> Result<(), Refusal> {
+        if self.file.has_sums() && lookup_3(bytes).to_le_bytes() != sum {
+            return Err(self.damaged(place, at, "a block does not match its check sum"));
+        }
+        Ok(())
+    }
+
     /// The address of the root's header.
     fn superblock(&self) -> Result<u64, Refusal> {
-        let head = self.bytes("", 0, 16).map_err(|_| Refusal::NotHdf5)?;
+        let head = self.bytes("", 0, 20).map_err(|_| Refusal::NotHdf5)?;
         if head.get(..8) != Some(SIGNATURE) {
             return Err(Refusal::NotHdf5);
         }
@@ -255,6 +281,14 @@ impl<'a, B: Bytes + ?Sized> Reader<'a, B> {
         if widths != [8, 8] {
             return Err(self.unaccepted("", "addresses that are not 8 bytes wide"));
         }
+        // libhdf5 refuses trees without members, and files that a program has open or did not close.
+        if version < 2 && (head[16..18] == [0; 2] || head[18..20] == [0; 2]) {
+            return Err(self.damaged("", 16, "its trees have no members"));
+        }
+        if version == 3 && head[11] & IS_OPEN != 0 {
+            let what = "a mark that a program writes it or ended without closing it (h5clear -s takes the mark away)";
+            return Err(self.unaccepted("", what));
+        }
         let bytes = self.bytes("", body, size)?;
         let mut cursor = numbers(&bytes);
         let mut next = || cursor.number(8).unwrap_or(UNDEFINED);
@@ -263,10 +297,12 @@ impl<'a, B: Bytes + ?Sized> Reader<'a, B> {
             return Err(self.unaccepted("", "a base address that is not 0"));
         }
         if end > self.file.size() {
-            return Err(self.damaged("", body + 16, "it ends before its end-of-file address"));
+            let what = "it was cut off, or is still being written: it ends before its end-of-file address";
+            return Err(self.damaged("", body + 16, what));
         }
         if version >= 2 {
             let root = next();
+            self.sealed("", 0, NEW_SUPERBLOCK)?;
             if second != UNDEFINED {
                 self.check_extension(second)?;
             }

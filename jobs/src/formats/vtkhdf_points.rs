@@ -30,7 +30,13 @@ pub struct VtkPoints {
 /// # Errors
 /// A sentence that names the data set and what is wrong with it.
 pub fn read(file: &File, purpose: Purpose) -> Result<VtkPoints, String> {
-    let found = Found { file, structure: structure::read(file).map_err(|refusal| refusal.to_string())? };
+    let structure = structure::read(file).map_err(|refusal| match refusal {
+        Refusal::NotHdf5 if purpose == Purpose::Points => {
+            format!("{refusal}; points with their level (phi) come as VTKHDF")
+        }
+        _ => refusal.to_string(),
+    })?;
+    let found = Found { file, structure };
     let (points, count) = found.check_points()?;
     let level = found.level(purpose, count)?;
     let normals = if purpose == Purpose::Surface { found.normals(count)? } else { None };
@@ -84,7 +90,9 @@ impl Found<'_> {
             return Err(format!("{place} has the extent {:?}, not [n, 3]", points.extent));
         };
         if !points.is_float() || count == 0 || count > MOST_POINTS {
-            return Err(format!("{place} must be 1 to {MOST_POINTS} points of floating-point numbers"));
+            return Err(format!(
+                "{place} must be 1 to {MOST_POINTS} points of floating-point numbers of 32 or 64 bits"
+            ));
         }
         let steps = self.get("/VTKHDF/Steps/Values").map_or(1, DataSet::elements);
         if steps > 1 {
@@ -98,9 +106,10 @@ impl Found<'_> {
         match self.get(place) {
             // Places are asked about: what they may have beside does not matter.
             _ if purpose != Purpose::Points => Ok(None),
-            Some(phi) if !phi.is_float() || phi.extent != [count] => {
-                Err(format!("{place} must be {count} floating-point numbers, not {:?}", phi.extent))
-            }
+            Some(phi) if !phi.is_float() || ![vec![count], vec![count, 1]].contains(&phi.extent) => Err(format!(
+                "{place} must be {count} floating-point numbers of 32 or 64 bits; its extent is {:?}",
+                phi.extent
+            )),
             Some(_) => Ok(Some(place)),
             None => Err("there is no data set /VTKHDF/PointData/phi (the level, positive outside)".to_owned()),
         }
@@ -113,7 +122,9 @@ impl Found<'_> {
         match self.get(&place) {
             Some(normal) if !normal.is_float() || normal.extent != [count, 3] => {
                 let found = &normal.extent;
-                Err(format!("{place} must be [{count}, 3] floating-point numbers, not {found:?}"))
+                Err(format!(
+                    "{place} must be [{count}, 3] floating-point numbers of 32 or 64 bits; its extent is {found:?}"
+                ))
             }
             _ => Ok(Some(place)),
         }

@@ -24,12 +24,16 @@ fn whole_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     })
 }
 
+/// Corners of a face with their normals, both from 0, and the line that names them.
+struct Face {
+    line: usize,
+    corners: Vec<(u32, Option<u32>)>,
+}
+
 /// Reads positions, normals and faces.
 pub(super) fn read(text: &str) -> Result<Mesh, String> {
     let mut mesh = Mesh::default();
-    let mut normals = Vec::new();
-    // The normal that a face gives to a point.
-    let mut given: HashMap<u32, usize> = HashMap::new();
+    let (mut normals, mut faces) = (Vec::new(), Vec::new());
     for (line, words) in whole_lines(text) {
         let mut words = words.split('#').next().unwrap_or_default().split_whitespace();
         match words.next().unwrap_or_default() {
@@ -42,35 +46,56 @@ pub(super) fn read(text: &str) -> Result<Mesh, String> {
                 normals.push(triple(&mut words, line)?);
             }
             "f" => {
-                check_count(mesh.faces.len() / 4)?;
-                let mut face = Vec::new();
-                for word in words {
-                    if face.len() >= MOST_CORNERS {
-                        return Err(format!("line {line} has more than {MOST_CORNERS} corners"));
-                    }
-                    let mut parts = word.split('/');
-                    let point = index(parts.next(), mesh.points.len(), ("point", line))?;
-                    let normal = parts.nth(1).filter(|text| !text.is_empty());
-                    let normal = normal.map(|text| index(Some(text), normals.len(), ("normal", line))).transpose()?;
-                    face.push((point, normal));
-                }
+                check_count(faces.len() / 4)?;
+                let corners = corners(words, (mesh.points.len(), normals.len()), line)?;
                 // A face of two corners is a line, and one of one corner a point.
-                if face.len() > 2 {
-                    given.extend(face.iter().filter_map(|(point, normal)| normal.map(|n| (*point, n as usize))));
-                    mesh.faces.push(face.into_iter().map(|(point, _)| point).collect());
+                if corners.len() > 2 {
+                    faces.push(Face { line, corners });
                 }
             }
             _ => {}
         }
     }
+    // A face may come before its points. The last face of a point gives it its normal.
+    let mut given: HashMap<u32, [f64; 3]> = HashMap::new();
+    for Face { line, corners } in faces {
+        for (point, normal) in &corners {
+            check_index(*point, mesh.points.len(), ("point", line))?;
+            if let Some(normal) = normal {
+                check_index(*normal, normals.len(), ("normal", line))?;
+                given.insert(*point, normals[*normal as usize]);
+            }
+        }
+        mesh.faces.push(corners.into_iter().map(|(point, _)| point).collect());
+    }
     if !given.is_empty() {
         // Points to which no face gives a normal are refused where all formats are, unless they are no part of the surface.
-        let of_point = |k: u32| given.get(&k).and_then(|normal| normals.get(*normal)).copied().unwrap_or([f64::NAN; 3]);
+        let of_point = |k: u32| given.get(&k).copied().unwrap_or([f64::NAN; 3]);
         mesh.normals = (0..mesh.points.len() as u32).map(of_point).collect();
     } else if normals.len() == mesh.points.len() {
         mesh.normals = normals;
     }
     Ok(mesh)
+}
+
+/// Corners of a face: point, texture coordinate and normal of each, of which the latter may be missing.
+fn corners(
+    words: SplitWhitespace,
+    (points, normals): (usize, usize),
+    line: usize,
+) -> Result<Vec<(u32, Option<u32>)>, String> {
+    let mut found = Vec::new();
+    for word in words {
+        if found.len() >= MOST_CORNERS {
+            return Err(format!("line {line} has more than {MOST_CORNERS} corners"));
+        }
+        let mut parts = word.split('/');
+        let point = index(parts.next().unwrap_or_default(), points, ("point", line))?;
+        let normal = parts.nth(1).filter(|text| !text.is_empty());
+        let normal = normal.map(|text| index(text, normals, ("normal", line))).transpose()?;
+        found.push((point, normal));
+    }
+    Ok(found)
 }
 
 /// The first three numbers of a line; a weight or a color may follow.
@@ -79,12 +104,20 @@ fn triple(words: &mut SplitWhitespace, line: usize) -> Result<[f64; 3], String> 
     Ok([text::real(next()?, line)?, text::real(next()?, line)?, text::real(next()?, line)?])
 }
 
-/// An index: from 1, or from the end where negative.
-fn index(text: Option<&str>, count: usize, (kind, line): (&str, usize)) -> Result<u32, String> {
-    let text = text.unwrap_or_default();
+/// An index, as one from 0: it is from 1, or from the end of what came before where it is negative.
+fn index(text: &str, count: usize, (kind, line): (&str, usize)) -> Result<u32, String> {
     let number: i64 = text.parse().map_err(|_| format!("line {line}: {text:?} is no index of a {kind}"))?;
     let place = if number < 0 { (count as i64).checked_add(number) } else { number.checked_sub(1) };
-    place.and_then(|place| u32::try_from(place).ok()).filter(|place| (*place as usize) < count).ok_or_else(|| {
-        format!("line {line}: there is no {kind} {number} among the {count} before it (they are counted from 1)")
+    place.and_then(|place| u32::try_from(place).ok()).ok_or_else(|| {
+        format!(
+            "line {line}: there is no {kind} {number}; there are {count} before it, counted from 1, or from −1 backward"
+        )
     })
+}
+
+fn check_index(place: u32, count: usize, (kind, line): (&str, usize)) -> Result<(), String> {
+    if (place as usize) < count {
+        return Ok(());
+    }
+    Err(format!("line {line}: there is no {kind} {} among {count} (they are counted from 1)", u64::from(place) + 1))
 }

@@ -110,7 +110,7 @@ fn what_is_not_needed_is_passed_over() {
     let mut latin_1 = TETRAHEDRON.replace("element vertex", "comment Gr??e\nobj_info x\nelement vertex").into_bytes();
     latin_1.iter_mut().filter(|byte| **byte == b'?').for_each(|byte| *byte = 0xF6);
     assert_eq!(read(&latin_1).unwrap(), tetrahedron());
-    // 66 further properties, lists among them, an element that nobody knows before the faces and one behind that is cut off.
+    // 66 further properties, lists among them, an element that no reader knows before the faces and one behind that is cut off.
     let more: String = (0..66).map(|k| format!("property float scalar_{k}\n")).collect();
     let text = TETRAHEDRON
         .replace("element face", &format!("{more}property list int int marks\nelement camera 2\nproperty float a\nproperty list uint8 uint16 b\nelement face"))
@@ -125,6 +125,9 @@ fn what_is_not_needed_is_passed_over() {
     let obj = "o Gr\u{f6}\u{df}e\nmtllib x\nv 0 0 0 1 .5 .5\nv 1 0 0\nv 0 1 \\\n 0\nv 0 0 1\nvt 0 0\nvn 1 0 0\nl 1 2\nf 1 2\nf 1/1/1 3/1/1 \\\r\n2/1/1 # x\nf 1/1/1 2/1/1 \\\n\\\n4/1/1\ns off\nf -4/-1/-1 -1//-1 3//1\ncurv 1 2\nf 2/1/1 3/1/1 4/1/1\np 1\n";
     let obj = read(obj.as_bytes()).unwrap();
     assert_eq!((obj.faces.clone(), obj.normals.len()), (tetrahedron().faces, 4));
+    // Faces may come before their points.
+    let (points, faces) = OBJ.split_at(OBJ.find('f').unwrap());
+    assert_eq!(read(format!("{faces}{points}").as_bytes()), read(OBJ.as_bytes()));
     // Lines of points with colors, with a value, with a value and colors, with colors and normals.
     let line = |rest: &str| read(format!("X Y Z\n0 0 1 {rest}\n0 1 0 {rest}\n").as_bytes()).unwrap();
     for (rest, normals) in
@@ -198,7 +201,7 @@ fn what_is_wrong_is_named() {
             TETRAHEDRON.replace("\n1 0 0\n", "\n1,5 0 0\n"),
             "vertex 1 (counted from 0) of 4: \"1,5\" has a decimal comma",
         ),
-        ("v 0 0 0\nf 1 2 3\n".to_owned(), "line 2: there is no point 2 among the 1 before it"),
+        ("v 0 0 0\nf 1 2 3\n".to_owned(), "line 2: there is no point 2 among 1"),
         ("v 0 0 0\nf 0 1 1\n".to_owned(), "counted from 1"),
         ("v 0 0 0\nf 1//7 1 1\n".to_owned(), "no normal 7"),
         (String::new(), "no points"),

@@ -1,10 +1,8 @@
 //! Indexes of chunks that are arrays: of fixed length, and extensible ones, whose blocks double.
 
 use super::chunk_index::{Entry, Grid};
-use super::{Bytes, Reader, Refusal, UNDEFINED, numbers};
+use super::{Bytes, Reader, Refusal, SUM, UNDEFINED, numbers};
 
-/// Bytes of a check sum.
-const SUM: u64 = 4;
 /// Bytes before the rest of each block: signature, version, client, address of the header.
 const BEFORE: u64 = 14;
 
@@ -48,7 +46,7 @@ impl Found {
 
 impl<B: Bytes + ?Sized> Reader<'_, B> {
     fn shape(&self, entry: u64, page_bits: u64) -> Option<Shape> {
-        (entry >= 8 && page_bits < 32).then_some(Shape { entry, page: 1 << page_bits })
+        (entry >= 8 && page_bits < 32).then(|| Shape { entry, page: 1 << page_bits })
     }
 
     /// The first entries of an array of fixed length.
@@ -60,7 +58,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         grid: &Grid,
     ) -> Result<Vec<Option<Entry>>, Refusal> {
         let torn = || self.damaged(place, at, "the array of its chunks is torn");
-        let head = self.bytes(place, at, 24)?;
+        let head = self.sealed(place, at, 24)?;
         let count = numbers(&head[8..]).number(8).ok_or_else(torn)?;
         let block = numbers(&head[16..]).number(8).ok_or_else(torn)?;
         if !head.starts_with(b"FAHD") || head[4] != 0 || count < needed {
@@ -71,17 +69,19 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         if block == UNDEFINED {
             return Ok(found.entries);
         }
-        if self.bytes(place, block, 4)? != *b"FADB" {
+        let is_paged = count > shape.page;
+        let mask = if is_paged { count.div_ceil(shape.page).div_ceil(8) } else { 0 };
+        let body = if is_paged { mask } else { count.saturating_mul(shape.entry) };
+        let bytes = self.sealed(place, block, BEFORE.saturating_add(body))?;
+        if !bytes.starts_with(b"FADB") {
             return Err(torn());
         }
-        let start = block.checked_add(BEFORE).ok_or_else(torn)?;
-        if count <= shape.page {
-            self.entries(place, start, count, &shape, grid, &mut found)?;
+        let body = &bytes[BEFORE as usize..];
+        if is_paged {
+            let pages = block.checked_add(BEFORE + mask + SUM).ok_or_else(torn)?;
+            self.pages(place, (pages, count), body, &shape, grid, &mut found)?;
         } else {
-            let mask = count.div_ceil(shape.page).div_ceil(8);
-            let written = self.bytes(place, start, mask)?;
-            let pages = start.checked_add(mask + SUM).ok_or_else(torn)?;
-            self.pages(place, (pages, count), &written, &shape, grid, &mut found)?;
+            self.entries(place, block, body, &shape, grid, &mut found)?;
         }
         Ok(found.entries)
     }
@@ -95,7 +95,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         grid: &Grid,
     ) -> Result<Vec<Option<Entry>>, Refusal> {
         let torn = || self.damaged(place, at, "the array of its chunks is torn");
-        let head = self.bytes(place, at, 68)?;
+        let head = self.sealed(place, at, 68)?;
         if !head.starts_with(b"EAHD") || head[4] != 0 {
             return Err(torn());
         }
@@ -112,34 +112,31 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         if index == UNDEFINED {
             return Ok(found.entries);
         }
-        if self.bytes(place, index, 4)? != *b"EAIB" {
+        let named_blocks: u64 = (0..named.min(blocks.supers)).map(|level| 1_u64 << (level / 2)).sum();
+        let addresses = named_blocks + blocks.supers.saturating_sub(named);
+        let size = BEFORE + in_index * shape.entry + 8 * addresses;
+        let bytes = self.sealed(place, index, size)?;
+        if !bytes.starts_with(b"EAIB") {
             return Err(torn());
         }
-        let mut next = index.checked_add(BEFORE).ok_or_else(torn)?;
-        self.entries(place, next, in_index, &shape, grid, &mut found)?;
-        next += in_index * shape.entry;
+        let (own, addresses) = bytes[BEFORE as usize..].split_at((in_index * shape.entry) as usize);
+        self.entries(place, index, own, &shape, grid, &mut found)?;
+        let mut addresses = addresses.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes));
         for level in 0..blocks.supers {
             if found.is_full() {
                 break;
             }
             let (count, length) = (1_u64 << (level / 2), blocks.smallest << level.div_ceil(2));
             if level < blocks.named {
-                for address in self.addresses(place, next, count)? {
+                for address in addresses.by_ref().take(count as usize) {
                     self.data_block(place, (address, length), &[], (&shape, &blocks), grid, &mut found)?;
                 }
-                next += 8 * count;
             } else {
-                let address = self.addresses(place, next, 1)?.first().copied().ok_or_else(torn)?;
+                let address = addresses.next().ok_or_else(torn)?;
                 self.super_block(place, (address, count, length), (&shape, &blocks), grid, &mut found)?;
-                next += 8;
             }
         }
         Ok(found.entries)
-    }
-
-    fn addresses(&self, place: &str, at: u64, count: u64) -> Result<Vec<u64>, Refusal> {
-        let bytes = self.bytes(place, at, 8 * count)?;
-        Ok(bytes.as_chunks::<8>().0.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect())
     }
 
     /// A super block at an address, with so many blocks of so many entries each.
@@ -156,19 +153,20 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             return Ok(());
         }
         let torn = || self.damaged(place, at, "the array of its chunks is torn");
-        if self.bytes(place, at, 4)? != *b"EASB" {
-            return Err(torn());
-        }
-        let start = at.checked_add(BEFORE + blocks.offset).ok_or_else(torn)?;
         // A mask of the pages that were written, for each block that has pages.
         let mask = if length > shape.page { (length / shape.page).div_ceil(8) } else { 0 };
-        let masks = self.bytes(place, start, count * mask)?;
-        for (k, address) in (0..).zip(self.addresses(place, start + count * mask, count)?) {
+        let size = count.saturating_mul(mask + 8).saturating_add(BEFORE + blocks.offset);
+        let bytes = self.sealed(place, at, size)?;
+        if !bytes.starts_with(b"EASB") {
+            return Err(torn());
+        }
+        let (masks, addresses) = bytes[(BEFORE + blocks.offset) as usize..].split_at((count * mask) as usize);
+        for (k, address) in addresses.as_chunks::<8>().0.iter().enumerate() {
             if found.is_full() {
                 break;
             }
-            let written = &masks[(k * mask) as usize..((k + 1) * mask) as usize];
-            self.data_block(place, (address, length), written, (shape, blocks), grid, found)?;
+            let written = &masks[k * mask as usize..(k + 1) * mask as usize];
+            self.data_block(place, (u64::from_le_bytes(*address), length), written, (shape, blocks), grid, found)?;
         }
         Ok(())
     }
@@ -188,14 +186,18 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             return Ok(());
         }
         let torn = || self.damaged(place, at, "the array of its chunks is torn");
-        if self.bytes(place, at, 4)? != *b"EADB" {
+        let is_paged = length > shape.page;
+        let body = if is_paged { 0 } else { length * shape.entry };
+        let bytes = self.sealed(place, at, BEFORE + blocks.offset + body)?;
+        if !bytes.starts_with(b"EADB") {
             return Err(torn());
         }
-        let start = at.checked_add(BEFORE + blocks.offset).ok_or_else(torn)?;
-        if length <= shape.page {
-            return self.entries(place, start, length, shape, grid, found);
+        let body = &bytes[(BEFORE + blocks.offset) as usize..];
+        if !is_paged {
+            return self.entries(place, at, body, shape, grid, found);
         }
-        self.pages(place, (start + SUM, length), written, shape, grid, found)
+        let pages = at.checked_add(BEFORE + blocks.offset + SUM).ok_or_else(torn)?;
+        self.pages(place, (pages, length), written, shape, grid, found)
     }
 
     /// Entries in pages, of which those that were never written are marked by a 0.
@@ -216,7 +218,8 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             if mask & 0x80 >> (page % 8) == 0 {
                 found.skip(here);
             } else {
-                self.entries(place, at, here, shape, grid, found)?;
+                let bytes = self.sealed(place, at, here * shape.entry)?;
+                self.entries(place, at, &bytes, shape, grid, found)?;
             }
             at = at.checked_add(shape.page * shape.entry + SUM).ok_or_else(torn)?;
             count -= here;
@@ -225,19 +228,18 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         Ok(())
     }
 
-    /// Entries one after another; no more than are wanted.
+    /// Entries one after another in a block at an address; no more than are wanted.
     fn entries(
         &self,
         place: &str,
         at: u64,
-        count: u64,
+        bytes: &[u8],
         shape: &Shape,
         grid: &Grid,
         found: &mut Found,
     ) -> Result<(), Refusal> {
-        let count = count.min(found.needed - found.entries.len() as u64);
-        let bytes = self.bytes(place, at, count * shape.entry)?;
-        for bytes in bytes.chunks_exact(shape.entry as usize) {
+        let wanted = found.needed - found.entries.len() as u64;
+        for bytes in bytes.chunks_exact(shape.entry as usize).take(wanted as usize) {
             let torn = || self.damaged(place, at, "the array of its chunks is torn");
             let entry = self.entry(bytes, grid).ok_or_else(torn)?;
             found.entries.push((entry.at != UNDEFINED).then_some(entry));

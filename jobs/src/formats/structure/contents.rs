@@ -34,7 +34,8 @@ pub fn contents(file: &(impl Bytes + ?Sized), place: &str, data_set: &DataSet) -
 pub fn reals(file: &(impl Bytes + ?Sized), place: &str, data_set: &DataSet) -> Result<Vec<f64>, Refusal> {
     let bytes = contents(file, place, data_set)?;
     let values = bytes.chunks_exact(data_set.element_bytes.max(1) as usize).map(|bytes| data_set.element.real(bytes));
-    values.collect::<Option<_>>().ok_or_else(|| Reader::new(file).unaccepted(place, "elements that are no numbers"))
+    let values = values.collect::<Option<Vec<f64>>>().filter(|values| values.len() as u64 == data_set.elements());
+    values.ok_or_else(|| Reader::new(file).unaccepted(place, "elements that are no numbers"))
 }
 
 /// The elements of a data set as whole numbers.
@@ -45,8 +46,8 @@ pub fn integers(file: &(impl Bytes + ?Sized), place: &str, data_set: &DataSet) -
     let bytes = contents(file, place, data_set)?;
     let values =
         bytes.chunks_exact(data_set.element_bytes.max(1) as usize).map(|bytes| data_set.element.integer(bytes));
-    let what = "elements that are no whole numbers of 63 bits";
-    values.collect::<Option<_>>().ok_or_else(|| Reader::new(file).unaccepted(place, what))
+    let values = values.collect::<Option<Vec<i64>>>().filter(|values| values.len() as u64 == data_set.elements());
+    values.ok_or_else(|| Reader::new(file).unaccepted(place, "elements that are no whole numbers of 63 bits"))
 }
 
 impl<B: Bytes + ?Sized> Reader<'_, B> {
@@ -78,8 +79,10 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             let torn = |what: &'static str| self.damaged(place, found.entry.at, what);
             let is_edge = found.place.iter().zip(chunk).zip(&data_set.extent).any(|((k, c), n)| (k + 1) * c > *n);
             let is_plain = filters.is_empty() || (*are_edges_plain && is_edge);
-            let length = if is_plain { size } else { found.entry.bytes };
-            let bytes = self.bytes(place, found.entry.at, length)?;
+            if is_plain && found.entry.bytes != size {
+                return Err(torn("a chunk has another size than its extent says"));
+            }
+            let bytes = self.bytes(place, found.entry.at, found.entry.bytes)?;
             let applied = if is_plain { &[] } else { filters.as_slice() };
             let bytes = undo(bytes, applied, found.entry.skipped, data_set.element_bytes, size).map_err(torn)?;
             copy(&bytes, &found.place, data_set, chunk, &mut data);

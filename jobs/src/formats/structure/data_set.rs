@@ -24,7 +24,9 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         for _ in 0..count {
             let id = cursor.number(2).ok_or_else(torn)? as u16;
             if !FILTERS.contains(&id) {
-                let what = format!("filter {id} (accepted are deflate, shuffle and Fletcher-32)");
+                let what = format!(
+                    "filter {id} (deflate, shuffle and Fletcher-32 are accepted; h5repack -f GZIP=6 changes it)"
+                );
                 return Err(self.unaccepted(place, what));
             }
             found.push(id);
@@ -113,7 +115,10 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             }
             2 if version == 3 => self.old_chunks(place, layout, data_set, filters),
             2 => self.new_chunks(place, layout, data_set, filters),
-            3 => Err(self.unaccepted(place, "a virtual layout (its data lie in other files)")),
+            3 => Err(self.unaccepted(
+                place,
+                "a virtual layout, whose numbers lie in other data sets (h5repack -l CONTI writes them into the file)",
+            )),
             other => Err(self.unaccepted(place, format!("layout class {other}"))),
         }
     }

@@ -21,10 +21,10 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         if heap == UNDEFINED {
             return Ok(());
         }
-        let heap = self.fractal_heap(place, heap)?;
+        let mut heap = self.fractal_heap(place, heap)?;
         for record in self.records(place, tree, &[NAMES], MOST_OBJECTS as u64)? {
             let id = record.get(HASH..).ok_or_else(torn)?;
-            let (at, link) = self.heap_object(place, &heap, id)?;
+            let (at, link) = self.heap_object(place, &mut heap, id)?;
             found.push(self.link(place, at, &link)?);
         }
         Ok(())

@@ -2,7 +2,11 @@
 //! and huge ones have names of more than 4,000 bytes.
 
 use super::tree_2::width;
-use super::{Bytes, DEEPEST, LARGEST_BLOCK, Reader, Refusal, UNDEFINED, numbers};
+use super::{Bytes, DEEPEST, LARGEST_BLOCK, Reader, Refusal, SUM, UNDEFINED, numbers};
+use std::collections::BTreeSet;
+
+/// Bytes of a block before its offset: signature, version, address of the header.
+const BEFORE: u64 = 13;
 
 /// What the header of a heap says of its blocks.
 pub(super) struct Heap {
@@ -22,6 +26,10 @@ pub(super) struct Heap {
     root: u64,
     /// Rows of the root; 0 where it is a block with objects.
     rows: u64,
+    /// Whether blocks with objects have check sums.
+    has_sums: bool,
+    /// Blocks whose check sums were compared.
+    checked: BTreeSet<u64>,
 }
 
 impl Heap {
@@ -41,7 +49,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
     /// Reads the header of a heap.
     pub(super) fn fractal_heap(&self, place: &str, at: u64) -> Result<Heap, Refusal> {
         let torn = || self.damaged(place, at, "the heap of its links is torn");
-        let head = self.bytes(place, at, 142)?;
+        let head = self.sealed(place, at, 142)?;
         let number = |from: usize, width: usize| numbers(&head[from..]).number(width).ok_or_else(torn);
         if !head.starts_with(b"FRHP") || head[4] != 0 {
             return Err(torn());
@@ -59,12 +67,15 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             length: (largest.max(1).ilog2() as usize).div_ceil(8).min(width(most)),
             root: number(132, 8)?,
             rows: number(140, 2)?,
+            has_sums: head[9] & 2 != 0,
+            checked: BTreeSet::new(),
         };
         let is_sound = heap.width.is_power_of_two()
             && heap.start.is_power_of_two()
             && heap.largest.is_power_of_two()
             && heap.start <= heap.largest
             && heap.largest <= LARGEST_BLOCK
+            && heap.width <= 1 << 10
             && (1..=64).contains(&bits)
             && heap.rows <= 64
             && heap.root != UNDEFINED;
@@ -72,8 +83,9 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
     }
 
     /// An object of a heap by its id, with its address in the file.
-    pub(super) fn heap_object(&self, place: &str, heap: &Heap, id: &[u8]) -> Result<(u64, Vec<u8>), Refusal> {
-        let torn = || self.damaged(place, heap.at, "the heap of its links is torn");
+    pub(super) fn heap_object(&self, place: &str, heap: &mut Heap, id: &[u8]) -> Result<(u64, Vec<u8>), Refusal> {
+        let header = heap.at;
+        let torn = || self.damaged(place, header, "the heap of its links is torn");
         let mut cursor = numbers(id);
         let kind = cursor.number(1).ok_or_else(torn)?;
         if kind != 0 {
@@ -85,23 +97,25 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         let mut is_table = heap.rows > 0;
         for _ in 0..DEEPEST {
             if !is_table {
-                let fits = offset.checked_add(length).is_some_and(|end| end <= size);
-                if !fits || self.bytes(place, at, 4)? != *b"FHDB" {
+                self.check_block(place, at, size, heap)?;
+                if offset.checked_add(length).is_none_or(|end| end > size) {
                     return Err(torn());
                 }
                 let at = at.checked_add(offset).ok_or_else(torn)?;
                 return Ok((at, self.bytes(place, at, length)?));
             }
+            let table = BEFORE + heap.offset as u64 + 8 * rows * heap.width;
+            let table =
+                if heap.checked.insert(at) { self.sealed(place, at, table)? } else { self.bytes(place, at, table)? };
             let row = (0..rows).rev().find(|row| heap.row_start(*row) <= offset).ok_or_else(torn)?;
             size = heap.block(row);
             let column = (offset - heap.row_start(row)) / size;
-            if column >= heap.width || self.bytes(place, at, 4)? != *b"FHIB" {
+            if column >= heap.width || !table.starts_with(b"FHIB") {
                 return Err(torn());
             }
             offset -= heap.row_start(row) + column * size;
-            let entry = 13 + heap.offset as u64 + 8 * (row * heap.width + column);
-            let entry = self.bytes(place, at.checked_add(entry).ok_or_else(torn)?, 8)?;
-            at = numbers(&entry).number(8).ok_or_else(torn)?;
+            let entry = BEFORE as usize + heap.offset + 8 * (row * heap.width + column) as usize;
+            at = table.get(entry..).and_then(|entry| numbers(entry).number(8)).ok_or_else(torn)?;
             is_table = size > heap.largest;
             if is_table {
                 let first_rows = heap.start.saturating_mul(heap.width);
@@ -109,5 +123,25 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
             }
         }
         Err(torn())
+    }
+
+    /// Checks a block with objects: its beginning, and its check sum, which counts as zeros where it stands.
+    fn check_block(&self, place: &str, at: u64, size: u64, heap: &mut Heap) -> Result<(), Refusal> {
+        if !heap.checked.insert(at) {
+            return Ok(());
+        }
+        let torn = || self.damaged(place, at, "a block of the heap of its links is torn");
+        let mut block = self.bytes(place, at, size)?;
+        if !block.starts_with(b"FHDB") {
+            return Err(torn());
+        }
+        if heap.has_sums {
+            let from = BEFORE as usize + heap.offset;
+            let sum = block.get_mut(from..from + SUM as usize).ok_or_else(torn)?;
+            let found = sum.to_vec();
+            sum.fill(0);
+            self.check_sum(place, at, &block, &found)?;
+        }
+        Ok(())
     }
 }

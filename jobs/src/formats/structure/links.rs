@@ -24,7 +24,9 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         match kind {
             0 => Ok((name, Some(cursor.number(8).ok_or_else(torn)?))),
             1 => Ok((name, None)),
-            64 => Err(self.unaccepted(&format!("{place}/{name}"), "an external link")),
+            64 => {
+                Err(self.unaccepted(&format!("{place}/{name}"), "an external link (copy what it names into this file)"))
+            }
             other => Err(self.unaccepted(&format!("{place}/{name}"), format!("a link of class {other}"))),
         }
     }

@@ -1,10 +1,12 @@
 //! Version 2 trees: the records of all nodes, from the root down.
 
-use super::{Bytes, DEEPEST, MOST_NODES, Reader, Refusal, UNDEFINED, numbers};
+use super::{Bytes, DEEPEST, MOST_NODES, Reader, Refusal, SUM, UNDEFINED, numbers};
 use std::collections::BTreeSet;
 
 /// Bytes of a node beside its records: signature, version, type, check sum.
 const AROUND: u64 = 10;
+/// Bytes of a header before its check sum.
+const HEAD: u64 = 34;
 /// Bytes of a node before its records.
 const BEFORE: u64 = 6;
 
@@ -45,7 +47,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
     /// All records of a tree of one of some types, at most so many.
     pub(super) fn records(&self, place: &str, at: u64, types: &[u8], most: u64) -> Result<Vec<Vec<u8>>, Refusal> {
         let torn = |at: u64| self.damaged(place, at, "a version 2 tree is torn");
-        let head = self.bytes(place, at, 38)?;
+        let head = self.sealed(place, at, HEAD)?;
         if !head.starts_with(b"BTHD") || head[4] != 0 || !types.contains(&head[5]) {
             return Err(torn(at));
         }
@@ -90,10 +92,10 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
         let pointer = 8 + shape.count + depth.checked_sub(1).map_or(0, |below| shape.total[below]);
         let pointers = if depth == 0 { 0 } else { (count + 1) * pointer as u64 };
         let size = BEFORE + count * shape.record + pointers;
-        if size > shape.node {
+        if size > shape.node - SUM {
             return Err(torn());
         }
-        let node = self.bytes(place, at, size)?;
+        let node = self.sealed(place, at, size)?;
         if !node.starts_with(signature) {
             return Err(torn());
         }
