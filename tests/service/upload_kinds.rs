@@ -236,7 +236,7 @@ fn check_levels(service: &Service, directory: &Path) {
     let points = root.new_dataset::<f32>().chunk((25_000, 3)).shape((places.len().., 3));
     points.create("Points").unwrap().write_raw(places.as_flattened()).unwrap();
     data.new_dataset::<f32>().deflate(4).chunk(999).shape(phi.len()..).create("phi").unwrap().write_raw(&phi).unwrap();
-    drop((data, root));
+    drop((points, data, root));
     file.close().unwrap();
     let found = upload(service, "points", &std::fs::read(&path).unwrap());
     assert_eq!((&found["state"], &found["found"]["points"]), (&json!("ready"), &json!(4225)), "{found}");

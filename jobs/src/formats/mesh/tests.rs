@@ -162,11 +162,7 @@ fn strips_are_triangles_that_turn_by_turns() {
 fn points_that_no_face_has_are_left_out() {
     let normals = "vn 1 0 0\nf 1//1 3//1 2//1\nf 1//1 2//1 4//1\nf 1//1 4//1 3//1\nf 2//1 3//1 4//1\n";
     let points = OBJ.split('f').next().unwrap();
-    let mut mesh = read(
-        format!("v 7 7 7\n{points}v 8 8 8\n{}", normals.replace("f 1", "f 5").replace("2//1 4//1", "2//1 4//1"))
-            .as_bytes(),
-    )
-    .unwrap();
+    let mut mesh = read(format!("v 7 7 7\n{points}v 8 8 8\n{}", normals.replace("f 1", "f 5")).as_bytes()).unwrap();
     // Points 2 to 5 have faces, the first and the last do not.
     assert_eq!(mesh.points.len(), 6);
     assert_eq!(mesh.leave_out_loose_points(), Ok(2));

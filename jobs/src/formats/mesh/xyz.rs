@@ -71,7 +71,7 @@ fn numbers(line: &str, number: usize) -> Result<Vec<f64>, String> {
     let is_fraction = |word: &&str| word.len() > 3 || (word.len() > 1 && word.starts_with('0'));
     if fields.len() == 1
         && words.len() >= 4
-        && words.len() % 2 == 0
+        && words.len().is_multiple_of(2)
         && words.iter().all(is_whole)
         && words.iter().skip(1).step_by(2).any(is_fraction)
     {
