@@ -1,4 +1,4 @@
-//! Files that others read: VTKHDF frames, CSV series, SVG pictures.
+//! Files that others read or write: VTKHDF frames, CSV series, SVG pictures, meshes and points.
 
 pub mod chart;
 pub mod checkpoint;
@@ -10,7 +10,9 @@ pub mod hdf5_file;
 pub mod mesh;
 pub mod operator_files;
 pub mod picture;
+pub mod points_file;
 pub mod speed_error;
 pub mod structure;
 pub mod surface_view;
 pub mod vtkhdf;
+pub mod vtkhdf_points;

@@ -19,6 +19,8 @@ pub struct Cloud {
     pub normals: Option<Vec<[f64; 3]>>,
     /// Corners of the triangles of a surface, as indices of points; empty where it has none.
     pub triangles: Vec<[u32; 3]>,
+    /// Points of the file that are not here because no face has them.
+    pub left_out: u64,
 }
 
 /// What stands at a pointer of a scene.

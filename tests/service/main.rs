@@ -18,6 +18,7 @@ mod http;
 mod readers;
 mod requests;
 mod studies;
+mod upload_kinds;
 mod uploads;
 mod verify;
 

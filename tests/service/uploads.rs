@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::process::Command;
 use std::time::Duration;
 
-fn upload(service: &Service, purpose: &str, bytes: &[u8]) -> Value {
+pub(crate) fn upload(service: &Service, purpose: &str, bytes: &[u8]) -> Value {
     let answer = service.request("POST", &format!("/v1/uploads?as={purpose}"), &[], Some(bytes));
     assert_eq!(answer.status, 201, "{}", answer.text());
     let id = answer.json()["id"].as_str().unwrap().to_owned();

@@ -48,7 +48,7 @@ pub struct UploadQuery {
 /// Receives a file. It is `quarantined` until a separate process has examined it, then `ready` or `rejected`.
 #[utoipa::path(post, path = "/v1/uploads", operation_id = "submit_upload", tag = "uploads",
     params(UploadQuery, ("Idempotency-Key" = Option<String>, Header)),
-    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "the file: HDF5; surfaces and queries also PLY, OBJ or XYZ"),
+    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "the file: HDF5; surfaces and queries also PLY, OBJ, STL or XYZ"),
     responses((status = 201, body = UploadView, headers(("Location" = String))), (status = 413, body = Problem),
         (status = 415, body = Problem), (status = 422, body = Problem), (status = 429, body = Problem), (status = 507, body = Problem)))]
 pub async fn submit(

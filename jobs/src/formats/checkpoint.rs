@@ -8,7 +8,7 @@
 pub mod format_1;
 pub mod layout;
 
-use crate::formats::hdf5_file::write;
+use crate::formats::hdf5_file::{create, write};
 use crate::formats::structure::{self, Refusal, Structure};
 use crate::spec::body::resolved_scene;
 use crate::spec::records::FileRecord;
@@ -282,7 +282,7 @@ fn check_finite(state: &Section) -> Result<(), CheckpointError> {
 }
 
 fn write_file(path: &Path, meta: &Meta, state: &Section) -> Result<(), CheckpointError> {
-    let file = hdf5::File::create(path)?;
+    let file = create(path)?;
     layout::write_section(&file.create_group("state")?, state)?;
     let text = serde_json::to_vec(meta)?;
     write(&file, "meta", 1, &text)?;

@@ -1,7 +1,7 @@
 //! Points in a plain format of our own: what a checked upload becomes. Numbers are little-endian doubles.
 //!
-//! `MNSCLOUD` · count (u64) · columns (u64: 3 for the positions, + 1 with a level, + 3 with normals) · positions, levels,
-//! normals, one after another · corners of triangles (u32), if there are some.
+//! `MNSCLOUD` · count (u64) · columns (u32: 3 for the positions, + 1 with a level, + 3 with normals) · points that were left
+//! out (u32) · positions, levels, normals, one after another · corners of triangles (u32), if there are some.
 
 use meniscus::scene::Cloud;
 use std::io::{self, Read, Write};
@@ -25,11 +25,11 @@ pub const MOST_BYTES: u64 =
 /// # Errors
 /// When they cannot be written.
 pub fn write(out: &mut impl Write, cloud: &Cloud) -> io::Result<()> {
-    let Cloud { positions, level, normals, triangles } = cloud;
+    let Cloud { positions, level, normals, triangles, left_out } = cloud;
     let columns = 3 + u64::from(level.is_some()) + 3 * u64::from(normals.is_some());
     out.write_all(MAGIC)?;
     out.write_all(&(positions.len() as u64).to_le_bytes())?;
-    out.write_all(&columns.to_le_bytes())?;
+    out.write_all(&(columns | left_out << 32).to_le_bytes())?;
     let normals = normals.iter().flat_map(|normals| normals.as_flattened());
     for number in positions.as_flattened().iter().chain(level.iter().flatten()).chain(normals) {
         out.write_all(&number.to_le_bytes())?;
@@ -46,7 +46,7 @@ pub fn read(input: &mut impl Read) -> io::Result<Cloud> {
     let mut head = [0; HEAD];
     input.read_exact(&mut head)?;
     let number = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().unwrap_or_default());
-    let (count, columns) = (number(8), number(16));
+    let (count, columns, left_out) = (number(8), number(16) & u64::from(u32::MAX), number(16) >> 32);
     if head[..8] != *MAGIC || ![3, 4, 6, MOST_COLUMNS].contains(&columns) || count > crate::spec::uploads::MOST_POINTS {
         return Err(wrong());
     }
@@ -69,6 +69,7 @@ pub fn read(input: &mut impl Read) -> io::Result<Cloud> {
         level: has_level.then(|| level.to_vec()),
         normals: (columns >= 6).then(|| normals.as_chunks::<3>().0.to_vec()),
         triangles: corners.as_chunks::<3>().0.to_vec(),
+        left_out,
     })
 }
 
@@ -91,7 +92,8 @@ mod tests {
             for normals in [None, Some(vec![[0.0, 0.0, 1.0], [0.5, 0.0, -2.0]])] {
                 for triangles in [Vec::new(), vec![[0, 1, 1], [1, 0, 1]]] {
                     let (positions, level, normals) = (positions.clone(), level.clone(), normals.clone());
-                    let cloud = Cloud { positions, level, normals, triangles };
+                    let left_out = triangles.len() as u64;
+                    let cloud = Cloud { positions, level, normals, triangles, left_out };
                     let mut bytes = Vec::new();
                     write(&mut bytes, &cloud).unwrap();
                     assert_eq!(read(&mut bytes.as_slice()).unwrap(), cloud);

@@ -1,7 +1,12 @@
-//! Surfaces in common text and binary formats: PLY (text and binary), OBJ, XYZ. Only positions, normals and faces are
-//! read; everything else is ignored.
+//! Surfaces in common formats: PLY (text and binary), OBJ, STL (text and binary), XYZ. Positions, normals and faces are read;
+//! everything else is passed over. Text may have a byte order mark (UTF-8 or UTF-16), and lines may end in LF, CR LF or CR.
 
+mod foreign;
+mod obj;
 mod ply;
+mod stl;
+mod text;
+mod xyz;
 
 use crate::spec::uploads::MOST_POINTS;
 use std::collections::HashMap;
@@ -11,50 +16,127 @@ use std::collections::HashMap;
 pub struct Mesh {
     /// Positions of the points.
     pub points: Vec<[f64; 3]>,
-    /// Normals, as many as points or none.
+    /// Normals, as many as points or none. A normal that is missing is NaN.
     pub normals: Vec<[f64; 3]>,
     /// Corners of each face, as indices of points.
     pub faces: Vec<Vec<u32>>,
+    /// Whether points belong to the surface though no face has them.
+    pub has_loose_points: bool,
 }
 
 /// Most corners of a face.
-const MOST_CORNERS: u64 = 1000;
+const MOST_CORNERS: usize = 1 << 16;
+/// Share of the points without a face beyond which a file is neither a mesh nor points.
+const MOST_LOOSE: f64 = 0.5;
+/// What helps where normals are wrong.
+const WITHOUT_NORMALS: &str = "write them anew, or leave normals out: then they are estimated";
 
 /// Reads a mesh; its format is guessed from the bytes.
 ///
 /// # Errors
 /// A sentence that names the line or the byte.
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
-    let mesh = if bytes.starts_with(b"ply") {
+    let bytes = bytes.strip_prefix(text::MARK).unwrap_or(bytes);
+    let mesh = if let Some(rest) = bytes.strip_prefix(b"ply")
+        && rest.first().is_none_or(u8::is_ascii_whitespace)
+    {
         ply::read(bytes)?
+    } else if stl::is_binary(bytes) {
+        stl::binary(bytes)?
     } else {
-        let text = std::str::from_utf8(bytes).map_err(|e| format!("byte {} is no text", e.valid_up_to()))?;
-        let is_obj = text.lines().map(str::trim_start).any(|l| l.starts_with("v ") || l.starts_with("v\t"));
-        if is_obj { obj(text)? } else { xyz(text)? }
+        let text = text::decode(bytes)?;
+        if text.starts_with("ply") {
+            ply::read(text.as_bytes())?
+        } else if stl::is_text(&text) {
+            stl::text(&text)?
+        } else if obj::is_obj(&text) {
+            obj::read(&text)?
+        } else {
+            xyz::read(&text)?
+        }
     };
-    if mesh.points.is_empty() {
-        return Err("there are no points".to_owned());
-    }
-    if !mesh.normals.is_empty() && mesh.normals.len() != mesh.points.len() {
-        return Err(format!("{} of {} points have normals", mesh.normals.len(), mesh.points.len()));
-    }
-    if let Some(k) = mesh.points.iter().chain(&mesh.normals).position(|p| p.iter().any(|c| !c.is_finite())) {
-        return Err(format!("coordinate {} is not finite", k % mesh.points.len()));
-    }
-    let count = mesh.points.len();
-    if let Some(k) = mesh.faces.iter().position(|face| face.len() < 3 || face.iter().any(|v| *v as usize >= count)) {
-        return Err(format!("face {k} has fewer than 3 corners or names a point that is not there"));
-    }
-    Ok(mesh)
+    if mesh.points.is_empty() { Err("there are no points in the file".to_owned()) } else { Ok(mesh) }
 }
 
 impl Mesh {
+    /// Leaves out points that no face has, where there are faces: they are no part of the surface. Returns their number.
+    ///
+    /// # Errors
+    /// Where more than half of the points would be left out.
+    pub fn leave_out_loose_points(&mut self) -> Result<u64, String> {
+        if self.faces.is_empty() || self.has_loose_points {
+            return Ok(0);
+        }
+        let mut places = vec![None; self.points.len()];
+        for corner in self.faces.iter().flatten() {
+            if let Some(place) = places.get_mut(*corner as usize) {
+                *place = Some(0);
+            }
+        }
+        let mut kept = 0;
+        places.iter_mut().flatten().for_each(|place| {
+            *place = kept;
+            kept += 1;
+        });
+        let (all, left_out) = (self.points.len(), self.points.len() - kept as usize);
+        if left_out as f64 > MOST_LOOSE * all as f64 {
+            return Err(format!(
+                "{left_out} of {all} points belong to no face; send the points without faces, or faces that cover the surface"
+            ));
+        }
+        if left_out > 0 {
+            let is_kept = |k: usize| places.get(k).is_some_and(Option::is_some);
+            let keep = |list: &[[f64; 3]]| (0..).zip(list).filter(|(k, _)| is_kept(*k)).map(|(_, x)| *x).collect();
+            (self.points, self.normals) = (keep(&self.points), keep(&self.normals));
+            for corner in self.faces.iter_mut().flatten() {
+                *corner = places.get(*corner as usize).copied().flatten().unwrap_or(u32::MAX);
+            }
+        }
+        Ok(left_out as u64)
+    }
+
+    /// Refuses what is no surface: numbers that are not finite, normals that are missing or have no length, faces of points
+    /// that are not there.
+    ///
+    /// # Errors
+    /// A sentence that names the first point or face, how many there are, and what helps.
+    pub fn check(&self) -> Result<(), String> {
+        let count = self.points.len();
+        let is_wrong = |x: &[f64; 3]| x.iter().any(|c| !c.is_finite());
+        let list = |found: &[usize]| format!("point {} (counted from 0){}", found[0], and_more(found.len() - 1));
+        let wrong: Vec<usize> = (0..count).filter(|k| is_wrong(&self.points[*k])).collect();
+        if !wrong.is_empty() {
+            let [x, y, z] = self.points[wrong[0]];
+            return Err(format!("the position of {} is not finite: {x} {y} {z}; take such points out", list(&wrong)));
+        }
+        if !self.normals.is_empty() && self.normals.len() != count {
+            return Err(format!("{} of {count} points have normals; {WITHOUT_NORMALS}", self.normals.len()));
+        }
+        let wrong: Vec<usize> = (0..self.normals.len()).filter(|k| is_wrong(&self.normals[*k])).collect();
+        if !wrong.is_empty() {
+            let [x, y, z] = self.normals[wrong[0]];
+            return Err(format!("the normal of {} is not finite: {x} {y} {z}; {WITHOUT_NORMALS}", list(&wrong)));
+        }
+        let wrong: Vec<usize> = (0..self.normals.len()).filter(|k| self.normals[*k] == [0.0; 3]).collect();
+        if !wrong.is_empty() {
+            return Err(format!("the normal of {} is zero, which is no direction; {WITHOUT_NORMALS}", list(&wrong)));
+        }
+        let is_bad = |face: &Vec<u32>| face.len() < 3 || face.iter().any(|v| *v as usize >= count);
+        if let Some(k) = self.faces.iter().position(is_bad) {
+            return Err(format!(
+                "face {k} (counted from 0) has fewer than 3 corners or names a point that is not there"
+            ));
+        }
+        Ok(())
+    }
+
     /// Its faces as triangles that share their first corners.
     #[must_use]
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let of = |face: &Vec<u32>| {
-            let first = face[0];
-            face[1..].windows(2).map(move |pair| [first, pair[0], pair[1]]).collect::<Vec<_>>()
+            let first = face.first().copied().unwrap_or(0);
+            let pairs = face.get(1..).unwrap_or_default().windows(2);
+            pairs.map(move |pair| [first, pair[0], pair[1]]).collect::<Vec<_>>()
         };
         self.faces.iter().flat_map(of).collect()
     }
@@ -74,152 +156,27 @@ impl Mesh {
     }
 }
 
-fn real(word: &str, line: usize) -> Result<f64, String> {
-    word.parse().map_err(|_| format!("line {}: {:?} is no number", line + 1, word.chars().take(40).collect::<String>()))
+/// Adds the triangles of a strip: each corner from the third on makes one with the two before it, and every second is turned.
+/// Triangles with two equal corners join parts of a strip and are none.
+pub(super) fn strip_faces(strip: &[u32], faces: &mut Vec<Vec<u32>>) {
+    for (k, corners) in strip.windows(3).enumerate() {
+        let [a, b, c] = [corners[0], corners[1], corners[2]];
+        if a != b && b != c && a != c {
+            faces.push(if k % 2 == 0 { vec![a, b, c] } else { vec![b, a, c] });
+        }
+    }
+}
+
+fn and_more(more: usize) -> String {
+    if more > 0 { format!(" and of {more} more") } else { String::new() }
 }
 
 fn check_count(count: usize) -> Result<(), String> {
-    if count as u64 >= MOST_POINTS { Err(format!("there are more than {MOST_POINTS} points or faces")) } else { Ok(()) }
-}
-
-fn xyz(text: &str) -> Result<Mesh, String> {
-    let mut mesh = Mesh::default();
-    for (k, line) in text.lines().enumerate() {
-        let line = line.split('#').next().unwrap_or_default().trim();
-        if line.is_empty() {
-            continue;
-        }
-        let words = line.split([' ', '\t', ',', ';']).filter(|word| !word.is_empty());
-        let numbers = words.map(|word| real(word, k)).collect::<Result<Vec<f64>, _>>()?;
-        check_count(mesh.points.len())?;
-        match numbers.as_slice() {
-            [x, y] => mesh.points.push([*x, *y, 0.0]),
-            [x, y, z] => mesh.points.push([*x, *y, *z]),
-            [x, y, z, nx, ny, nz] => {
-                mesh.points.push([*x, *y, *z]);
-                mesh.normals.push([*nx, *ny, *nz]);
-            }
-            other => return Err(format!("line {} has {} numbers; 2, 3 or 6 are understood", k + 1, other.len())),
-        }
+    if count as u64 >= MOST_POINTS {
+        return Err(format!("there are more than {MOST_POINTS} points or faces, the most that are read"));
     }
-    Ok(mesh)
-}
-
-fn obj(text: &str) -> Result<Mesh, String> {
-    let mut mesh = Mesh::default();
-    let mut normals = Vec::new();
-    // The normal that a face gives to a point.
-    let mut given: HashMap<u32, usize> = HashMap::new();
-    for (k, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
-        let kind = words.next().unwrap_or_default();
-        let triple = |words: &mut std::str::SplitWhitespace| -> Result<[f64; 3], String> {
-            let mut next = || words.next().ok_or_else(|| format!("line {} has fewer than 3 numbers", k + 1));
-            Ok([real(next()?, k)?, real(next()?, k)?, real(next()?, k)?])
-        };
-        match kind {
-            "v" => {
-                check_count(mesh.points.len())?;
-                mesh.points.push(triple(&mut words)?);
-            }
-            "vn" => {
-                check_count(normals.len())?;
-                normals.push(triple(&mut words)?);
-            }
-            "f" => {
-                check_count(mesh.faces.len())?;
-                let mut face = Vec::new();
-                for word in words {
-                    if face.len() as u64 >= MOST_CORNERS {
-                        return Err(format!("line {} has more than {MOST_CORNERS} corners", k + 1));
-                    }
-                    let mut parts = word.split('/');
-                    let point = index(parts.next(), mesh.points.len(), k)?;
-                    if let Some(normal) = parts.nth(1).filter(|text| !text.is_empty()) {
-                        given.insert(point, index(Some(normal), normals.len(), k)? as usize);
-                    }
-                    face.push(point);
-                }
-                mesh.faces.push(face);
-            }
-            _ => {}
-        }
-    }
-    if !given.is_empty() {
-        // Those that faces give to some points only are refused where all formats are.
-        let of_point = |k: u32| given.get(&k).and_then(|normal| normals.get(*normal)).copied();
-        mesh.normals = (0..mesh.points.len() as u32).filter_map(of_point).collect();
-    } else if normals.len() == mesh.points.len() {
-        mesh.normals = normals;
-    }
-    Ok(mesh)
-}
-
-/// An index of an OBJ file: from 1, or from the end where negative.
-fn index(text: Option<&str>, count: usize, line: usize) -> Result<u32, String> {
-    let text = text.unwrap_or_default();
-    let number: i64 = text.parse().map_err(|_| format!("line {}: {text:?} is no index", line + 1))?;
-    let place = if number < 0 { count as i64 + number } else { number - 1 };
-    u32::try_from(place)
-        .ok()
-        .filter(|place| (*place as usize) < count)
-        .ok_or_else(|| format!("line {}: there is no number {number} among {count}", line + 1))
+    Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::read;
-
-    const TETRAHEDRON: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
-
-    #[test]
-    fn the_same_tetrahedron_in_every_format() {
-        let text = read(TETRAHEDRON.as_bytes()).unwrap();
-        assert_eq!((text.points.len(), text.faces.len(), text.is_closed()), (4, 4, true));
-        for (name, big) in [("binary_little_endian", false), ("binary_big_endian", true)] {
-            let mut bytes = TETRAHEDRON.split("end_header\n").next().unwrap().replace("ascii", name).into_bytes();
-            bytes.extend(b"end_header\n");
-            for c in text.points.iter().flatten() {
-                let c = *c as f32;
-                bytes.extend(if big { c.to_be_bytes() } else { c.to_le_bytes() });
-            }
-            for face in &text.faces {
-                bytes.push(3);
-                for v in face {
-                    bytes.extend(if big { v.to_be_bytes() } else { v.to_le_bytes() });
-                }
-            }
-            assert_eq!(read(&bytes).unwrap(), text);
-            assert!(read(&bytes[..bytes.len() - 1]).is_err());
-        }
-        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 1 0 0\nf 1//1 3//1 2//1\nf 1//1 2//1 4//1\nf -4//1 -1//1 3//1\nf 2 3 4\n";
-        let obj = read(obj.as_bytes()).unwrap();
-        assert_eq!((obj.points.as_slice(), obj.normals.len(), obj.is_closed()), (text.points.as_slice(), 4, true));
-        let points = read(b"# points\n0 0 0\n1,0,0\n0 1 0\n0 0 1\n").unwrap();
-        assert_eq!((points.points, points.faces.len()), (text.points, 0));
-    }
-
-    #[test]
-    fn what_is_wrong_is_named() {
-        for (text, part) in [
-            ("0 0\n1 2 3 4\n", "line 2"),
-            ("0 0 x\n", "no number"),
-            ("nan 0 0\n", "not finite"),
-            ("v 0 0 0\nf 1 2 3\n", "line 2"),
-            ("", "no points"),
-            ("0 0 0\n1 0 0 0 0 1\n", "1 of 2 points have normals"),
-            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3\n", "2 of 3 points have normals"),
-            (
-                "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nproperty int nx\n\
-                 property int ny\nproperty int nz\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\n\
-                 end_header\n0 0 0 1 0 0\n1 0 0\n",
-                "1 of 2 points have normals",
-            ),
-            ("ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n", "at most"),
-            ("ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nend_header\n1\n", "too soon"),
-        ] {
-            let message = read(text.as_bytes()).unwrap_err();
-            assert!(message.contains(part), "{text:?}: {message}");
-        }
-    }
-}
+mod tests;

@@ -2,10 +2,9 @@
 //!
 //! VTK's reader needs all four topology groups, and numbers only under `FieldData`.
 
-use super::hdf5_file::write;
+use super::hdf5_file::{create, open, write};
+use hdf5::Group;
 use hdf5::types::FixedAscii;
-use hdf5::{File, Group};
-use meniscus::scene::Cloud;
 use meniscus::simulation::{FieldValues, Fields};
 use std::path::Path;
 
@@ -15,7 +14,7 @@ use std::path::Path;
 /// # Errors
 /// Errors of libhdf5.
 pub fn write_frame(path: &Path, fields: &Fields, time: f64, step: u64) -> hdf5::Result<()> {
-    let file = File::create(path)?;
+    let file = create(path)?;
     let root = file.create_group("VTKHDF")?;
     root.new_attr::<i64>().shape(2).create("Version")?.write_raw(&[2_i64, 0])?;
     let kind = FixedAscii::<8>::from_ascii(b"PolyData").map_err(|e| hdf5::Error::from(e.to_string()))?;
@@ -75,7 +74,7 @@ impl Frame {
     /// # Errors
     /// Errors of libhdf5.
     pub fn open(path: &Path) -> hdf5::Result<Self> {
-        Ok(Self { root: File::open(path)?.group("VTKHDF")? })
+        Ok(Self { root: open(path)?.group("VTKHDF")? })
     }
 
     /// Scene time.
@@ -123,55 +122,4 @@ pub fn read_profile(path: &Path, field: &str) -> hdf5::Result<Option<Vec<(f64, f
     let frame = Frame::open(path)?;
     let pair = frame.scalars("phi")?.zip(frame.scalars(field)?);
     Ok(pair.map(|(phi, values)| phi.into_iter().zip(values).collect()))
-}
-
-/// Reads points, and `phi` where there is one, from a frame or any file that is laid out like one.
-///
-/// # Errors
-/// Errors of libhdf5, and points that are no triples.
-pub fn read_cloud(path: &Path) -> Result<Cloud, CloudError> {
-    let root = File::open(path)?.group("VTKHDF")?;
-    let numbers: Vec<f64> = root.dataset("Points")?.read_raw()?;
-    let (positions, rest) = numbers.as_chunks::<3>();
-    if !rest.is_empty() {
-        return Err(CloudError::NotTriples { numbers: numbers.len() });
-    }
-    let level = match root.dataset("PointData/phi") {
-        Ok(phi) => Some(phi.read_raw()?),
-        Err(_) => None,
-    };
-    Ok(Cloud { positions: positions.to_vec(), level, ..Cloud::default() })
-}
-
-/// Reads `normal` of the points, if they have it, from a frame or any file that is laid out like one.
-///
-/// # Errors
-/// Errors of libhdf5, and normals that are no triples.
-pub fn read_normals(path: &Path) -> Result<Option<Vec<[f64; 3]>>, CloudError> {
-    let Ok(normal) = File::open(path)?.dataset("VTKHDF/PointData/normal") else { return Ok(None) };
-    let numbers: Vec<f64> = normal.read_raw()?;
-    match numbers.as_chunks::<3>() {
-        (normals, []) => Ok(Some(normals.to_vec())),
-        _ => Err(CloudError::NoNormals { numbers: numbers.len() }),
-    }
-}
-
-/// Why a file holds no points.
-#[derive(Debug, thiserror::Error)]
-pub enum CloudError {
-    /// libhdf5 failed.
-    #[error("{0}")]
-    Hdf5(#[from] hdf5::Error),
-    /// The coordinates are no triples.
-    #[error("/VTKHDF/Points holds {numbers} numbers, which are no triples")]
-    NotTriples {
-        /// Count of numbers.
-        numbers: usize,
-    },
-    /// The components of the normals are no triples.
-    #[error("/VTKHDF/PointData/normal holds {numbers} numbers, which are no triples")]
-    NoNormals {
-        /// Count of numbers.
-        numbers: usize,
-    },
 }

@@ -1,6 +1,6 @@
 //! Files from outside: what they are to be used as, and what was found in them. They are hostile until a short-lived
-//! process under limits ([`crate::inspection`]) has looked into them: HDF5 files by our own reading of their structure
-//! ([`crate::formats::structure`]) before libhdf5 sees a byte, meshes by our own parsers ([`crate::formats::mesh`]).
+//! process under limits ([`crate::inspection`]) has looked into them: HDF5 files by our own reading
+//! ([`crate::formats::structure`]), of which libhdf5 sees no byte, meshes by our own parsers ([`crate::formats::mesh`]).
 //! Points leave that process in a plain format ([`crate::formats::cloud_file`]), so that no other process opens the file.
 
 use serde::{Deserialize, Serialize};
@@ -107,6 +107,9 @@ pub struct PointContents {
     /// Faces, of a surface from a mesh file.
     #[serde(flatten)]
     pub faces: Option<FaceContents>,
+    /// Points of a mesh that were left out because no face has them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points_left_out: Option<u64>,
 }
 
 /// Faces of a mesh.

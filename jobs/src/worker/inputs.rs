@@ -1,9 +1,9 @@
 //! Points that a scene takes from files, as its worker reads them: uploads in the plain format that their inspection
 //! wrote, local files of `meniscus run` as they are.
 
-use crate::formats::mesh;
-use crate::formats::{cloud_file, structure, vtkhdf};
+use crate::formats::{cloud_file, points_file};
 use crate::spec::attempt_spec::AttemptSpec;
+use crate::spec::uploads::Purpose;
 use meniscus::scene::{Cloud, CloudReference, CloudSource, Clouds, Scene};
 use std::fs::File;
 use std::path::Path;
@@ -28,18 +28,13 @@ fn read_upload(id: &str, spec: &AttemptSpec) -> Result<Cloud, String> {
     File::open(path).and_then(|mut file| cloud_file::read(&mut file)).map_err(|error| error.to_string())
 }
 
-/// HDF5, else a mesh by what the bytes look like. Only a surface has normals: those of frames are NaN outside a band.
+/// A local file, as the inspection of uploads reads it. Only a surface has normals and faces.
 fn read_local(path: &Path, pointer: &str) -> Result<Cloud, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    if bytes.starts_with(structure::SIGNATURE) {
-        let mut cloud = vtkhdf::read_cloud(path).map_err(|error| error.to_string())?;
-        if pointer == "/surface" {
-            cloud.normals = vtkhdf::read_normals(path).map_err(|error| error.to_string())?;
-        }
-        return Ok(cloud);
-    }
-    let mesh = mesh::read(&bytes)?;
-    let triangles = mesh.triangles();
-    let normals = (!mesh.normals.is_empty()).then_some(mesh.normals);
-    Ok(Cloud { positions: mesh.points, level: None, normals, triangles })
+    let purpose = match pointer {
+        "/surface" => Purpose::Surface,
+        "/queries" => Purpose::Queries,
+        _ => Purpose::Points,
+    };
+    let mut file = File::open(path).map_err(|error| error.to_string())?;
+    points_file::read(&mut file, purpose).map(|(_, cloud)| cloud)
 }

@@ -134,7 +134,9 @@ impl<const D: usize> Found<D> {
         let rows = prepared.points.len();
         let edges = Edges::new(whole.as_ref().unwrap_or(&prepared), rows, &scene.spec.edges);
         edges.check(&prepared, &scene.spec.edges)?;
-        let Preparation { findings, marks, mut counted } = Preparation::new(&prepared, is_equation, edges.held_count());
+        let without_face = clouds.get(PLACE).map_or(0, |cloud| cloud.left_out);
+        let Preparation { findings, marks, mut counted } =
+            Preparation::new(&prepared, is_equation, edges.held_count(), without_face);
         counted.extend(edges.counted(rows));
         let measure = prepared.graph.areas.iter().sum();
         let origin = format!(

@@ -18,9 +18,15 @@ const START: (u64, f64) = (0, 0.0);
 
 impl Preparation {
     /// Collects what was found. At edges an equation has its natural condition, while values at points are one-sided.
-    /// `held` points of edges hold a value.
-    pub fn new<const D: usize>(cloud: &PreparedCloud<D>, is_equation: bool, held: usize) -> Self {
+    /// `held` points of edges hold a value. The file had `without_face` points more.
+    pub fn new<const D: usize>(cloud: &PreparedCloud<D>, is_equation: bool, held: usize, without_face: u64) -> Self {
         let mut found = Self { findings: Vec::new(), marks: Vec::new(), counted: Vec::new() };
+        if without_face > 0 {
+            let message = format!(
+                "{without_face} points of the file were left out, since no face has them; numbers of points do not count them"
+            );
+            found.findings.push(Finding::info("points.without_face", message, START).with_count(without_face));
+        }
         found.left_out(cloud);
         found.edges(cloud, is_equation, held);
         found.normals(cloud);

@@ -1,13 +1,14 @@
 //! Everything that reads what strangers send, fed with mutations of what is right: no crash, and what is accepted is
 //! whole. In this process, so that a panic is seen.
 
+use super::files;
 use meniscus::geometry::random::CounterRandom;
 use meniscus::scene::CloudSizes;
 use meniscus::scene::parse;
 use meniscus::scenes::SCENES;
 use meniscus::simulation::OutputPlan;
 use meniscus_jobs::formats::mesh;
-use meniscus_jobs::formats::structure;
+use meniscus_jobs::formats::structure::{self, Bytes};
 use meniscus_jobs::spec::body::{self, Allowance, NoSources};
 use meniscus_jobs::spec::calibration::Calibration;
 use meniscus_jobs::spec::strict_json;
@@ -231,20 +232,56 @@ pub fn mutate_bytes(bytes: &mut Vec<u8>, draws: &mut Draws) {
     }
 }
 
-/// Structures of HDF5 files: of our own, whose every byte of structure counts.
+/// Bytes of a data set at most that the proof reads.
+const LARGEST_DATA: u64 = 1 << 20;
+
+/// Bytes of a file whose check sums are not compared, so that what is behind them is reached.
+struct WithoutSums<'a>(&'a [u8]);
+
+impl Bytes for WithoutSums<'_> {
+    fn size(&self) -> u64 {
+        self.0.size()
+    }
+
+    fn fill(&self, at: u64, buffer: &mut [u8]) -> bool {
+        self.0.fill(at, buffer)
+    }
+
+    fn has_sums(&self) -> bool {
+        false
+    }
+}
+
+/// HDF5 files in every format and storage: their structure, and the numbers of all data sets.
 pub fn structures(count: u64, seed: u64) -> String {
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("x.h5");
-    super::files::points_file(&path);
-    let whole = std::fs::read(&path).unwrap();
-    let mut accepted = 0;
+    let files: Vec<(Vec<u8>, Vec<usize>)> =
+        files::points_files().into_iter().map(|bytes| (bytes.clone(), files::parts(&bytes))).collect();
+    let (mut accepted, mut read, mut refused) = (0, 0, 0);
     for run in 0..count {
         let mut draws = Draws::new(seed, run);
+        let (whole, parts) = draws.pick(&files);
         let mut bytes = whole.clone();
-        mutate_bytes(&mut bytes, &mut draws);
-        accepted += u64::from(structure::read(bytes.as_slice()).is_ok());
+        files::mutate_file(&mut bytes, parts, &mut draws);
+        let bytes = WithoutSums(&bytes);
+        let Ok(structure) = structure::read(&bytes) else { continue };
+        accepted += 1;
+        for (place, data_set) in &structure.data_sets {
+            if data_set.elements().saturating_mul(data_set.element_bytes) > LARGEST_DATA {
+                continue;
+            }
+            match structure::reals(&bytes, place, data_set) {
+                Ok(numbers) => {
+                    read += 1;
+                    assert_eq!(numbers.len() as u64, data_set.elements(), "run {run} of seed {seed}: {place}");
+                }
+                Err(refusal) => {
+                    refused += 1;
+                    assert!(refusal.to_string().contains(place.as_str()), "{refusal}");
+                }
+            }
+        }
     }
-    format!("{count} files, {accepted} accepted, no crash (seed {seed})")
+    format!("{count} files, {accepted} accepted, {read} data sets read, {refused} refused, no crash (seed {seed})")
 }
 
 /// Meshes in every format.
@@ -260,16 +297,35 @@ pub fn meshes(count: u64, seed: u64) -> String {
     let obj =
         b"# x\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 1 0 0\nf 1//1 3//1 2//1\nf -4 -1 3\nf 2/1/1 3/2/1 4\n".to_vec();
     let xyz = b"0 0 0\n1,0,0\n0 1 0 # c\n\n0;0;1e5\n".to_vec();
-    let seeds = [ply.as_bytes().to_vec(), binary, obj, xyz];
+    let colors = b"X,Y,Z,R,G,B,NX,NY,NZ\n0,0,1,255,0,7,0,0,1\n0,1,0,255,0,7,0,1,0\n".to_vec();
+    let continued = b"\xEF\xBB\xBFv 0 0 \\\r\n0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 \\\r\n3\r\nf 1 2\r\n".to_vec();
+    let strips = b"ply\rformat ascii 1.0\rcomment \xF6\relement vertex 4\rproperty float x\rproperty float y\rproperty int q\relement tristrips 1\rproperty list int int vertex_indices\relement edge 1\rproperty list uchar short a\rend_header\r0 0 1\r1 0 2\r0 1 3\r1 1 4\r9 0 1 2 3 -1 3 2 1 -1\r2 1 2\r".to_vec();
+    let facets = b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n".to_vec();
+    let mut stl = vec![0; 80];
+    stl.extend(2_u32.to_le_bytes());
+    for triangle in [
+        [0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0],
+    ] {
+        stl.extend(triangle.iter().flat_map(|c| c.to_le_bytes()));
+        stl.extend([0; 2]);
+    }
+    let utf_16 = "\u{FEFF}0 0 0 0 0 1\r\n1 0 0 0 0 1\r\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let seeds = [ply.as_bytes().to_vec(), binary, obj, xyz, colors, continued, strips, facets, stl, utf_16];
     let mut accepted = 0;
     for run in 0..count {
         let mut draws = Draws::new(seed, run);
         let mut bytes = draws.pick(&seeds).clone();
         mutate_bytes(&mut bytes, &mut draws);
-        if let Ok(mesh) = mesh::read(&bytes) {
+        let found = mesh::read(&bytes).and_then(|mut mesh| {
+            mesh.leave_out_loose_points()?;
+            mesh.check().map(|()| mesh)
+        });
+        if let Ok(mesh) = found {
             accepted += 1;
             assert!(mesh.points.iter().flatten().all(|c| c.is_finite()));
             assert!(mesh.normals.is_empty() || mesh.normals.len() == mesh.points.len());
+            assert!(mesh.triangles().as_flattened().iter().all(|corner| (*corner as usize) < mesh.points.len()));
             let _ = mesh.is_closed();
         }
     }

@@ -1,0 +1,101 @@
+//! Points of any file from outside: VTKHDF, or a mesh by what its bytes look like. The service's inspection and `meniscus run`
+//! read files by this alone, so that both accept and refuse the same, in the same words.
+
+use super::mesh::{self, Mesh};
+use super::{cloud_file, structure, vtkhdf_points};
+use crate::spec::uploads::{FaceContents, PointContents, Purpose};
+use meniscus::scene::Cloud;
+use std::fs::File;
+use std::io::{Read, Seek};
+
+/// Bytes of a mesh file at most.
+const LARGEST_MESH: u64 = 1 << 30;
+
+/// Reads the points of a file for a purpose, and says what was found.
+///
+/// # Errors
+/// A sentence: what is wrong, where, and what helps.
+pub fn read(file: &mut File, purpose: Purpose) -> Result<(PointContents, Cloud), String> {
+    let failed = |error: std::io::Error| error.to_string();
+    let mut head = Vec::new();
+    file.take(structure::SIGNATURE.len() as u64).read_to_end(&mut head).map_err(failed)?;
+    let is_hdf5 = head == structure::SIGNATURE;
+    if is_hdf5 || purpose == Purpose::Points {
+        let found = vtkhdf_points::read(file, purpose)?;
+        let level = found.level;
+        check_level(level.as_deref())?;
+        return finish(found.mesh, level, purpose, is_hdf5);
+    }
+    let size = file.metadata().map_err(failed)?.len();
+    if size > LARGEST_MESH {
+        return Err(format!("a mesh of {size} bytes; at most {LARGEST_MESH} are read"));
+    }
+    file.rewind().map_err(failed)?;
+    let mut bytes = Vec::new();
+    file.take(LARGEST_MESH).read_to_end(&mut bytes).map_err(failed)?;
+    finish(mesh::read(&bytes)?, None, purpose, false)
+}
+
+/// Checks numbers, leaves out what is no part of a surface, and describes what is there.
+fn finish(
+    mut mesh: Mesh,
+    level: Option<Vec<f64>>,
+    purpose: Purpose,
+    is_hdf5: bool,
+) -> Result<(PointContents, Cloud), String> {
+    let is_surface = purpose == Purpose::Surface;
+    if !is_surface {
+        // Places have neither normals nor faces.
+        mesh = Mesh { points: mesh.points, ..Mesh::default() };
+    }
+    let left_out = mesh.leave_out_loose_points()?;
+    mesh.check()?;
+    let is_closed = (!mesh.faces.is_empty()).then(|| mesh.is_closed());
+    let faces = FaceContents { faces: mesh.faces.len(), is_closed };
+    let triangles = mesh.triangles();
+    if triangles.len() as u64 > cloud_file::MOST_TRIANGLES {
+        return Err(format!("{} triangles; at most {} are read", triangles.len(), cloud_file::MOST_TRIANGLES));
+    }
+    let normals = (!mesh.normals.is_empty()).then_some(mesh.normals);
+    let cloud = Cloud { positions: mesh.points, level, normals, triangles, left_out };
+    let contents = PointContents {
+        normals: is_surface.then_some(cloud.normals.is_some()),
+        // Frames of particles have no faces to speak of.
+        faces: (is_surface && (!is_hdf5 || faces.faces > 0)).then_some(faces),
+        ..contents_of(&cloud)
+    };
+    Ok((contents, cloud))
+}
+
+/// Number of points, their fields and the box around them.
+fn contents_of(cloud: &Cloud) -> PointContents {
+    let bound = |pick: fn(f64, f64) -> f64, start: f64| -> [f64; 3] {
+        std::array::from_fn(|d| cloud.positions.iter().map(|x| x[d]).fold(start, pick))
+    };
+    let phi = cloud.level.as_ref().map(|_| "phi".to_owned());
+    let normal = cloud.normals.as_ref().map(|_| "normal".to_owned());
+    PointContents {
+        points: cloud.positions.len() as u64,
+        fields: phi.into_iter().chain(normal).collect(),
+        low: bound(f64::min, f64::INFINITY),
+        high: bound(f64::max, f64::NEG_INFINITY),
+        normals: None,
+        faces: None,
+        points_left_out: (cloud.left_out > 0).then_some(cloud.left_out),
+    }
+}
+
+/// Refuses levels that are infinite; a level may be missing at some points, where it is NaN.
+fn check_level(level: Option<&[f64]>) -> Result<(), String> {
+    let Some(level) = level else { return Ok(()) };
+    if let Some(k) = level.iter().position(|level| level.is_infinite()) {
+        return Err(format!("phi of point {k} is infinite"));
+    }
+    if level.iter().all(|level| level.is_nan()) {
+        return Err("no point has a phi that is a number".to_owned());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;
