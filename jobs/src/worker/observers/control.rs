@@ -8,7 +8,7 @@ use std::time::Duration;
 
 /// Time that a run has to come to the end of its step after a request to pause. Then the step, or the measurement, is
 /// dropped.
-const PATIENCE: Duration = Duration::from_millis(1200);
+const PATIENCE: Duration = Duration::from_millis(1000);
 
 /// Flags shared between the thread that receives requests and the run.
 #[derive(Debug, Clone, Default)]
