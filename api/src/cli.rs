@@ -166,22 +166,9 @@ pub fn main() -> ExitCode {
         Command::Resume { checkpoint, out, threads } => {
             foreground::resume(&checkpoint, &out, threads).unwrap_or_else(|error| fail(&error))
         }
-        Command::Verify { only, full, checks: true, cases, runs, results } => {
-            let request = verify::Request { only, full, cases, runs, results };
-            match verify::checks::run(&request, |line| writeln!(std::io::stdout(), "{line}")) {
-                Ok(true) => ExitCode::SUCCESS,
-                Ok(false) => ExitCode::FAILURE,
-                Err(error) => fail(&error),
-            }
-        }
-        Command::Verify { only, full, checks: false, cases, runs, results } => {
-            let request = verify::Request { only, full, cases, runs, results };
-            let show = |outcome: &verify::Outcome| writeln!(std::io::stdout(), "{outcome}");
-            match verify::verify(&request, show) {
-                Ok(true) => ExitCode::SUCCESS,
-                Ok(false) => ExitCode::FAILURE,
-                Err(error) => fail(&error),
-            }
+        Command::Verify { only, full, checks, cases, runs, results } => {
+            let verified = verify_cases(&verify::Request { only, full, cases, runs, results }, checks);
+            verified.unwrap_or_else(|error| fail(&error))
         }
         Command::Backup { target, data } => {
             backup::back_up(&data, &target).map_or_else(|e| fail(&e), |()| ExitCode::SUCCESS)
@@ -200,6 +187,16 @@ pub fn main() -> ExitCode {
             Err(error) => fail(&error),
         },
     }
+}
+
+fn verify_cases(request: &verify::Request, checks: bool) -> Result<ExitCode, verify::VerifyError> {
+    let mut output = std::io::stdout();
+    let is_met = if checks {
+        verify::checks::run(request, |line| writeln!(output, "{line}"))?
+    } else {
+        verify::verify(request, |outcome| writeln!(output, "{outcome}"))?
+    };
+    Ok(if is_met { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn check_data(data: &Path) -> Result<ExitCode, fsck::FsckError> {

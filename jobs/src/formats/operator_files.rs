@@ -3,8 +3,9 @@
 use crate::spec::run_options::OperatorFormat;
 use crate::system::artifacts;
 use meniscus::linear_algebra::SparseRows;
+use meniscus::parallel::Interrupt;
 use meniscus::simulation::NamedOperator;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -22,37 +23,69 @@ pub fn write(
     directory: &Path,
     operator: &NamedOperator,
     format: OperatorFormat,
+    interrupt: &Interrupt,
 ) -> io::Result<Vec<(String, &'static str)>> {
     let NamedOperator { name, rows, areas } = operator;
     let mut written = Vec::new();
     match format {
         OperatorFormat::MatrixMarket => {
             let file = format!("{name}.mtx");
-            into_file(directory, &file, |out| matrix(out, rows))?;
+            into_file(directory, &file, interrupt, |out| matrix(out, rows))?;
             written.push((file, MATRIX_MARKET));
             if let Some(areas) = areas {
                 let file = format!("{name}_areas.mtx");
-                into_file(directory, &file, |out| column(out, areas))?;
+                into_file(directory, &file, interrupt, |out| column(out, areas))?;
                 written.push((file, MATRIX_MARKET));
             }
         }
         OperatorFormat::Npz => {
             let file = format!("{name}.npz");
-            into_file(directory, &file, |out| archive(out, rows, *areas))?;
+            into_file(directory, &file, interrupt, |out| archive(out, rows, *areas))?;
             written.push((file, NPZ));
         }
     }
     Ok(written)
 }
 
+/// Bytes between two looks at the interrupt.
+const BUFFER_BYTES: usize = 1 << 18;
+
+/// A buffered file that a request can cut short.
+type Output = BufWriter<Interruptible>;
+
+/// A file whose writing fails once the interrupt is raised.
+struct Interruptible {
+    file: std::fs::File,
+    interrupt: Interrupt,
+}
+
+impl Write for Interruptible {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.interrupt.check().map_err(io::Error::other)?;
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for Interruptible {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
 /// Writes a file that appears under its name when it is complete.
 fn into_file(
     directory: &Path,
     name: &str,
-    fill: impl FnOnce(&mut BufWriter<std::fs::File>) -> io::Result<()>,
+    interrupt: &Interrupt,
+    fill: impl FnOnce(&mut Output) -> io::Result<()>,
 ) -> io::Result<()> {
     let path = directory.join(name);
-    let mut out = BufWriter::new(std::fs::File::create(artifacts::unfinished(&path))?);
+    let file = std::fs::File::create(artifacts::unfinished(&path))?;
+    let mut out = BufWriter::with_capacity(BUFFER_BYTES, Interruptible { file, interrupt: interrupt.clone() });
     fill(&mut out)?;
     out.flush()?;
     artifacts::finish(&path)
@@ -77,7 +110,7 @@ fn column(out: &mut impl Write, values: &[f64]) -> io::Result<()> {
 }
 
 /// Compressed rows: `data`, `indices`, `indptr`, `shape`, `format`; and `areas`.
-fn archive(out: &mut BufWriter<std::fs::File>, rows: &SparseRows, areas: Option<&[f64]>) -> io::Result<()> {
+fn archive(out: &mut Output, rows: &SparseRows, areas: Option<&[f64]>) -> io::Result<()> {
     let size = rows.rows();
     let mut archive = ZipWriter::new(out);
     let row = |i: usize| rows.row(i);
@@ -109,7 +142,7 @@ fn archive(out: &mut BufWriter<std::fs::File>, rows: &SparseRows, areas: Option<
 }
 
 /// One array in the format `.npy` 1.0: a line that says what follows, padded to a multiple of 64 bytes, then numbers.
-fn array<W: Write + io::Seek>(
+fn array<W: Write + Seek>(
     archive: &mut ZipWriter<W>,
     name: &str,
     kind: &str,
@@ -143,7 +176,7 @@ mod tests {
         rows.push_row(&[1], &[2e-17]);
         let operator = NamedOperator { name: "test", rows: &rows, areas: Some(&[0.5, 1.5]) };
         let directory = tempfile::tempdir().unwrap();
-        let files = write(directory.path(), &operator, OperatorFormat::MatrixMarket).unwrap();
+        let files = write(directory.path(), &operator, OperatorFormat::MatrixMarket, &Interrupt::default()).unwrap();
         let text = |k: usize| std::fs::read_to_string(directory.path().join(&files[k].0)).unwrap();
         assert_eq!(text(0), "%%MatrixMarket matrix coordinate real general\n2 2 3\n1 1 -1e-1\n1 2 1e-1\n2 2 2e-17\n");
         assert_eq!(text(1), "%%MatrixMarket matrix array real general\n2 1\n5e-1\n1.5e0\n");
@@ -157,7 +190,7 @@ mod tests {
         let operator = NamedOperator { name: "test", rows: &rows, areas: Some(&[0.5]) };
         let bytes = || {
             let directory = tempfile::tempdir().unwrap();
-            let files = write(directory.path(), &operator, OperatorFormat::Npz).unwrap();
+            let files = write(directory.path(), &operator, OperatorFormat::Npz, &Interrupt::default()).unwrap();
             assert_eq!(files.len(), 1);
             std::fs::read(directory.path().join("test.npz")).unwrap()
         };

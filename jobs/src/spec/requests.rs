@@ -8,6 +8,8 @@ pub const NOT_STARTED_CODE: u8 = 75;
 pub enum Request {
     /// End the run after a checkpoint at the end of the step.
     Pause,
+    /// The same because the service stops: the job goes back to the queue.
+    Drain,
     /// Drop the step and end.
     Cancel,
     /// Write a checkpoint at the end of the step and go on.
@@ -16,13 +18,14 @@ pub enum Request {
 
 impl Request {
     /// All requests.
-    pub const ALL: [Self; 3] = [Self::Pause, Self::Cancel, Self::Checkpoint];
+    pub const ALL: [Self; 4] = [Self::Pause, Self::Drain, Self::Cancel, Self::Checkpoint];
 
     /// Its word on the way to a worker.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
             Self::Pause => "pause",
+            Self::Drain => "drain",
             Self::Cancel => "cancel",
             Self::Checkpoint => "checkpoint",
         }

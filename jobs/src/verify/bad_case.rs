@@ -2,6 +2,9 @@
 //! is doubtful.
 
 use super::case::{CaseError, job_body, parse};
+use crate::spec::health::HealthStatus;
+use crate::spec::report::RunReport;
+use meniscus::simulation::Severity;
 use serde::Deserialize;
 use serde_json::Value;
 use std::fmt;
@@ -18,6 +21,19 @@ pub enum Fate {
     Doubtful(String),
     /// It passes for a success.
     Sound,
+}
+
+impl Fate {
+    /// What a finished run thinks of itself; a doubt is told by the finding that was expected, else by the first.
+    pub(super) fn of_report(report: &RunReport, expected: Option<&Fate>) -> Self {
+        let warnings = || report.health.findings.iter().filter(|finding| finding.severity == Severity::Warning);
+        if report.health.status != Some(HealthStatus::Doubtful) {
+            return Self::Sound;
+        }
+        let is_expected = |code: &str| matches!(expected, Some(Self::Doubtful(wanted)) if wanted == code);
+        let finding = warnings().find(|finding| is_expected(&finding.code)).or_else(|| warnings().next());
+        Self::Doubtful(finding.map_or_else(String::new, |finding| finding.code.to_string()))
+    }
 }
 
 impl fmt::Display for Fate {

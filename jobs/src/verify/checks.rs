@@ -5,8 +5,7 @@ use super::case::{CaseError, job_body};
 use super::catalog::{self, Catalog};
 use super::workspace::Workspace;
 use super::{Request, VerifyError};
-use crate::spec::health::{HealthRecord, HealthStatus};
-use crate::spec::report::RunReport;
+use crate::spec::health::HealthRecord;
 use crate::system::{build, clock, process};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{Check, Severity};
@@ -108,17 +107,6 @@ fn row(workspace: &Workspace, name: &str, title: &str, body: &Value, expected: O
         tightest: health.map(tightest).unwrap_or_default(),
         findings: health.map(findings).unwrap_or_default(),
     }
-}
-
-/// What a finished run thinks of itself; a doubt is told by the finding that was expected, else by the first.
-pub(super) fn fate_of(report: &RunReport, expected: Option<&Fate>) -> Fate {
-    let warnings = || report.health.findings.iter().filter(|finding| finding.severity == Severity::Warning);
-    if report.health.status != Some(HealthStatus::Doubtful) {
-        return Fate::Sound;
-    }
-    let is_expected = |code: &str| matches!(expected, Some(Fate::Doubtful(wanted)) if wanted == code);
-    let finding = warnings().find(|finding| is_expected(&finding.code)).or_else(|| warnings().next());
-    Fate::Doubtful(finding.map_or_else(String::new, |finding| finding.code.to_string()))
 }
 
 /// The check that came nearest to its limit at the end.

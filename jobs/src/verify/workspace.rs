@@ -1,7 +1,6 @@
 //! Where the runs of a verification are kept. Runs of this build that are already there are not repeated.
 
 use super::bad_case::Fate;
-use super::checks;
 use super::measure::FinishedRun;
 use crate::spec::attempt_files;
 use crate::spec::records::Verdict;
@@ -37,13 +36,13 @@ impl Workspace {
     pub(super) fn fate(&self, body: &Value, expected: Option<&Fate>) -> (Fate, Option<RunReport>) {
         let directory = self.directory_of(body, Keep::Report);
         if let Some(report) = read_report(&directory) {
-            return (checks::fate_of(&report, expected), Some(report));
+            return (Fate::of_report(&report, expected), Some(report));
         }
         let fate = match local_run::run_to_verdict(body, &directory, 1, Keep::Report) {
             Err(Refused { pointer, .. }) => Fate::Refused(pointer),
             Ok((_, Verdict::Failed { reason, .. })) => Fate::Ended(reason.word().to_owned()),
             Ok(_) => match read_report(&directory) {
-                Some(report) => return (checks::fate_of(&report, expected), Some(report)),
+                Some(report) => return (Fate::of_report(&report, expected), Some(report)),
                 None => Fate::Ended("no report".to_owned()),
             },
         };

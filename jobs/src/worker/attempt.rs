@@ -69,7 +69,7 @@ enum Failure {
     Known(Reason, String),
     Canceled,
     /// The set-up was dropped on request.
-    Paused,
+    Paused(Option<Reason>),
     /// The system did not grant what it needs to begin.
     Unstarted(String),
 }
@@ -88,7 +88,7 @@ impl Failure {
 
     fn verdict(self, directory: &Path) -> Verdict {
         match self {
-            Self::Paused => Verdict::Paused { reason: None },
+            Self::Paused(reason) => Verdict::Paused { reason },
             Self::Unstarted(cause) => Verdict::Unstarted { cause },
             Self::Canceled | Self::Run(RunError::Step(StepError::Interrupted)) => Verdict::Canceled,
             Self::Known(reason, message) => Verdict::Failed { reason, message },
@@ -144,7 +144,7 @@ fn attempt(
         let ending = match run(simulation.as_mut(), &mut observers) {
             Err(RunError::Step(StepError::Interrupted)) if control.is_only_pausing() => {
                 observers.rescue()?;
-                return Ok(Verdict::Paused { reason: None });
+                return Ok(Verdict::Paused { reason: control.pause_reason() });
             }
             ran => ran.map_err(Failure::Run)?,
         };
@@ -152,12 +152,15 @@ fn attempt(
         log.line(&format!("{word} at step {}", simulation.clock().step));
         match ending {
             Ending::Stopped if control.is_canceled() => Ok(Verdict::Canceled),
-            Ending::Stopped => Ok(Verdict::Paused { reason: observers.is_starved.then_some(Reason::StorageEnospc) }),
+            Ending::Stopped => {
+                let starved = observers.is_starved.then_some(Reason::StorageEnospc);
+                Ok(Verdict::Paused { reason: starved.or_else(|| control.pause_reason()) })
+            }
             Ending::Finished => {
                 let operators = match write_operators(directory, &options, simulation.as_mut(), &mut observers) {
                     // The checkpoint of the end stands; they are made when the job goes on.
                     Err(failure) if failure.is_interruption() && control.is_only_pausing() => {
-                        return Ok(Verdict::Paused { reason: None });
+                        return Ok(Verdict::Paused { reason: control.pause_reason() });
                     }
                     written => written?,
                 };
@@ -209,7 +212,7 @@ fn build(
         return Err(Failure::Canceled);
     }
     if control.interrupt().is_raised() {
-        return Err(Failure::Paused);
+        return Err(Failure::Paused(control.pause_reason()));
     }
     built.map_err(|found| {
         let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
@@ -370,9 +373,15 @@ fn write_operators(
     observers: &mut Observers,
 ) -> Result<Vec<FileRecord>, Failure> {
     let Some(format) = options.output.operators else { return Ok(Vec::new()) };
+    let interrupt = observers.control.interrupt();
     let mut files = Vec::new();
     for operator in simulation.operators().map_err(|error| Failure::Run(error.into()))? {
-        for (name, media_type) in operator_files::write(directory, &operator, format)? {
+        let files_of = operator_files::write(directory, &operator, format, interrupt);
+        // A file that was dropped on request is no failure of the disk.
+        let files_of = files_of.map_err(|error| {
+            if interrupt.is_raised() { Failure::Run(RunError::Step(StepError::Interrupted)) } else { error.into() }
+        })?;
+        for (name, media_type) in files_of {
             let file = FileRecord::from_file(directory, &name, media_type)?;
             observers.sink.put(&Record::File(file.clone()), false)?;
             files.push(file);

@@ -34,8 +34,9 @@ fn bodies() -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Time within which a worker is to have ended after a request. The contract says two seconds; the machine may be busy.
-const PROMPT: Duration = Duration::from_secs(6);
+/// Time within which a worker is to have ended after a request. The contract says two seconds; the machine may be busy. A worker
+/// that is deaf is killed after ten.
+const PROMPT: Duration = Duration::from_secs(8);
 
 /// What the disturbances of one job came to.
 #[derive(Default)]
@@ -75,7 +76,7 @@ pub fn of_every_scene(count: u64, seed: u64) -> String {
                 match (random() * 3.0) as u64 {
                     0 if !pause(&service, &id, &mut outcome) => break,
                     0 => {}
-                    1 => stop(&mut service, &mut outcome),
+                    1 => stop(&mut service, part, &mut outcome),
                     _ => {
                         cancel(&service, &id, &mut outcome);
                         break;
@@ -130,11 +131,11 @@ fn pause(service: &Service, id: &str, outcome: &mut Outcome) -> bool {
 }
 
 /// Stops the service in good order and starts it again.
-fn stop(service: &mut Service, outcome: &mut Outcome) {
+fn stop(service: &mut Service, part: &str, outcome: &mut Outcome) {
     let asked = Instant::now();
     assert!(service.stop());
     let time = asked.elapsed();
-    assert!(time < PROMPT, "the stop took {time:?}");
+    assert!(time < PROMPT, "{part}: the stop took {time:?}");
     outcome.times.push(time.as_secs_f64());
     outcome.stops += 1;
     service.restart();

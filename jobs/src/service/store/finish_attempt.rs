@@ -61,7 +61,8 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<()
                     step(Trigger::Pause, why, None)?;
                 }
                 // A pause on request is kept; after a drain or a limit the reason of the verdict is the newer one.
-                let drained = why == Some(Reason::ServerRestart) && reason.is_none();
+                let is_restart = |reason: Option<Reason>| reason == Some(Reason::ServerRestart);
+                let drained = is_restart(why) && (reason.is_none() || is_restart(reason));
                 let kept = if why == Some(Reason::UserPause) { why } else { reason.or(why) };
                 step(if drained { Trigger::Drain } else { Trigger::Rest }, kept, None).map(|_| ())
             }

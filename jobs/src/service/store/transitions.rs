@@ -238,11 +238,14 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
     metrics::counter!("meniscus_transitions_total", "to" => to.word(), "reason" => reason_word).increment(1);
     let data = json!({"from": job.state.word(), "to": to.word(), "reason": reason.map(Reason::word), "hint": hint, "message": message});
     events::append(transaction, id, job.study.as_deref(), attempt, "state", &data)?;
-    if to.is_terminal() {
-        tell_waiting_jobs(transaction, id, to)?;
-    }
-    if to == State::Failed
-        && let Some(study) = &job.study
+    if to.is_terminal() { tell_of_end(transaction, id, to, job.study.as_deref()) } else { Ok(()) }
+}
+
+/// Tells a study and the jobs that wait for one that it has ended.
+fn tell_of_end(transaction: &Transaction, id: &str, state: State, study: Option<&str>) -> Result<(), ChangeError> {
+    tell_waiting_jobs(transaction, id, state)?;
+    if state == State::Failed
+        && let Some(study) = study
     {
         study_limits::note_failure(transaction, study)?;
     }

@@ -100,7 +100,8 @@ impl Supervisor {
         let change = Change { reason: Some(reason), epoch: Some(running.epoch), ..Change::default() };
         self.change(&running.job, Trigger::Pause, &change)?;
         if running.pause_sent.is_none() {
-            running.worker.send(Request::Pause);
+            let is_drained = reason == Reason::ServerRestart;
+            running.worker.send(if is_drained { Request::Drain } else { Request::Pause });
             running.pause_sent = Some(self.clock.now());
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! Requests to a running worker, as its run sees them.
 
 use crate::spec::requests::Request;
+use crate::spec::states::Reason;
 use meniscus::parallel::Interrupt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,6 +16,7 @@ const PATIENCE: Duration = Duration::from_millis(1000);
 pub struct Control {
     interrupt: Interrupt,
     canceled: Arc<AtomicBool>,
+    draining: Arc<AtomicBool>,
     pausing: Arc<AtomicBool>,
     checkpoint: Arc<AtomicBool>,
 }
@@ -27,7 +29,8 @@ impl Control {
                 self.canceled.store(true, Ordering::Relaxed);
                 self.interrupt.raise();
             }
-            Request::Pause => {
+            Request::Pause | Request::Drain => {
+                self.draining.store(request == Request::Drain, Ordering::Relaxed);
                 self.pausing.store(true, Ordering::Relaxed);
                 self.lose_patience_later();
             }
@@ -51,6 +54,12 @@ impl Control {
     #[must_use]
     pub fn is_canceled(&self) -> bool {
         self.canceled.load(Ordering::Relaxed)
+    }
+
+    /// Why the run pauses, where it is not on a client's request.
+    #[must_use]
+    pub fn pause_reason(&self) -> Option<Reason> {
+        self.draining.load(Ordering::Relaxed).then_some(Reason::ServerRestart)
     }
 
     /// Whether the run is to end with its state kept.
