@@ -1,9 +1,11 @@
-//! The zero of a level set that particles carry, from fits in space or in material coordinates.
+//! The zero of a level set that particles carry, from fits in space, in coordinates of a stretched cloud or in material
+//! coordinates.
 
 use super::material::MaterialSurface;
 use super::queries::ClosestPoints;
 use super::redistancing::{ClosestPoint, Redistancing};
 use super::rescue::FitDiagnostics;
+use super::stretched::StretchedSurface;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
@@ -15,6 +17,8 @@ pub enum LevelSurface<const D: usize> {
     Spatial(Box<Redistancing<D>>),
     /// Fits over neighbors in initial positions.
     Material(Box<MaterialSurface<D>>),
+    /// Fits over neighbors in coordinates in which a stretched cloud is even.
+    Stretched(Box<StretchedSurface<D>>),
 }
 
 /// Distance from the surface, in multiples of h, beyond which the nearest particle decides on which side a point lies,
@@ -26,6 +30,7 @@ macro_rules! each {
         match $self {
             Self::Spatial($surface) => $value,
             Self::Material($surface) => $value,
+            Self::Stretched($surface) => $value,
         }
     };
 }
@@ -39,6 +44,7 @@ impl<const D: usize> LevelSurface<D> {
     pub fn detect(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
         match self {
             Self::Spatial(surface) => surface.detect(positions, level, interrupt),
+            Self::Stretched(surface) => surface.detect(positions, level, interrupt),
             Self::Material(_) => Ok(()),
         }
     }
@@ -57,6 +63,7 @@ impl<const D: usize> LevelSurface<D> {
         match self {
             Self::Spatial(surface) => surface.fit_samples(positions, level, normals, interrupt),
             Self::Material(surface) => surface.fit(positions, interrupt),
+            Self::Stretched(surface) => surface.fit_samples(positions, level, normals, interrupt),
         }
     }
 
@@ -107,6 +114,9 @@ impl<const D: usize> LevelSurface<D> {
     pub fn is_inside(&self, x: &Vector<D>, foot: &ClosestPoint<D>) -> bool {
         match self {
             Self::Spatial(surface) if foot.distance > FAR * surface.spacing() => surface.is_nearest_particle_inside(x),
+            Self::Stretched(surface) if foot.distance > FAR * surface.spacing() => {
+                surface.is_nearest_particle_inside(x)
+            }
             _ => !foot.is_outside,
         }
     }

@@ -121,8 +121,15 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
             }
         }
         self.course.phases.measure("redistancing/store", || {
+            let has_own_level = matches!(system.source, Source::Particles);
             for (i, answer) in system.answers.iter() {
                 system.columns.write(&mut system.particles, system.level, i, answer);
+                if has_own_level && system.particles.scalar(system.level)[i] == 0.0 {
+                    // The surface passes through the particle, also of the next redistancing.
+                    system.particles.scalar_mut(system.columns.phi)[i] = 0.0;
+                    let x = system.particles.positions()[i];
+                    system.particles.vector_mut(system.columns.closest_point)[i] = x;
+                }
                 let phi = system.particles.scalar(system.columns.phi)[i];
                 system.particles.scalar_mut(system.level)[i] = phi;
             }
