@@ -45,7 +45,7 @@ pub(super) struct Seed<const D: usize> {
 #[derive(Debug)]
 pub(super) struct Seeds<const D: usize> {
     pub list: Vec<Seed<D>>,
-    cells: CellList<D>,
+    pub cells: CellList<D>,
 }
 
 impl<const D: usize> Seeds<D> {
@@ -83,6 +83,11 @@ pub(super) trait Chart<const D: usize>: Sync {
         self.spot(patch, fit, &own).map(|spot| Seed { patch, own, spot })
     }
 
+    /// The seed by which an iteration goes on that left its fit at `place`: the nearest one.
+    fn seed_near(&self, seeds: &Seeds<D>, place: &Vector<D>) -> Option<usize> {
+        seeds.cells.nearest(place, f64::INFINITY).map(|(seed, _)| seed)
+    }
+
     /// The closest point of the surface to `x`; None without a seed within `cutoff`.
     fn query_from(&self, seeds: &Seeds<D>, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
         let (nearest, distance) = seeds.cells.nearest(x, cutoff)?;
@@ -114,8 +119,8 @@ pub(super) trait Chart<const D: usize>: Sync {
                     }
                     break;
                 }
-                Err(Some(left)) => match seeds.cells.nearest(&left, f64::INFINITY) {
-                    Some((next, _)) if next != current => current = next,
+                Err(Some(left)) => match self.seed_near(seeds, &left) {
+                    Some(next) if next != current => current = next,
                     _ => break,
                 },
                 Err(None) => break,

@@ -1,6 +1,7 @@
 //! The zero of a level set that particles carry, from fits in space, in coordinates of a stretched cloud or in material
 //! coordinates.
 
+use super::detection::Side;
 use super::material::MaterialSurface;
 use super::queries::ClosestPoints;
 use super::redistancing::{ClosestPoint, Redistancing};
@@ -97,6 +98,47 @@ impl<const D: usize> LevelSurface<D> {
     #[must_use]
     pub fn sample_points(&self) -> Vec<Vector<D>> {
         each!(self, surface => surface.sample_points().collect())
+    }
+
+    /// Indices of the particles next to the surface.
+    #[must_use]
+    pub fn near(&self) -> &[usize] {
+        each!(self, surface => surface.near())
+    }
+
+    /// Number of particles next to the surface that have a sample point.
+    #[must_use]
+    pub fn fitted_count(&self) -> usize {
+        each!(self, surface => surface.fitted_count())
+    }
+
+    /// Side of each particle of the last rebuild; None for fits in initial positions.
+    #[must_use]
+    pub fn sides(&self) -> Option<&[Side]> {
+        match self {
+            Self::Spatial(surface) => Some(surface.sides()),
+            Self::Stretched(surface) => Some(surface.sides()),
+            Self::Material(_) => None,
+        }
+    }
+
+    /// Calls `visit(j, r²)` for the particles within ξ of particle `i`, among which those of another side make it a
+    /// particle next to the surface. Distances r are those in space. Fits in initial positions have none.
+    pub(super) fn for_each_near_neighbor(&self, i: usize, positions: &[Vector<D>], visit: impl FnMut(usize, f64)) {
+        match self {
+            Self::Spatial(surface) => surface.for_each_near_neighbor(&positions[i], visit),
+            Self::Stretched(surface) => surface.for_each_near_neighbor(i, positions, visit),
+            Self::Material(_) => {}
+        }
+    }
+
+    /// Longest distance of neighboring particles near particle `i`, by the direction.
+    pub(super) fn spacing_at(&self, i: usize) -> f64 {
+        match self {
+            Self::Spatial(surface) => surface.spacing(),
+            Self::Stretched(surface) => surface.map_of(i).longest,
+            Self::Material(surface) => surface.spacing(),
+        }
     }
 
     /// Whether the surface has no sample point.

@@ -108,6 +108,18 @@ impl<const D: usize> MaterialSurface<D> {
         &mut self.fit_diagnostics
     }
 
+    /// Indices of the particles that started next to the surface.
+    #[must_use]
+    pub fn near(&self) -> &[usize] {
+        self.origin.detection.near()
+    }
+
+    /// Number of particles that started next to the surface and have a seed.
+    #[must_use]
+    pub fn fitted_count(&self) -> usize {
+        self.found.iter().filter(|seeds| !seeds.is_empty()).count()
+    }
+
     /// Seeds of the surface, as points in space.
     pub fn sample_points(&self) -> impl ExactSizeIterator<Item = Vector<D>> + '_ {
         self.seeds.list.iter().map(|seed| seed.spot.point)

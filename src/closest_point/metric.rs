@@ -1,91 +1,159 @@
-//! The metric of a cloud: how its particles are stretched near each place.
-//!
-//! Second moments of positions do not show how a lattice is stretched, because its density is the same everywhere. The
-//! moments of the offsets between adjacent particles do. Two particles are adjacent when the ball with both at the ends
-//! of a diameter contains no other particle (Gabriel and Sokal 1969). The inverse square root of these moments maps a
-//! stretched lattice to an even one. The map is improved until the mapped offsets have the same moments in every
-//! direction.
-//!
-//! The cloud is split into patches of some dozens of particles, each with one map.
+//! The metric of a stretched cloud: a linear map for each patch of some dozens of particles.
 
-use super::local_map::{LocalMap, MappedSearch, determinant, range_of_eigenvalues, spectral};
+use super::local_map::LocalMap;
+use super::map_search::{bounding_box, map_of, mean_spacing};
 use crate::geometry::{Domain, Vector};
-use crate::neighbors::{CellList, Neighbor, NeighborSearch};
+use crate::neighbors::{CellList, KdTree};
 use crate::parallel::{Interrupt, Interrupted};
-use crate::polynomials::neighborhood::radius_of_count;
-use nalgebra::SMatrix;
 use rayon::prelude::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
-use std::ops::Range;
 
-/// Patches of a cloud, and the map of each.
+/// Patches of a cloud, and the map of each patch next to the surface.
 #[derive(Debug, Clone)]
 pub struct CloudMetric<const D: usize> {
     /// Indices of the particles, patch by patch.
     order: Vec<usize>,
     /// First slot of each patch in `order`, and the number of particles at the end.
     starts: Vec<usize>,
+    /// Patch of each particle.
+    patch_of: Vec<usize>,
     maps: Vec<LocalMap<D>>,
+    /// Patches through which the surface passes; all where it passes through none.
+    crossed: Vec<usize>,
+    /// Whether each patch is crossed or lies next to such patches.
+    is_next_to_surface: Vec<bool>,
 }
 
 /// Largest number of particles of a patch.
 const PATCH: usize = 64;
-/// Particles of a patch that are looked at first.
-const FIRST_LOOK: usize = 8;
-/// A patch is even when its stretch is smaller at the first look. Moments of a jittered lattice stay below.
-const EVEN: f64 = 1.4;
-/// The stretch that is left in a map when its improvement ends.
-const SETTLED: f64 = 1.1;
-/// Largest factor by which a round changes the stretch. The first neighborhoods may show one row of particles alone.
-const MOST_CHANGE: f64 = 4.0;
-/// Largest stretch of a map. Beyond it neighborhoods have hundreds of particles too many in space.
-const MOST_STRETCH: f64 = 16.0;
-/// Largest number of improvements.
-const ROUNDS: usize = 12;
-/// A cloud is stretched when this share of its patches at the surface is, by at least [`STRETCHED`].
-const STRETCHED_SHARE: f64 = 0.05;
-/// Fits with one radius lose accuracy from this stretch on (measured: 1.5 costs less than a factor of two).
-const STRETCHED: f64 = 1.5;
+/// Factor by which the stretch beside a patch must be larger for its map to be tried.
+const MUCH_MORE: f64 = 2.0;
+/// How often maps pass from patch to patch.
+const PASSES: usize = 4;
 
-/// Number of particles among which adjacent ones are looked for: those up to the second shell.
-const fn looked_at(dimension: usize) -> f64 {
-    if dimension == 2 { 25.0 } else { 57.0 }
+/// Number of patches around one that count as next to it.
+const fn patches_around(dimension: usize) -> usize {
+    if dimension == 2 { 20 } else { 60 }
 }
 
 impl<const D: usize> CloudMetric<D> {
-    /// The metric of a cloud with a level.
+    /// The metric of a cloud in the patches through which the zero of its level passes.
     ///
     /// # Errors
     /// [`Interrupted`] when the interrupt is raised.
-    pub fn new(positions: &[Vector<D>], interrupt: &Interrupt) -> Result<Self, Interrupted> {
+    pub fn new(positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<Self, Interrupted> {
         let mut order: Vec<usize> = (0..positions.len()).collect();
         let mut starts = vec![0];
         split(positions, &mut order, 0, &mut starts);
-        let mut cells = CellList::new(Domain::unbounded());
-        let spacing = mean_spacing(positions, &order);
-        cells.rebuild(positions.iter().copied(), 2.0 * spacing);
-        let ranges: Vec<Range<usize>> = starts.windows(2).map(|pair| pair[0]..pair[1]).collect();
-        let maps = ranges
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|range| {
-                let start = LocalMap::even(spacing);
-                if interrupt.is_raised() { start } else { map_of(&cells, positions, &order[range], start) }
-            })
-            .collect();
+        let mut patch_of = vec![0; positions.len()];
+        for (patch, range) in starts.windows(2).enumerate() {
+            order[range[0]..range[1]].iter().for_each(|i| patch_of[*i] = patch);
+        }
+        let count = starts.len() - 1;
+        let is_crossed = |patch: &usize| is_crossed(&order[starts[*patch]..starts[patch + 1]], level);
+        let mut crossed: Vec<usize> = (0..count).filter(is_crossed).collect();
+        if crossed.is_empty() {
+            crossed.extend(0..count);
+        }
+        let even = LocalMap::even(mean_spacing(positions, &order));
+        let (maps, is_next_to_surface) = (vec![even; count], vec![false; count]);
+        let mut metric = Self { order, starts, patch_of, maps, crossed, is_next_to_surface };
+        let all = metric.crossed.iter().map(|patch| (*patch, even, true)).collect();
+        let found = metric.maps_from(&metric.sorted(positions), positions, all, interrupt);
+        found.into_iter().for_each(|(patch, (map, _))| metric.maps[patch] = map);
         interrupt.check()?;
-        Ok(Self { order, starts, maps })
+        Ok(metric)
     }
 
-    /// Whether particles near the zero of a level are stretched.
-    #[must_use]
-    pub fn is_stretched(&self, level: &[f64]) -> bool {
-        let is_crossed = |patch: usize| {
-            let particles = self.particles(patch);
-            particles.iter().any(|i| level[*i] <= 0.0) && particles.iter().any(|i| level[*i] >= 0.0)
+    /// The metric with the maps of all patches next to the surface.
+    ///
+    /// 1. Crossed patches try the maps of more stretched ones beside them. Jittered particles may lie as evenly under
+    ///    two maps, and patches side by side should have the same.
+    /// 2. The other patches next to the surface begin with the map of the nearest crossed patch.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when the interrupt is raised.
+    pub fn completed(mut self, positions: &[Vector<D>], interrupt: &Interrupt) -> Result<Self, Interrupted> {
+        let cells = self.sorted(positions);
+        let center = |patch: &usize| {
+            let particles = self.particles(*patch);
+            particles.iter().map(|i| positions[*i]).sum::<Vector<D>>() / particles.len().max(1) as f64
         };
-        let crossed: Vec<usize> = (0..self.maps.len()).filter(|patch| is_crossed(*patch)).collect();
-        let stretched = crossed.iter().filter(|patch| self.maps[**patch].stretch() >= STRETCHED).count();
-        stretched > 0 && stretched as f64 >= STRETCHED_SHARE * crossed.len() as f64
+        let centers: Vec<Vector<D>> = (0..self.maps.len()).collect::<Vec<_>>().iter().map(center).collect();
+        let crossed: Vec<Vector<D>> = self.crossed.iter().map(|patch| centers[*patch]).collect();
+        let (all_patches, crossed_patches) = (KdTree::new(&centers), KdTree::new(&crossed));
+        let mut found = Vec::new();
+        for _ in 0..PASSES {
+            let mut tries = Vec::new();
+            for patch in &self.crossed {
+                crossed_patches.nearest(&centers[*patch], 2 * D + 1, &mut found);
+                let beside = found.iter().map(|(_, k)| self.maps[self.crossed[*k as usize]]);
+                let most = beside.max_by(|a, b| a.stretch().total_cmp(&b.stretch()));
+                let own = self.maps[*patch].stretch();
+                tries.extend(most.filter(|map| map.stretch() > MUCH_MORE * own).map(|map| (*patch, map, false)));
+            }
+            if tries.is_empty() {
+                break;
+            }
+            for (patch, (map, is_settled)) in self.maps_from(&cells, positions, tries, interrupt) {
+                if is_settled {
+                    self.maps[patch] = map;
+                }
+            }
+        }
+        self.crossed.iter().for_each(|patch| self.is_next_to_surface[*patch] = true);
+        let mut others = Vec::new();
+        for patch in &self.crossed {
+            all_patches.nearest(&centers[*patch], patches_around(D), &mut found);
+            for (_, other) in &found {
+                let other = *other as usize;
+                if !std::mem::replace(&mut self.is_next_to_surface[other], true) {
+                    others.push(other);
+                }
+            }
+        }
+        let start = |patch: usize| {
+            crossed_patches.nearest(&centers[patch], 1, &mut found);
+            let nearest = found.first().map_or(patch, |(_, k)| self.crossed[*k as usize]);
+            (patch, self.maps[nearest], false)
+        };
+        let tries = others.into_iter().map(start).collect();
+        for (patch, (map, _)) in self.maps_from(&cells, positions, tries, interrupt) {
+            self.maps[patch] = map;
+        }
+        interrupt.check()?;
+        Ok(self)
+    }
+
+    /// The particles sorted for searches.
+    fn sorted(&self, positions: &[Vector<D>]) -> CellList<D> {
+        let mut cells = CellList::new(Domain::unbounded());
+        cells.rebuild(positions.iter().copied(), 2.0 * mean_spacing(positions, &self.order));
+        cells
+    }
+
+    /// The maps of patches, each with the map to begin with and whether a first look may end the search.
+    fn maps_from(
+        &self,
+        cells: &CellList<D>,
+        positions: &[Vector<D>],
+        tries: Vec<(usize, LocalMap<D>, bool)>,
+        interrupt: &Interrupt,
+    ) -> Vec<(usize, (LocalMap<D>, bool))> {
+        tries
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|(patch, start, is_first)| {
+                let is_dropped = interrupt.is_raised();
+                let find = || map_of(cells, positions, self.particles(patch), start, is_first);
+                (patch, if is_dropped { (start, false) } else { find() })
+            })
+            .collect()
+    }
+
+    /// Whether a patch is crossed by the surface or lies next to such patches.
+    #[must_use]
+    pub fn is_next_to_surface(&self, patch: usize) -> bool {
+        self.is_next_to_surface[patch]
     }
 
     /// Number of patches.
@@ -100,28 +168,34 @@ impl<const D: usize> CloudMetric<D> {
         &self.order[self.starts[patch]..self.starts[patch + 1]]
     }
 
+    /// The patch of a particle.
+    #[must_use]
+    pub fn patch_of(&self, particle: usize) -> usize {
+        self.patch_of[particle]
+    }
+
     /// The map of a patch.
     #[must_use]
     pub fn map(&self, patch: usize) -> &LocalMap<D> {
         &self.maps[patch]
     }
 
-    /// Medians over the patches of the shortest and of the longest spacing.
+    /// Medians of the shortest and of the longest spacing near the surface.
     #[must_use]
     pub fn spacings(&self) -> (f64, f64) {
-        let median = |length: fn(&LocalMap<D>) -> f64| {
-            let mut lengths: Vec<f64> = self.maps.iter().map(length).collect();
-            lengths.sort_by(f64::total_cmp);
-            lengths.get(lengths.len() / 2).copied().unwrap_or(0.0)
-        };
-        (median(|map| map.shortest), median(|map| map.longest))
+        (self.median(|map| map.shortest), self.median(|map| map.longest))
     }
 
-    /// The largest stretch of a patch.
-    #[must_use]
-    pub fn largest_stretch(&self) -> f64 {
-        self.maps.iter().map(LocalMap::stretch).fold(1.0, f64::max)
+    fn median(&self, length: impl Fn(&LocalMap<D>) -> f64) -> f64 {
+        let mut lengths: Vec<f64> = self.crossed.iter().map(|patch| length(&self.maps[*patch])).collect();
+        lengths.sort_by(f64::total_cmp);
+        lengths.get(lengths.len() / 2).copied().unwrap_or(0.0)
     }
+}
+
+/// Whether the surface passes through a patch.
+fn is_crossed(particles: &[usize], level: &[f64]) -> bool {
+    particles.iter().any(|i| level[*i] <= 0.0) && particles.iter().any(|i| level[*i] >= 0.0)
 }
 
 /// Splits particles into patches at the medians along the longest sides of their boxes.
@@ -139,96 +213,82 @@ fn split<const D: usize>(positions: &[Vector<D>], order: &mut [usize], first: us
     split(positions, upper, first + middle, starts);
 }
 
-fn bounding_box<const D: usize>(positions: &[Vector<D>], order: &[usize]) -> (Vector<D>, Vector<D>) {
-    let (low, high) = (Vector::<D>::repeat(f64::INFINITY), Vector::<D>::repeat(f64::NEG_INFINITY));
-    order.iter().fold((low, high), |(low, high), i| (low.inf(&positions[*i]), high.sup(&positions[*i])))
-}
+#[cfg(test)]
+mod tests {
+    use super::{CellList, CloudMetric, Domain, Interrupt, Vector};
+    use crate::closest_point::Stretch;
+    use crate::geometry::random::CounterRandom;
 
-/// The spacing of particles that fill their bounding box.
-fn mean_spacing<const D: usize>(positions: &[Vector<D>], order: &[usize]) -> f64 {
-    let (low, high) = bounding_box(positions, order);
-    let sides = high - low;
-    let volume: f64 = sides.iter().product();
-    let mean = (volume / order.len().max(1) as f64).powf(1.0 / D as f64);
-    if mean > 0.0 && mean.is_finite() { mean } else { sides.max().max(f64::MIN_POSITIVE) / order.len().max(1) as f64 }
-}
+    /// A lattice in the unit square or cube, stretched by the given spacings along turned axes, and moved by up to
+    /// `jitter` spacings along each of them.
+    fn lattice<const D: usize>(spacings: Vector<D>, angle: f64, jitter: f64) -> Vec<Vector<D>> {
+        let random = CounterRandom::new(5);
+        let counts: [i64; D] = std::array::from_fn(|d| (1.3 / spacings[d]).ceil() as i64);
+        let total: i64 = counts.iter().map(|n| 2 * n + 1).product();
+        let (sin, cos) = angle.sin_cos();
+        let place = |k: i64| {
+            let mut rest = k;
+            let mut x = Vector::<D>::from_fn(|d, _| {
+                let index = rest % (2 * counts[d] + 1) - counts[d];
+                rest /= 2 * counts[d] + 1;
+                spacings[d] * (index as f64 + jitter * random.symmetric(&[k, d as i64]))
+            });
+            (x[0], x[1]) = (cos * x[0] - sin * x[1], sin * x[0] + cos * x[1]);
+            x
+        };
+        (0..total).map(place).filter(|x| x.amax() <= 1.0).collect()
+    }
 
-/// What the neighborhoods of some particles show.
-struct Look<const D: usize> {
-    /// Mean number of particles in a neighborhood.
-    count: f64,
-    /// Second moments of the mapped offsets to adjacent particles.
-    moments: SMatrix<f64, D, D>,
-}
+    fn stretches<const D: usize>(points: &[Vector<D>]) -> (f64, f64, f64) {
+        let metric = CloudMetric::new(points, &vec![0.0; points.len()], &Interrupt::default()).unwrap();
+        let mut all: Vec<f64> = (0..metric.patch_count()).map(|k| metric.map(k).stretch()).collect();
+        all.sort_by(f64::total_cmp);
+        (all[all.len() / 50], all[all.len() / 2], all[all.len() - 1 - all.len() / 50])
+    }
 
-/// The map of a patch.
-///
-/// 1. Change the spacing until neighborhoods have the wanted number of particles.
-/// 2. Look at a few particles. If they lie about as densely in every direction, the map is even.
-/// 3. Improve the map with the moments of all particles of the patch.
-fn map_of<const D: usize>(
-    cells: &CellList<D>,
-    positions: &[Vector<D>],
-    particles: &[usize],
-    start: LocalMap<D>,
-) -> LocalMap<D> {
-    let wanted = looked_at(D);
-    let few: Vec<usize> = particles.iter().copied().step_by(particles.len().div_ceil(FIRST_LOOK).max(1)).collect();
-    let mut map = start;
-    let mut is_first = true;
-    let mut neighbors = Vec::new();
-    for _ in 0..ROUNDS {
-        let seen = look(cells, positions, if is_first { &few } else { particles }, &map, &mut neighbors);
-        let factor = (wanted / seen.count).powf(1.0 / D as f64);
-        if !(0.85..=1.2).contains(&factor) {
-            map = map.coarser(factor.clamp(0.25, 2.0));
-            continue;
+    /// Shares of the crossed patches whose stretch lies within a factor of 1.5 of the expected one.
+    fn share<const D: usize>(spacings: Vector<D>, angle: f64, jitter: f64) -> (f64, bool) {
+        let points = lattice(spacings, angle, jitter);
+        let level: Vec<f64> = points.iter().map(|x| x.norm() - 0.6).collect();
+        let never = Interrupt::default();
+        let metric = CloudMetric::new(&points, &level, &never).unwrap();
+        let mut cells = CellList::new(Domain::unbounded());
+        cells.rebuild(points.iter().copied(), spacings.max());
+        let is_stretched = Stretch::new(&cells, &points, &level).is_large();
+        let metric = metric.completed(&points, &never).unwrap();
+        let expected = spacings.max() / spacings.min();
+        let is_right = |patch: &&usize| {
+            let ratio = metric.map(**patch).stretch() / expected;
+            (1.0 / 1.5..=1.5).contains(&ratio)
+        };
+        (metric.crossed.iter().filter(is_right).count() as f64 / metric.crossed.len() as f64, is_stretched)
+    }
+
+    #[test]
+    fn the_stretch_of_a_turned_lattice_is_found() {
+        for ratio in [2.0, 4.0, 10.0] {
+            for angle in [0.0, 0.5, 0.785] {
+                for jitter in [0.0, 0.1, 0.3] {
+                    let found = share(Vector::<2>::new(1.0 / 16.0, 1.0 / 16.0 / ratio), angle, jitter);
+                    // Where particles move by a third of a spacing, some patches lie as evenly under another map.
+                    let least = if jitter < 0.2 { 0.95 } else { 0.6 };
+                    assert!(found.0 >= least && found.1, "{ratio} {angle} {jitter}: {found:?}");
+                }
+            }
         }
-        let (least, most) = range_of_eigenvalues(&seen.moments);
-        let left = (most / least.max(0.0)).sqrt();
-        if left < if is_first { EVEN } else { SETTLED } {
-            break;
-        }
-        is_first = false;
-        // Eigenvalues far below the largest stand for directions in which no neighbor was seen yet.
-        let floor = most / (MOST_CHANGE * MOST_CHANGE);
-        let change = spectral(&seen.moments, |value| 1.0 / value.max(floor));
-        let scale = determinant(&change).powf(1.0 / D as f64);
-        let metric = map.map * change * map.map / scale;
-        match LocalMap::from_metric(&metric).filter(|next| next.stretch() <= MOST_STRETCH) {
-            Some(next) => map = next,
-            None => break,
+        for spacings in [Vector::<3>::new(1.0, 1.0, 0.2), Vector::<3>::new(1.0, 0.2, 0.2)] {
+            let found = share(spacings * 0.2, 0.4, 0.1);
+            assert!(found.0 >= 0.7 && found.1, "{spacings:?}: {found:?}");
         }
     }
-    map
-}
 
-/// Looks at the neighborhoods of particles under a map.
-fn look<const D: usize>(
-    cells: &CellList<D>,
-    positions: &[Vector<D>],
-    particles: &[usize],
-    map: &LocalMap<D>,
-    neighbors: &mut Vec<Neighbor<D>>,
-) -> Look<D> {
-    let radius = radius_of_count::<D>(looked_at(D));
-    let search = MappedSearch { cells, map };
-    let mut moments = SMatrix::<f64, D, D>::zeros();
-    let (mut count, mut pairs) = (0, 0);
-    for i in particles {
-        search.gather(&(map.map * positions[*i]), radius, neighbors);
-        count += neighbors.len();
-        neighbors.retain(|neighbor| neighbor.index != *i && neighbor.r2 > 0.0);
-        // The nearest neighbors rule out most pairs.
-        neighbors.sort_unstable_by(|a, b| a.r2.total_cmp(&b.r2).then(a.index.cmp(&b.index)));
-        for j in &*neighbors {
-            // A lattice has particles on the spheres themselves. They do not count as inside, whatever the rounding.
-            let is_inside = |k: &Neighbor<D>| k.r2 - k.dx.dot(&j.dx) < -1e-9 * j.r2;
-            if !neighbors.iter().take_while(|k| k.r2 < j.r2).any(is_inside) {
-                moments += j.dx * j.dx.transpose();
-                pairs += 1;
+    #[test]
+    fn even_lattices_are_not_stretched() {
+        for jitter in [0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.49] {
+            for angle in [0.0, 0.3, 0.785] {
+                assert!(!share(Vector::<2>::repeat(1.0 / 20.0), angle, jitter).1, "{jitter} {angle}");
+                assert!(!share(Vector::<3>::repeat(0.2), angle, jitter).1, "3D {jitter} {angle}");
             }
         }
     }
-    Look { count: count as f64 / particles.len().max(1) as f64, moments: moments / f64::from(pairs.max(1)) }
 }

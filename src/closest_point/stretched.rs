@@ -29,6 +29,8 @@ pub struct StretchedSurface<const D: usize> {
     spacing: f64,
     regression: Regression<D>,
     metric: CloudMetric<D>,
+    /// Medians of the shortest and of the longest spacing.
+    spacings: (f64, f64),
     cells: CellList<D>,
     sides: Vec<Side>,
     /// Whether each particle lies next to the surface, patch by patch.
@@ -62,6 +64,7 @@ impl<const D: usize> StretchedSurface<D> {
             method,
             spacing,
             is_near: (0..metric.patch_count()).map(|patch| vec![false; metric.particles(patch).len()]).collect(),
+            spacings: metric.spacings(),
             metric,
             cells: CellList::new(Domain::unbounded()),
             sides: Vec::new(),
@@ -93,6 +96,33 @@ impl<const D: usize> StretchedSurface<D> {
         &self.near
     }
 
+    /// Number of particles next to the surface that have a point of the surface.
+    #[must_use]
+    pub fn fitted_count(&self) -> usize {
+        self.seeds.list.len()
+    }
+
+    /// Side of each particle.
+    #[must_use]
+    pub fn sides(&self) -> &[Side] {
+        &self.sides
+    }
+
+    /// The map of the patch of a particle.
+    pub(super) fn map_of(&self, i: usize) -> &LocalMap<D> {
+        self.metric.map(self.metric.patch_of(i))
+    }
+
+    /// Calls `visit(j, r²)` for the particles within ξ of particle `i` in the coordinates of its patch. The distances r
+    /// are those in space.
+    pub(super) fn for_each_near_neighbor(&self, i: usize, positions: &[Vector<D>], mut visit: impl FnMut(usize, f64)) {
+        let map = self.map_of(i);
+        let x = map.map * positions[i];
+        MappedSearch { cells: &self.cells, map }.for_each_within(&x, self.method.sample_threshold_h, |j, _, _| {
+            visit(j, (positions[j] - positions[i]).norm_squared());
+        });
+    }
+
     /// Points of the surface.
     pub fn sample_points(&self) -> impl ExactSizeIterator<Item = Vector<D>> + '_ {
         self.seeds.list.iter().map(|seed| seed.spot.point)
@@ -121,14 +151,13 @@ impl<const D: usize> StretchedSurface<D> {
     /// [`Interrupted`] when the interrupt is raised.
     pub fn detect(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
         let threshold = self.method.sample_threshold_h;
-        let (_, longest) = self.metric.spacings();
-        self.cells.rebuild(positions.iter().copied(), threshold * longest);
+        self.cells.rebuild(positions.iter().copied(), threshold * self.spacings.1);
         self.sides.clear();
         self.sides.extend(level.iter().map(|level| Side::from_level(*level)));
         let (cells, sides, metric) = (&self.cells, &self.sides, &self.metric);
         let (order, sorted) = (cells.permutation(), cells.sorted());
         self.is_near.par_iter_mut().enumerate().for_each(|(patch, is_near)| {
-            if interrupt.is_raised() {
+            if interrupt.is_raised() || !metric.is_next_to_surface(patch) {
                 return;
             }
             let map = metric.map(patch);
@@ -216,7 +245,7 @@ impl<const D: usize> StretchedSurface<D> {
                 None => add(&self.fit_diagnostics.counts.unprojected, 1),
             }
         }
-        let (shortest, longest) = self.metric.spacings();
+        let (shortest, longest) = self.spacings;
         seeds.sort(SEED_CELL * (shortest * longest).sqrt());
         self.seeds = seeds;
     }
@@ -258,6 +287,21 @@ impl<const D: usize> Chart<D> for StretchedSurface<D> {
 
     fn fit(&self, patch: usize) -> Option<&Fit<D>> {
         self.fits[patch].as_ref()
+    }
+
+    /// The nearest seed in the coordinates of its fit. In space a seed across the stretch may be nearer, but its fit does
+    /// not reach as far.
+    fn seed_near(&self, seeds: &Seeds<D>, place: &Vector<D>) -> Option<usize> {
+        let (nearest, distance) = seeds.cells.nearest(place, f64::INFINITY)?;
+        let map = |seed: usize| &self.batches[seeds.list[seed].patch / LANES].map;
+        let mut best = (nearest, (map(nearest).map * (seeds.list[nearest].spot.point - place)).norm_squared());
+        seeds.cells.for_each_within(place, distance.max(map(nearest).longest), |seed, dx, _| {
+            let r2 = (map(seed).map * dx).norm_squared();
+            if r2 < best.1 || r2 <= best.1 && seed < best.0 {
+                best = (seed, r2);
+            }
+        });
+        Some(best.0)
     }
 
     fn spot(&self, patch: usize, fit: &Fit<D>, own: &Vector<D>) -> Option<Spot<D>> {

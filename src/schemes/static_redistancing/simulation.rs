@@ -1,9 +1,10 @@
 //! One step a redistancing: the distances of one are the input of the next.
 
+use super::checks::Watched;
 use super::format_1;
 use super::quantities::{PHI_ERROR_MAX, PHI_ERROR_RMS, RESCUED_FITS, TIME};
 use super::system::{Source, StaticSystem};
-use crate::closest_point::FitDiagnostics;
+use crate::closest_point::{Coverage, FitDiagnostics};
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_diagnostics, rescued};
 use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::simulation::components::{load_particles, save_particles};
@@ -19,6 +20,9 @@ use std::collections::BTreeMap;
 pub struct StaticRedistancing<const D: usize> {
     system: StaticSystem<D>,
     course: Course,
+    watched: Watched,
+    /// Distance of each particle at the last redistancing, without sign; NaN without an answer.
+    distances: Vec<f64>,
 }
 
 impl<const D: usize> StaticRedistancing<D> {
@@ -26,7 +30,31 @@ impl<const D: usize> StaticRedistancing<D> {
     #[must_use]
     pub fn new(system: StaticSystem<D>, cpu_clock: CpuClock, method: BTreeMap<&'static str, String>) -> Self {
         let fixed = FixedStep { time_step: 1.0, steps: system.repeats };
-        Self { system, course: Course::new(fixed.into(), Phases::new(cpu_clock), method) }
+        let course = Course::new(fixed.into(), Phases::new(cpu_clock), method);
+        Self { system, course, watched: Watched::default(), distances: Vec::new() }
+    }
+
+    /// Compares the answers of a step with the particles that they are made of.
+    fn check(&mut self) -> Result<(), StepError> {
+        let StaticSystem { redistancing: surface, answers, particles, source, .. } = &self.system;
+        let coverage = Coverage::new(surface, answers, particles.len());
+        let crossings = match source {
+            Source::Particles => {
+                self.distances.clear();
+                self.distances.resize(particles.len(), f64::NAN);
+                answers.iter().for_each(|(i, answer)| self.distances[i] = answer.distance);
+                let distance = |i: usize| Some(self.distances[i]).filter(|distance| distance.is_finite());
+                surface.crossings(particles.positions(), distance)
+            }
+            Source::Others { positions, .. } => surface
+                .crossings(positions, |i| surface.query(&positions[i], f64::INFINITY).map(|answer| answer.distance)),
+            // The surface of a grid is that of its nodes, not of the particles.
+            Source::Grid(_) => None,
+        };
+        self.watched = Watched::new(coverage, crossings);
+        let doubts = self.watched.judge(self.course.next())?;
+        self.course.findings.extend(doubts);
+        Ok(())
     }
 
     /// Errors against the exact surface over the band; none where it is not known.
@@ -89,6 +117,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
     /// 1. Detection, regression and projection from the present level, or from what a grid gets of it.
     /// 2. Queries at every particle.
     /// 3. The distances become the level.
+    /// 4. Checks of the answers.
     fn step(&mut self) -> Result<(), StepError> {
         let system = &mut self.system;
         let (positions, level) = (system.particles.positions(), system.particles.scalar(system.level));
@@ -135,6 +164,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
             }
         });
         first_broken(system.columns.find_broken(&system.particles), self.course.next())?;
+        self.check()?;
         self.course.step += 1;
         Ok(())
     }
@@ -164,6 +194,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         self.course.save(state);
         state.put_section("particles", |section| save_particles(&self.system.particles, section));
         state.put_component("redistancing", self.system.redistancing.fit_diagnostics());
+        state.put_component("watched", &self.watched);
         if let Source::Grid(remeshing) = &self.system.source {
             state.put_reals("remeshed_level", remeshing.values());
         }
@@ -176,12 +207,15 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
             Source::Grid(remeshing) => Some(state.reals_of("remeshed_level", remeshing.values().len())?),
             _ => None,
         };
+        // Checkpoints of 0.2.0 have no values of checks.
+        let watched = if state.has("watched") { state.component("watched")? } else { Watched::default() };
         state.section("particles", |section| load_particles(&mut self.system.particles, section))?;
         // From here on nothing fails.
         if let (Source::Grid(remeshing), Some(values)) = (&mut self.system.source, remeshed) {
             remeshing.restore(values);
         }
         *self.system.redistancing.fit_diagnostics_mut() = soundness;
+        self.watched = watched;
         self.course.step = clock.step;
         Ok(())
     }
@@ -202,7 +236,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
 
     fn health(&self) -> Health {
         let finite = self.system.particles.scalar(self.system.columns.phi).iter().all(|v| v.is_finite());
-        Health { finite, max_cfl: 0.0, volume_drift: None, checks: Vec::new() }
+        Health { finite, max_cfl: 0.0, volume_drift: None, checks: self.watched.checks() }
     }
 
     fn particle_count(&self) -> usize {
