@@ -4,7 +4,7 @@
 //! initial position X, however distorted the present distribution is. The neighbors in initial positions never change,
 //! and the two sheets of a filament remain separate. The chain rule gives the level set in space:
 //!
-//! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹,
+//! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹.
 
 use super::charts::{Chart, Seed, Seeds, Spot};
 use super::detection::Detection;

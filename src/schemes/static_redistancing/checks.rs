@@ -128,19 +128,21 @@ impl Watched {
             .collect()
     }
 
-    /// Doubts about a redistancing.
+    /// Doubts about a redistancing that there were not `before`.
     ///
     /// # Errors
     /// [`StepError::Unresolved`] where a value is beyond its limit.
-    pub fn judge(&self, Clock { step, time }: Clock) -> Result<Vec<Finding>, StepError> {
+    pub fn judge(&self, before: &Self, Clock { step, time }: Clock) -> Result<Vec<Finding>, StepError> {
         let mut doubts = Vec::new();
-        for Watch { name, value, doubt, limit, meaning, .. } in self.watches() {
+        for (Watch { name, value, doubt, limit, meaning, .. }, before) in
+            self.watches().into_iter().zip(before.watches())
+        {
             let Some(value) = value else { continue };
             if value > limit {
                 let reason = format!("{meaning} ({name} is {value:.3e}, its limit {limit})");
                 return Err(StepError::Unresolved { reason, step, time });
             }
-            if value > doubt {
+            if value > doubt && before.value.is_none_or(|value| value <= doubt) {
                 doubts.push(Finding::warning(name, meaning, (step, time)).with_advice(ADVICE));
             }
         }
@@ -179,13 +181,14 @@ mod tests {
     fn good_values_pass_doubts_are_found_and_bad_values_end_the_run_with_a_sentence() {
         let coverage = Coverage { near: 100, lost: 0, asked: 10_000, by_sample: 1, out_of_reach: 0 };
         let good = Watched::new(coverage, Some(Crossings { zeros: 10, one_sided: 0, missed: 1e-6 }));
-        assert_eq!(good.judge(AT), Ok(Vec::new()));
+        assert_eq!(good.judge(&Watched::default(), AT), Ok(Vec::new()));
         assert!(good.checks().iter().all(|check| check.holds == Some(true)));
         let doubtful = Watched { missed: Some(0.5 * (LIMITS.missed + LIMITS.missed_doubt)), ..good };
-        assert_eq!(doubtful.judge(AT).unwrap()[0].code, "missed_crossing");
+        assert_eq!(doubtful.judge(&good, AT).unwrap()[0].code, "missed_crossing");
+        assert_eq!(doubtful.judge(&doubtful, AT), Ok(Vec::new()), "a doubt that lasts is one finding");
         let crossings = Some(Crossings::default());
         let bad = Watched::new(Coverage { by_sample: 1357, ..coverage }, crossings);
-        let Err(error @ StepError::Unresolved { .. }) = bad.judge(AT) else { panic!("a share of 14 % passed") };
+        let Err(error @ StepError::Unresolved { .. }) = bad.judge(&good, AT) else { panic!("a share of 14 % passed") };
         assert_eq!(
             error.to_string(),
             "no closest point was found for 13.57 % of the points (unreached_queries is 1.357e-1, its limit 0.01), at \
@@ -193,7 +196,7 @@ mod tests {
         );
         assert_eq!(bad.checks()[1].holds, Some(false));
         let layer = Watched::new(coverage, Some(Crossings { zeros: 10, one_sided: 4, missed: 0.0 }));
-        assert!(layer.judge(AT).is_err());
+        assert!(layer.judge(&good, AT).is_err());
     }
 
     #[test]

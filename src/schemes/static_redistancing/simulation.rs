@@ -51,8 +51,8 @@ impl<const D: usize> StaticRedistancing<D> {
             // The surface of a grid is that of its nodes, not of the particles.
             Source::Grid(_) => None,
         };
-        self.watched = Watched::new(coverage, crossings);
-        let doubts = self.watched.judge(self.course.next())?;
+        let before = std::mem::replace(&mut self.watched, Watched::new(coverage, crossings));
+        let doubts = self.watched.judge(&before, self.course.next())?;
         self.course.findings.extend(doubts);
         Ok(())
     }
