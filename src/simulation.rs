@@ -230,6 +230,16 @@ pub enum StepError {
         /// Scene time of the step.
         time: f64,
     },
+    /// Something is finer than the particles resolve.
+    #[error("{reason}, at step {step}, time {time}")]
+    Unresolved {
+        /// What was found, as the beginning of a sentence with numbers.
+        reason: String,
+        /// Number of the step.
+        step: u64,
+        /// Scene time of the step.
+        time: f64,
+    },
     /// The surface vanished: no particle has a neighbor of the other sign, or no fit reaches a zero.
     #[error("no sample particle is left on the interface at step {step}, time {time}")]
     InterfaceLost {

@@ -1,19 +1,62 @@
-//! Detection of the particles next to the surface: those with a particle of the opposite sign within ξ (PCP 3.1).
+//! Detection of the particles next to the surface: those with a particle of another side within ξ (PCP 3.1).
 
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 
-/// Particles sorted into cells of edge ξ, their signs, and the near-surface particles.
+/// The side of the surface on which a particle lies, from the sign of its level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// The level is negative.
+    Inside,
+    /// The level is positive, or no number.
+    Outside,
+    /// The level is exactly zero: the surface passes through the particle.
+    On,
+}
+
+impl Side {
+    /// The side of a particle with the given level. Both zeros are [`Side::On`].
+    #[must_use]
+    #[inline(always)]
+    pub fn from_level(level: f64) -> Self {
+        if level < 0.0 {
+            Self::Inside
+        } else if level == 0.0 {
+            Self::On
+        } else {
+            Self::Outside
+        }
+    }
+
+    /// Whether the surface separates particles of two sides. One on the surface belongs to both sides.
+    #[must_use]
+    #[inline(always)]
+    pub fn is_apart_from(self, other: Self) -> bool {
+        self != other
+    }
+
+    /// The marks of the sides that it belongs to.
+    #[inline(always)]
+    fn marks(self) -> u8 {
+        match self {
+            Self::Inside => INSIDE,
+            Self::Outside => OUTSIDE,
+            Self::On => INSIDE | OUTSIDE,
+        }
+    }
+}
+
+/// Particles sorted into cells of edge ξ, their sides, and the near-surface particles.
 #[derive(Debug)]
 pub struct Detection<const D: usize> {
     cells: CellList<D>,
-    /// Whether each particle has a negative level.
-    is_inside: Vec<bool>,
-    /// `is_inside` in the order of cells.
-    signs: Vec<bool>,
-    /// Signs that occur in each cell and the adjacent ones.
+    /// Side of each particle.
+    sides: Vec<Side>,
+    /// `sides` in the order of cells.
+    sorted_sides: Vec<Side>,
+    /// Sides that occur in each cell and the adjacent ones.
     marks: Vec<u8>,
     /// Scratch buffer for the marks.
     before: Vec<u8>,
@@ -36,8 +79,8 @@ impl<const D: usize> Detection<D> {
     pub fn new(domain: Domain<D>) -> Self {
         Self {
             cells: CellList::new(domain),
-            is_inside: Vec::new(),
-            signs: Vec::new(),
+            sides: Vec::new(),
+            sorted_sides: Vec::new(),
             marks: Vec::new(),
             before: Vec::new(),
             candidates: Vec::new(),
@@ -52,10 +95,10 @@ impl<const D: usize> Detection<D> {
         &self.cells
     }
 
-    /// Whether the level of each particle is negative.
+    /// Side of each particle.
     #[must_use]
-    pub fn is_inside(&self) -> &[bool] {
-        &self.is_inside
+    pub fn sides(&self) -> &[Side] {
+        &self.sides
     }
 
     /// Indices of the particles next to the surface.
@@ -64,11 +107,11 @@ impl<const D: usize> Detection<D> {
         &self.near
     }
 
-    /// Finds the particles next to the surface. A level of exactly zero counts as outside.
+    /// Finds the particles next to the surface. A particle with a level of exactly zero belongs to both sides.
     ///
-    /// 1. Sort the particles into cells of edge ξ = `threshold`, and mark each cell with the signs in it and in the
+    /// 1. Sort the particles into cells of edge ξ = `threshold`, and mark each cell with the sides in it and in the
     ///    adjacent cells.
-    /// 2. Look for a particle of the opposite sign within ξ, only for particles in cells with both marks.
+    /// 2. Look for a particle of another side within ξ, only for particles in cells with both marks.
     ///
     /// # Errors
     /// [`Interrupted`] when the interrupt is raised.
@@ -80,18 +123,17 @@ impl<const D: usize> Detection<D> {
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         self.cells.rebuild(positions.iter().copied(), threshold);
-        self.is_inside.clear();
-        self.is_inside.extend(level.iter().map(|l| *l < 0.0));
-        let (cells, is_inside) = (&self.cells, &self.is_inside);
+        self.sides.clear();
+        self.sides.extend(level.iter().map(|level| Side::from_level(*level)));
+        let (cells, sides) = (&self.cells, &self.sides);
         let (starts, order) = (cells.starts(), cells.permutation());
-        self.signs.clear();
-        self.signs.extend(order.iter().map(|i| is_inside[*i]));
-        let signs = &self.signs;
+        self.sorted_sides.clear();
+        self.sorted_sides.extend(order.iter().map(|i| sides[*i]));
+        let sides = &self.sorted_sides;
         self.marks.clear();
-        self.marks.extend(starts.windows(2).map(|range| {
-            let mark = |inside: &bool| if *inside { INSIDE } else { OUTSIDE };
-            signs[range[0]..range[1]].iter().map(mark).fold(0, |all, mark| all | mark)
-        }));
+        self.marks.extend(
+            starts.windows(2).map(|range| sides[range[0]..range[1]].iter().fold(0, |all, side| all | side.marks())),
+        );
         cells.spread_marks(&mut self.marks, &mut self.before);
         self.candidates.clear();
         for (cell, mark) in self.marks.iter().enumerate() {
@@ -106,8 +148,8 @@ impl<const D: usize> Detection<D> {
                 return;
             }
             for (flag, place) in flags.iter_mut().zip(places) {
-                let inside = signs[*place];
-                *flag = cells.any_within(&sorted[*place], threshold, |other| signs[other] != inside);
+                let side = sides[*place];
+                *flag = cells.any_within(&sorted[*place], threshold, |other| side.is_apart_from(sides[other]));
             }
         });
         interrupt.check()?;
@@ -121,6 +163,6 @@ impl<const D: usize> Detection<D> {
     /// also where the surface has gaps.
     #[must_use]
     pub fn is_nearest_inside(&self, x: &Vector<D>) -> bool {
-        self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.is_inside[i])
+        self.cells.nearest(x, f64::INFINITY).is_some_and(|(i, _)| self.sides[i] == Side::Inside)
     }
 }

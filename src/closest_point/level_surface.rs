@@ -1,9 +1,12 @@
-//! The zero of a level set that particles carry, from fits in space or in material coordinates.
+//! The zero of a level set that particles carry, from fits in space, in coordinates of a stretched cloud or in material
+//! coordinates.
 
+use super::detection::Side;
 use super::material::MaterialSurface;
 use super::queries::ClosestPoints;
 use super::redistancing::{ClosestPoint, Redistancing};
 use super::rescue::FitDiagnostics;
+use super::stretched::StretchedSurface;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
@@ -15,6 +18,8 @@ pub enum LevelSurface<const D: usize> {
     Spatial(Box<Redistancing<D>>),
     /// Fits over neighbors in initial positions.
     Material(Box<MaterialSurface<D>>),
+    /// Fits over neighbors in coordinates in which a stretched cloud is even.
+    Stretched(Box<StretchedSurface<D>>),
 }
 
 /// Distance from the surface, in multiples of h, beyond which the nearest particle decides on which side a point lies,
@@ -26,6 +31,7 @@ macro_rules! each {
         match $self {
             Self::Spatial($surface) => $value,
             Self::Material($surface) => $value,
+            Self::Stretched($surface) => $value,
         }
     };
 }
@@ -39,6 +45,7 @@ impl<const D: usize> LevelSurface<D> {
     pub fn detect(&mut self, positions: &[Vector<D>], level: &[f64], interrupt: &Interrupt) -> Result<(), Interrupted> {
         match self {
             Self::Spatial(surface) => surface.detect(positions, level, interrupt),
+            Self::Stretched(surface) => surface.detect(positions, level, interrupt),
             Self::Material(_) => Ok(()),
         }
     }
@@ -57,6 +64,7 @@ impl<const D: usize> LevelSurface<D> {
         match self {
             Self::Spatial(surface) => surface.fit_samples(positions, level, normals, interrupt),
             Self::Material(surface) => surface.fit(positions, interrupt),
+            Self::Stretched(surface) => surface.fit_samples(positions, level, normals, interrupt),
         }
     }
 
@@ -92,6 +100,47 @@ impl<const D: usize> LevelSurface<D> {
         each!(self, surface => surface.sample_points().collect())
     }
 
+    /// Indices of the particles next to the surface.
+    #[must_use]
+    pub fn near(&self) -> &[usize] {
+        each!(self, surface => surface.near())
+    }
+
+    /// Number of particles next to the surface that have a sample point.
+    #[must_use]
+    pub fn fitted_count(&self) -> usize {
+        each!(self, surface => surface.fitted_count())
+    }
+
+    /// Side of each particle of the last rebuild; None for fits in initial positions.
+    #[must_use]
+    pub fn sides(&self) -> Option<&[Side]> {
+        match self {
+            Self::Spatial(surface) => Some(surface.sides()),
+            Self::Stretched(surface) => Some(surface.sides()),
+            Self::Material(_) => None,
+        }
+    }
+
+    /// Calls `visit(j, r²)` for the particles within ξ of particle `i`, among which those of another side make it a
+    /// particle next to the surface. Distances r are those in space. Fits in initial positions have none.
+    pub(super) fn for_each_near_neighbor(&self, i: usize, positions: &[Vector<D>], visit: impl FnMut(usize, f64)) {
+        match self {
+            Self::Spatial(surface) => surface.for_each_near_neighbor(&positions[i], visit),
+            Self::Stretched(surface) => surface.for_each_near_neighbor(i, positions, visit),
+            Self::Material(_) => {}
+        }
+    }
+
+    /// Longest distance of neighboring particles near particle `i`, by the direction.
+    pub(super) fn spacing_at(&self, i: usize) -> f64 {
+        match self {
+            Self::Spatial(surface) => surface.spacing(),
+            Self::Stretched(surface) => surface.map_of(i).longest,
+            Self::Material(surface) => surface.spacing(),
+        }
+    }
+
     /// Whether the surface has no sample point.
     #[must_use]
     pub fn is_lost(&self) -> bool {
@@ -107,6 +156,9 @@ impl<const D: usize> LevelSurface<D> {
     pub fn is_inside(&self, x: &Vector<D>, foot: &ClosestPoint<D>) -> bool {
         match self {
             Self::Spatial(surface) if foot.distance > FAR * surface.spacing() => surface.is_nearest_particle_inside(x),
+            Self::Stretched(surface) if foot.distance > FAR * surface.spacing() => {
+                surface.is_nearest_particle_inside(x)
+            }
             _ => !foot.is_outside,
         }
     }

@@ -4,20 +4,17 @@
 //! initial position X, however distorted the present distribution is. The neighbors in initial positions never change,
 //! and the two sheets of a filament remain separate. The chain rule gives the level set in space:
 //!
-//! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹,
-//!
-//! Closest points are therefore found by the same Newton steps as in space, where a step s changes X by J⁻¹ s.
+//! J = ∂x/∂X,  ∇p = J⁻ᵀ ∂ψ,  ∇∇p = J⁻ᵀ (∂∂ψ − Σ_d (∇p)_d ∂∂x_d) J⁻¹.
 
+use super::charts::{Chart, Seed, Seeds, Spot};
 use super::detection::Detection;
 use super::method::PcpMethod;
-use super::newton::{ACCEPTED, LONGEST_STEP, Progress, is_last_step, newton_step, tangents};
-use super::projection::{Projected, project};
-use super::queries::{ClosestPoints, QUERIES};
-use super::redistancing::{ClosestPoint, QueryCounts};
+use super::newton::tangents;
+use super::queries::ClosestPoints;
+use super::redistancing::ClosestPoint;
 use super::rescue::{FitDiagnostics, add};
 use crate::geometry::{Domain, Vector};
 use crate::linear_algebra::number::LANES;
-use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{BLOCK, Interrupt, Interrupted, PerThread};
 use crate::polynomials::horner::derivatives;
 use crate::polynomials::{Fit, FitData, Jet, Regression, RegressionScratch};
@@ -46,44 +43,17 @@ pub struct MaterialSurface<const D: usize> {
     fits: Vec<Option<Fit<D>>>,
     coefficients: Vec<f64>,
     /// Points of the surface, several per fit where the flow has stretched it.
-    seeds: Vec<Seed<D>>,
+    seeds: Seeds<D>,
     /// The seeds of each fit.
     found: Vec<Vec<Seed<D>>>,
-    seed_cells: CellList<D>,
     scratch: PerThread<RegressionScratch<D>>,
     fit_diagnostics: FitDiagnostics,
-}
-
-/// A point of the surface with the fit by which it was found.
-#[derive(Debug, Clone, Copy)]
-struct Seed<const D: usize> {
-    /// Index of the fit.
-    patch: usize,
-    /// Material coordinates X of the point.
-    material: Vector<D>,
-    /// Results of the fit at the point.
-    spot: Spot<D>,
-}
-
-/// Results of the fits at a material point X.
-#[derive(Debug, Clone, Copy)]
-struct Spot<const D: usize> {
-    /// Position x(X) in space.
-    point: Vector<D>,
-    /// Value, gradient and Hessian of the level set in space.
-    jet: Jet<f64, D>,
-    /// Gradient ∂ψ/∂X of the level in material coordinates.
-    material_gradient: Vector<D>,
-    /// The inverse J⁻¹ of the deformation gradient.
-    inverse: SMatrix<f64, D, D>,
 }
 
 /// Extent along the surface of the seeds of a patch, in material coordinates and multiples of h.
 const SEED_EXTENT: f64 = 0.8;
 /// Largest number of seeds to either side along one direction. A larger stretch leaves gaps.
 const MAX_SEEDS: i32 = 64;
-/// Largest number of changes to another seed's fit before the nearest seed itself is the result.
-const MAX_SAMPLE_CHANGES: usize = 4;
 
 impl<const D: usize> MaterialSurface<D> {
     /// The surface of particles at their initial positions, with the levels that they keep.
@@ -108,9 +78,8 @@ impl<const D: usize> MaterialSurface<D> {
             origin,
             fits: Vec::new(),
             coefficients: Vec::new(),
-            seeds: Vec::new(),
+            seeds: Seeds::new(),
             found: Vec::new(),
-            seed_cells: CellList::new(Domain::unbounded()),
             scratch: PerThread::new(),
             fit_diagnostics: FitDiagnostics::default(),
         }
@@ -139,15 +108,27 @@ impl<const D: usize> MaterialSurface<D> {
         &mut self.fit_diagnostics
     }
 
+    /// Indices of the particles that started next to the surface.
+    #[must_use]
+    pub fn near(&self) -> &[usize] {
+        self.origin.detection.near()
+    }
+
+    /// Number of particles that started next to the surface and have a seed.
+    #[must_use]
+    pub fn fitted_count(&self) -> usize {
+        self.found.iter().filter(|seeds| !seeds.is_empty()).count()
+    }
+
     /// Seeds of the surface, as points in space.
     pub fn sample_points(&self) -> impl ExactSizeIterator<Item = Vector<D>> + '_ {
-        self.seeds.iter().map(|seed| seed.spot.point)
+        self.seeds.list.iter().map(|seed| seed.spot.point)
     }
 
     /// Whether the surface has no point.
     #[must_use]
     pub fn is_lost(&self) -> bool {
-        self.seeds.is_empty()
+        self.seeds.list.is_empty()
     }
 
     /// Fits ψ(X) and x(X) around the particles that started next to the surface, and finds the seeds of all fits.
@@ -197,17 +178,77 @@ impl<const D: usize> MaterialSurface<D> {
             }
         });
         interrupt.check()?;
-        self.seeds.clear();
+        self.seeds.list.clear();
         for (list, fit) in found.iter().zip(&self.fits) {
             add(&self.fit_diagnostics.counts.unprojected, u64::from(fit.is_some() && list.is_empty()));
-            self.seeds.extend(list);
+            self.seeds.list.extend(list);
         }
         self.found = found;
-        self.seed_cells.rebuild(self.seeds.iter().map(|seed| seed.spot.point), 2.0 * self.spacing);
+        self.seeds.sort(2.0 * self.spacing);
         Ok(())
     }
 
-    /// Results of the fits of a patch at a material point; None where the deformation gradient is singular.
+    /// Finds the seeds of a patch: its projected center, and points along the surface every h where the flow has
+    /// stretched it.
+    fn find_seeds(&self, patch: usize, seeds: &mut Vec<Seed<D>>) {
+        seeds.clear();
+        let Some(fit) = &self.fits[patch] else { return };
+        let Some(first) = self.project(patch, fit, &fit.middle) else { return };
+        seeds.push(first);
+        let (s, t) = tangents(&first.spot.jet.normal());
+        let along_s = first.spot.inverse * Vector::<D>::from(s) * self.spacing;
+        let along_t = first.spot.inverse * Vector::<D>::from(t) * self.spacing;
+        let extent = SEED_EXTENT * self.spacing;
+        let seeds_along = |direction: &Vector<D>| {
+            let wanted = extent / direction.norm();
+            // Seeds cannot cover a larger stretch.
+            add(&self.fit_diagnostics.counts.unprojected, u64::from(wanted > f64::from(MAX_SEEDS)));
+            (wanted as i32).min(MAX_SEEDS)
+        };
+        let (last_i, last_j) = (seeds_along(&along_s), if D == 3 { seeds_along(&along_t) } else { 0 });
+        for j in -last_j..=last_j {
+            for i in -last_i..=last_i {
+                if i != 0 || j != 0 {
+                    let start = first.own + along_s * f64::from(i) + along_t * f64::from(j);
+                    match self.project(patch, fit, &start) {
+                        Some(seed) => seeds.push(seed),
+                        None => add(&self.fit_diagnostics.counts.unprojected, 1),
+                    }
+                }
+            }
+        }
+    }
+
+    /// The closest point of the surface to `x`; None without a seed within `cutoff`.
+    #[must_use]
+    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
+        self.query_from(&self.seeds, x, cutoff)
+    }
+
+    /// [`Self::query`] for many points at once.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when the interrupt is raised.
+    pub fn closest_points(
+        &self,
+        points: &[Vector<D>],
+        cutoff: f64,
+        results: &mut ClosestPoints<D>,
+        interrupt: &Interrupt,
+    ) -> Result<(), Interrupted> {
+        self.closest_points_from(&self.seeds, (points, cutoff), results, &self.fit_diagnostics.counts, interrupt)
+    }
+}
+
+impl<const D: usize> Chart<D> for MaterialSurface<D> {
+    fn method(&self) -> &PcpMethod {
+        &self.method
+    }
+
+    fn fit(&self, patch: usize) -> Option<&Fit<D>> {
+        self.fits[patch].as_ref()
+    }
+
     #[inline]
     fn spot(&self, patch: usize, fit: &Fit<D>, material: &Vector<D>) -> Option<Spot<D>> {
         let terms = self.regression.terms();
@@ -234,179 +275,6 @@ impl<const D: usize> MaterialSurface<D> {
             gradient: gradient.into(),
             hessian: std::array::from_fn(|d| std::array::from_fn(|e| hessian[(d, e)])),
         };
-        Some(Spot { point, jet, material_gradient: Vector::<D>::from(level.gradient), inverse })
-    }
-
-    /// Projects a material point onto ψ = 0 along ∂ψ/∂X.
-    ///
-    /// This is the shortest way in material coordinates. The gradient in space may lead far along the surface.
-    fn project(&self, patch: usize, fit: &Fit<D>, start: &Vector<D>) -> Option<Seed<D>> {
-        let Projected { x, step, .. } = project(&self.method, fit, start, |x| {
-            let spot = self.spot(patch, fit, x)?;
-            Some((spot.jet.value, spot.material_gradient, ()))
-        })?;
-        let material = x + step;
-        self.spot(patch, fit, &material).map(|spot| Seed { patch, material, spot })
-    }
-
-    /// Finds the seeds of a patch: its projected center, and points along the surface every h where the flow has
-    /// stretched it.
-    fn find_seeds(&self, patch: usize, seeds: &mut Vec<Seed<D>>) {
-        seeds.clear();
-        let Some(fit) = &self.fits[patch] else { return };
-        let Some(first) = self.project(patch, fit, &fit.middle) else { return };
-        seeds.push(first);
-        let (s, t) = tangents(&first.spot.jet.normal());
-        let along_s = first.spot.inverse * Vector::<D>::from(s) * self.spacing;
-        let along_t = first.spot.inverse * Vector::<D>::from(t) * self.spacing;
-        let extent = SEED_EXTENT * self.spacing;
-        let seeds_along = |direction: &Vector<D>| {
-            let wanted = extent / direction.norm();
-            // Seeds cannot cover a larger stretch.
-            add(&self.fit_diagnostics.counts.unprojected, u64::from(wanted > f64::from(MAX_SEEDS)));
-            (wanted as i32).min(MAX_SEEDS)
-        };
-        let (last_i, last_j) = (seeds_along(&along_s), if D == 3 { seeds_along(&along_t) } else { 0 });
-        for j in -last_j..=last_j {
-            for i in -last_i..=last_i {
-                if i != 0 || j != 0 {
-                    let start = first.material + along_s * f64::from(i) + along_t * f64::from(j);
-                    match self.project(patch, fit, &start) {
-                        Some(seed) => seeds.push(seed),
-                        None => add(&self.fit_diagnostics.counts.unprojected, 1),
-                    }
-                }
-            }
-        }
-    }
-
-    /// The closest point of the surface to `x`; None without a seed within `cutoff`.
-    #[must_use]
-    pub fn query(&self, x: &Vector<D>, cutoff: f64) -> Option<ClosestPoint<D>> {
-        let (nearest, distance) = self.seed_cells.nearest(x, cutoff)?;
-        Some(self.solve(nearest, distance, x, &mut QueryCounts::default()))
-    }
-
-    /// The closest point for a query whose nearest seed lies at the given distance.
-    ///
-    /// Newton's method starts from the nearest seed. If it leaves the fit, it continues from the seed nearest to the
-    /// iterate. If the foot point is farther away than the nearest seed, or if there is none, the result is the seed
-    /// itself.
-    fn solve(&self, nearest: usize, distance: f64, x: &Vector<D>, query_counts: &mut QueryCounts) -> ClosestPoint<D> {
-        query_counts.queries += 1;
-        let mut current = nearest;
-        for changes in 0..=MAX_SAMPLE_CHANGES {
-            match self.newton(&self.seeds[current], x, query_counts) {
-                Ok(closest) => {
-                    let slack = self.method.slack(x);
-                    if closest.distance <= distance * (1.0 + 1e-9) + slack {
-                        query_counts.other_sample += u64::from(changes > 0);
-                        return closest;
-                    }
-                    break;
-                }
-                Err(Some(left)) => match self.seed_cells.nearest(&left, f64::INFINITY) {
-                    Some((next, _)) if next != current => current = next,
-                    _ => break,
-                },
-                Err(None) => break,
-            }
-        }
-        query_counts.sample_distance += 1;
-        let Spot { point, jet, .. } = &self.seeds[nearest].spot;
-        closest_point(x, point, jet, true)
-    }
-
-    /// The closest point on the fit of a seed. The error is the position where the iteration left the fit, or None
-    /// where it did not converge.
-    fn newton(
-        &self,
-        seed: &Seed<D>,
-        x: &Vector<D>,
-        query_counts: &mut QueryCounts,
-    ) -> Result<ClosestPoint<D>, Option<Vector<D>>> {
-        let fit = self.fits[seed.patch].as_ref().ok_or(None)?;
-        let mut material = seed.material;
-        let mut spot = seed.spot;
-        let mut last = f64::INFINITY;
-        let mut left = false;
-        let mut progress = Progress::default();
-        for _ in 0..self.method.max_iterations {
-            query_counts.iterations += 1;
-            let offset: [f64; D] = (x - spot.point).into();
-            let step = newton_step(&spot.jet, &offset);
-            let mut shift = spot.inverse * Vector::<D>::from(step);
-            let length = shift.norm();
-            if !length.is_finite() {
-                return Err(None);
-            }
-            if is_last_step(&self.method, length, last, fit.radius, material.amax()) {
-                let foot = spot.point + Vector::<D>::from(step);
-                return Ok(closest_point(x, &foot, &spot.jet.translated(&step), false));
-            }
-            if progress.is_stuck(length) {
-                return Err(None);
-            }
-            let longest = LONGEST_STEP * fit.radius;
-            if length > longest {
-                shift *= longest / length;
-            }
-            material += shift;
-            // An iteration may leave the support once and come back. It ends when it stays outside.
-            let outside = (material - fit.middle).norm_squared() > fit.radius * fit.radius;
-            spot = self.spot(seed.patch, fit, &material).ok_or(None)?;
-            if outside && (left || length <= ACCEPTED * fit.radius) {
-                return Err(Some(spot.point));
-            }
-            left = outside;
-            last = length;
-        }
-        Err(None)
-    }
-
-    /// [`Self::query`] for many points at once.
-    ///
-    /// # Errors
-    /// [`Interrupted`] when the interrupt is raised.
-    pub fn closest_points(
-        &self,
-        points: &[Vector<D>],
-        cutoff: f64,
-        results: &mut ClosestPoints<D>,
-        interrupt: &Interrupt,
-    ) -> Result<(), Interrupted> {
-        let feet = results.resize_to_queries(points.len());
-        feet.par_chunks_mut(QUERIES).zip(points.par_chunks(QUERIES)).for_each(|(feet, points)| {
-            if interrupt.is_raised() {
-                return;
-            }
-            let mut query_counts = QueryCounts::default();
-            let mut last = None;
-            for (foot, x) in feet.iter_mut().zip(points) {
-                let nearest = self.seed_cells.nearest_next(x, cutoff, &mut last, |seed| self.seeds[seed].spot.point);
-                *foot = nearest.map(|(seed, r2)| self.solve(seed, r2.sqrt(), x, &mut query_counts));
-            }
-            query_counts.add_to(&self.fit_diagnostics.counts);
-        });
-        interrupt.check()
-    }
-}
-
-/// The closest point `foot` to `x` with the geometry of the level set there.
-fn closest_point<const D: usize>(
-    x: &Vector<D>,
-    foot: &Vector<D>,
-    jet: &Jet<f64, D>,
-    is_sample: bool,
-) -> ClosestPoint<D> {
-    let offset = x - foot;
-    let normal = Vector::<D>::from(jet.normal());
-    ClosestPoint {
-        point: *foot,
-        distance: offset.norm(),
-        normal,
-        curvature: jet.curvature(),
-        is_outside: offset.dot(&normal) >= 0.0,
-        is_sample,
+        Some(Spot { point, jet, own_gradient: Vector::<D>::from(level.gradient), inverse })
     }
 }

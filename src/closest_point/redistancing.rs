@@ -1,6 +1,6 @@
 //! Redistancing with fits in space: from particles to sample points, and from queries to closest points.
 
-use super::detection::Detection;
+use super::detection::{Detection, Side};
 use super::method::PcpMethod;
 use super::newton::{FootPoint, NewtonEnd, Patch, closest_points};
 use super::projection::{Projected, project};
@@ -150,6 +150,30 @@ impl<const D: usize> Redistancing<D> {
         self.samples.iter().map(|sample| sample.point)
     }
 
+    /// Indices of the particles next to the surface.
+    #[must_use]
+    pub fn near(&self) -> &[usize] {
+        self.detection.near()
+    }
+
+    /// Number of particles next to the surface that have a sample.
+    #[must_use]
+    pub fn fitted_count(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Side of each particle.
+    #[must_use]
+    pub fn sides(&self) -> &[Side] {
+        self.detection.sides()
+    }
+
+    /// Calls `visit(j, r²)` for the particles within ξ of `x`.
+    pub(super) fn for_each_near_neighbor(&self, x: &Vector<D>, mut visit: impl FnMut(usize, f64)) {
+        let threshold = self.method.sample_threshold_h * self.spacing;
+        self.detection.cells().for_each_within(x, threshold, |j, _, r2| visit(j, r2));
+    }
+
     /// All samples.
     pub(super) fn samples(&self) -> &[Sample<D>] {
         &self.samples
@@ -168,7 +192,7 @@ impl<const D: usize> Redistancing<D> {
 
     /// First step of a rebuild: finds the particles with a particle of the opposite sign within ξ (PCP 3.1).
     ///
-    /// A level of exactly zero counts as outside.
+    /// A particle with a level of exactly zero belongs to both sides.
     ///
     /// # Errors
     /// [`Interrupted`] when the interrupt is raised.

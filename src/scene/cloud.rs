@@ -3,7 +3,8 @@
 //!
 //! The engine opens no file. A scene says by pointer what it needs; the caller that builds it hands over the arrays.
 
-use crate::geometry::Vector;
+use crate::geometry::{Domain, Vector};
+use crate::neighbors::{CellList, NeighborSearch};
 use crate::spec::Violation;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -164,8 +165,20 @@ pub fn normals<const D: usize>(clouds: &Clouds, pointer: &'static str) -> Result
 /// must lie between a third and three times it.
 #[must_use]
 pub fn check_spacing<const D: usize>(points: &[Vector<D>], spacing: f64) -> Option<Violation> {
-    let mut cells = crate::neighbors::CellList::new(crate::geometry::Domain::unbounded());
+    check_spacing_in(&sorted(points, spacing), points, spacing)
+}
+
+/// The points in cells of an edge of `spacing`.
+#[must_use]
+pub fn sorted<const D: usize>(points: &[Vector<D>], spacing: f64) -> CellList<D> {
+    let mut cells = CellList::new(Domain::unbounded());
     cells.rebuild(points.iter().copied(), spacing);
+    cells
+}
+
+/// [`check_spacing`] for points that are [`sorted`].
+#[must_use]
+pub fn check_spacing_in<const D: usize>(cells: &CellList<D>, points: &[Vector<D>], spacing: f64) -> Option<Violation> {
     // A few hundred points tell the median.
     let stride = points.len().div_ceil(500);
     let nearest = |k: usize| {
@@ -173,7 +186,7 @@ pub fn check_spacing<const D: usize>(points: &[Vector<D>], spacing: f64) -> Opti
         let mut radius = spacing;
         for _ in 0..12 {
             let found = &mut Vec::new();
-            crate::neighbors::NeighborSearch::gather(&cells, &points[k], radius, found);
+            cells.gather(&points[k], radius, found);
             least = found.iter().filter(|n| n.index != k && n.r2 > 0.0).map(|n| n.r2.sqrt()).fold(least, f64::min);
             if least.is_finite() {
                 break;

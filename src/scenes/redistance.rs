@@ -1,5 +1,6 @@
 //! `redistance`: static geometry (PCP, section 4.1).
 
+mod cloud_spacing;
 mod plan;
 pub mod spec;
 

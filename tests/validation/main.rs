@@ -8,6 +8,7 @@ mod droplets_in_frames;
 mod fronts;
 mod linear_theory;
 mod reading;
+mod redistancing;
 mod ring;
 mod hard_cases;
 mod surfaces;

@@ -167,6 +167,7 @@ fn array<W: Write + Seek>(
 
 #[cfg(test)]
 mod tests {
+    use super::Interrupt;
     use super::{NamedOperator, OperatorFormat, SparseRows, write};
 
     #[test]

@@ -218,6 +218,7 @@ impl From<&StepError> for Reason {
     fn from(error: &StepError) -> Self {
         match error {
             StepError::CheckFailed { divergence, .. } => (*divergence).into(),
+            StepError::Unresolved { .. } => Self::DivergedUnresolved,
             StepError::InterfaceLost { .. } => Self::DivergedInterface,
             StepError::TooFast { .. } => Self::DivergedCfl,
             StepError::TimeStepFloor { .. } => Self::DivergedDtFloor,

@@ -1,5 +1,6 @@
 //! From the spec of a `redistance` scene to resting particles.
 
+use super::cloud_spacing;
 use super::spec::{Initial, Kernel, Method, Queries, Redistance};
 use crate::closest_point::PcpMethod;
 use crate::geometry::Surface;
@@ -264,10 +265,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         let is_needed = |pointer: &str| self.clouds.iter().any(|cloud| cloud.pointer == pointer);
         let mut system = if is_needed("/shape") {
             let (points, levels) = cloud::points_with_levels::<D>(clouds, "/shape").map_err(|found| vec![found])?;
-            if let Some(found) = cloud::check_spacing(&points, parts.spacing) {
-                return Err(vec![found]);
-            }
-            StaticSystem::of_points(points, &levels, parts, context.interrupt)
+            let metric = cloud_spacing::metric(&points, &levels, parts.spacing, &context.interrupt)?;
+            StaticSystem::of_points(points, &levels, metric, parts, context.interrupt)
         } else {
             let surface = self.shape.surface::<D>("/shape")?;
             StaticSystem::about(surface, &self.lattice, self.initial, parts, context.interrupt)
@@ -275,6 +274,6 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         if is_needed("/queries") {
             system = system.asked_about(cloud::points::<D>(clouds, "/queries").map_err(|found| vec![found])?);
         }
-        Ok(Box::new(StaticRedistancing::new(system, context.cpu_clock, method)))
+        Ok(Box::new(StaticRedistancing::new(system, context.cpu_clock, method).with_plan(context.plan)))
     }
 }

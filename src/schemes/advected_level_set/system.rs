@@ -170,7 +170,7 @@ impl<const D: usize> AdvectedSystem<D> {
         let mut particles = self.particles.clone();
         let mut surface = match &self.redistancing {
             LevelSurface::Material(surface) => LevelSurface::Material(Box::new(surface.fresh())),
-            LevelSurface::Spatial(_) => {
+            LevelSurface::Spatial(_) | LevelSurface::Stretched(_) => {
                 let (method, domain) = (self.parts.method.clone(), Domain::unbounded());
                 LevelSurface::Spatial(Box::new(Redistancing::new(method, domain, self.parts.spacing)))
             }

@@ -1,7 +1,9 @@
 //! The particles of a static redistancing and what is asked of them.
 
 use super::remeshing::{Remeshing, RemeshingKernel};
-use crate::closest_point::{ClosestPoints, LevelSurface, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{
+    ClosestPoints, CloudMetric, LevelSurface, PcpMethod, Redistancing, StretchedSurface, SurfaceColumns,
+};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::Interrupt;
@@ -117,11 +119,22 @@ impl<const D: usize> StaticSystem<D> {
         system
     }
 
-    /// Particles with their level from elsewhere: all of them are the band.
+    /// Particles with their level from elsewhere: all of them are the band. `metric` is that of a stretched cloud.
     #[must_use]
-    pub fn of_points(positions: Vec<Vector<D>>, levels: &[f64], parts: StaticParts, interrupt: Interrupt) -> Self {
+    pub fn of_points(
+        positions: Vec<Vector<D>>,
+        levels: &[f64],
+        metric: Option<CloudMetric<D>>,
+        parts: StaticParts,
+        interrupt: Interrupt,
+    ) -> Self {
         let in_band = vec![true; positions.len()];
-        Self::assemble(positions, levels, in_band, Source::Particles, parts, interrupt)
+        let stretched = metric.map(|metric| StretchedSurface::new(parts.method.clone(), parts.spacing, metric));
+        let mut system = Self::assemble(positions, levels, in_band, Source::Particles, parts, interrupt);
+        if let Some(surface) = stretched {
+            system.redistancing = LevelSurface::Stretched(Box::new(surface));
+        }
+        system
     }
 
     /// Asks about other points instead; the particles become the source of the surface.
