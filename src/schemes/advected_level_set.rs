@@ -5,6 +5,7 @@ mod errors;
 mod format_1;
 pub mod frame_fields;
 pub mod quantities;
+mod reach_watch;
 mod simulation;
 mod system;
 

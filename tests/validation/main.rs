@@ -14,7 +14,6 @@ mod hard_cases;
 mod surfaces;
 mod varying_tension;
 #[path = "../support/mod.rs"]
-#[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
 use serde_json::{Value, json};

@@ -5,9 +5,10 @@ use super::errors::{DistanceErrors, MeasuredErrors};
 use super::format_1;
 use super::frame_fields;
 use super::quantities::{AREA, BAND_PARTICLES, CFL, RESCUED_FITS, TIME, TIME_STEP, VOLUME, VOLUME_DRIFT};
-use super::system::{AdvectedSystem, RedistanceWhen};
+use super::reach_watch::ReachWatch;
+use super::system::{AdvectedSystem, Copied, RedistanceWhen};
 use crate::closest_point::enclosed_moments::enclosed_area_or_volume;
-use crate::closest_point::{FitDiagnostics, LevelSurface};
+use crate::closest_point::{Coverage, FitDiagnostics, LevelSurface};
 use crate::geometry::Vector;
 use crate::parallel::Interrupted;
 use crate::particles::Particles;
@@ -35,6 +36,7 @@ pub struct AdvectedLevelSet<const D: usize> {
     /// Enclosed area or volume at time 0.
     initial_measure: f64,
     enclosed_watch: EnclosedWatch,
+    reach_watch: ReachWatch,
     max_cfl: f64,
     errors: Vec<MeasuredErrors>,
     course: Course,
@@ -55,7 +57,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
             || {
                 let copy = system.redistanced_copy(&system.interrupt);
                 // An interrupt ends the run before its first step.
-                copy.and_then(|(_, surface)| enclosed_area_or_volume(&surface, &system.interrupt)).unwrap_or(f64::NAN)
+                copy.and_then(|copy| enclosed_area_or_volume(&copy.surface, &system.interrupt)).unwrap_or(f64::NAN)
             },
             crate::geometry::Surface::area_or_volume,
         );
@@ -69,6 +71,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
             measure,
             measured: 0,
             enclosed_watch: EnclosedWatch::default(),
+            reach_watch: ReachWatch::default(),
             max_cfl: 0.0,
             errors: Vec::new(),
             course: Course::new(fixed.into(), Phases::new(cpu_clock), method),
@@ -149,6 +152,13 @@ impl<const D: usize> AdvectedLevelSet<D> {
         Ok(())
     }
 
+    /// Looks at the answers of a redistancing.
+    fn watch_reach(&mut self, coverage: Coverage, now: Clock) -> Result<(), StepError> {
+        let found = self.reach_watch.look(coverage, now)?;
+        self.course.findings.extend(found);
+        Ok(())
+    }
+
     /// Takes the errors of this moment: of the particles as they are where they were just redistanced, else of a copy,
     /// so that asking for an error never becomes part of the physics.
     fn take_errors(&mut self, now: Clock) -> Result<(), StepError> {
@@ -156,7 +166,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
         let measured = if self.redistanced == Some(now.step) {
             self.measure_errors(now.time, &self.system.particles, &self.system.redistancing, self.measure)?
         } else {
-            let (particles, surface) = self.system.redistanced_copy(&self.system.interrupt)?;
+            let Copied { particles, surface, coverage } = self.system.redistanced_copy(&self.system.interrupt)?;
             if surface.is_lost() {
                 return Err(StepError::InterfaceLost { step: now.step, time: now.time });
             }
@@ -167,6 +177,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
             self.system.redistancing.fit_diagnostics_mut().merge(surface.fit_diagnostics());
             (self.measure, self.measured) = (measure, now.step);
             self.watch_enclosed(now)?;
+            self.watch_reach(coverage, now)?;
             measured
         };
         self.errors.push(measured);
@@ -202,6 +213,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
             }
             first_broken(self.system.columns.find_broken(&self.system.particles), next)?;
             self.redistanced = Some(next.step);
+            self.watch_reach(self.system.coverage(), next)?;
             let is_row_due = self.plan.is_series_due(&self.course.fixed(), next.step);
             // What is redistanced for output alone is rare enough to be watched each time.
             let is_for_output = self.system.parts.when == RedistanceWhen::ForOutput;
@@ -254,8 +266,8 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         } else {
             // An interrupted frame is dropped by its writer.
             match self.system.redistanced_copy(&self.system.interrupt) {
-                Ok((copy, _)) => {
-                    fresh = copy;
+                Ok(copy) => {
+                    fresh = copy.particles;
                     &fresh
                 }
                 Err(Interrupted) => &self.system.particles,
@@ -276,6 +288,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         state.put_real("max_cfl", self.max_cfl);
         state.put_list("errors", &self.errors);
         self.enclosed_watch.save(state);
+        self.reach_watch.save(state);
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
@@ -285,12 +298,13 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let (measure, measured) =
             state.section("enclosed_measure", |section| Ok((section.real("value")?, section.count("at_step")?)))?;
         let (max_cfl, errors) = (state.real("max_cfl")?, state.list("errors")?);
-        let enclosed_watch = EnclosedWatch::load(state)?;
+        let (enclosed_watch, reach_watch) = (EnclosedWatch::load(state)?, ReachWatch::load(state)?);
         state.section("particles", |section| load_particles(&mut self.system.particles, section))?;
         // From here on nothing fails.
         *self.system.redistancing.fit_diagnostics_mut() = soundness;
         (self.redistanced, self.measure, self.measured) = (redistanced, measure, measured);
-        (self.max_cfl, self.errors, self.enclosed_watch) = (max_cfl, errors, enclosed_watch);
+        (self.max_cfl, self.errors) = (max_cfl, errors);
+        (self.enclosed_watch, self.reach_watch) = (enclosed_watch, reach_watch);
         self.course.step = clock.step;
         Ok(())
     }
@@ -310,11 +324,13 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
 
     fn health(&self) -> Health {
         let volume_drift = Some(self.drift());
+        let mut checks = vec![enclosed_watch::check::<D>(volume_drift, self.system.motion.flow().keeps_volume())];
+        checks.extend(self.reach_watch.checks());
         Health {
             finite: self.system.particles.positions().iter().all(is_finite),
             max_cfl: self.max_cfl,
             volume_drift,
-            checks: vec![enclosed_watch::check::<D>(volume_drift, self.system.motion.flow().keeps_volume())],
+            checks,
         }
     }
 

@@ -1,7 +1,9 @@
 //! The particles of an advected level set, their transport and their redistancing.
 
 use crate::closest_point::method::NeighborhoodChoice;
-use crate::closest_point::{ClosestPoints, LevelSurface, MaterialSurface, PcpMethod, Redistancing, SurfaceColumns};
+use crate::closest_point::{
+    ClosestPoints, Coverage, LevelSurface, MaterialSurface, PcpMethod, Redistancing, SurfaceColumns,
+};
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::parallel::{BLOCK, Interrupt, Interrupted};
@@ -64,6 +66,16 @@ impl<const D: usize> Start<D> {
         let level = positions.iter().map(|x| surface.signed_distance(x)).collect();
         Self { positions, level }
     }
+}
+
+/// A redistanced copy of the particles.
+pub(super) struct Copied<const D: usize> {
+    /// The particles with the surface columns of the present moment.
+    pub particles: Particles<D>,
+    /// Their surface.
+    pub surface: LevelSurface<D>,
+    /// How far its answers can be trusted.
+    pub coverage: Coverage,
 }
 
 /// What a run in a flow is made of, beside particles and flow.
@@ -161,12 +173,14 @@ impl<const D: usize> AdvectedSystem<D> {
         }
     }
 
+    /// How far the answers of the last redistancing can be trusted.
+    pub(super) fn coverage(&self) -> Coverage {
+        Coverage::new(&self.redistancing, &self.answers, self.particles.len())
+    }
+
     /// A copy of the particles with the surface columns of the present moment, and its surface, for what is asked
     /// between redistancings.
-    pub(super) fn redistanced_copy(
-        &self,
-        interrupt: &Interrupt,
-    ) -> Result<(Particles<D>, LevelSurface<D>), Interrupted> {
+    pub(super) fn redistanced_copy(&self, interrupt: &Interrupt) -> Result<Copied<D>, Interrupted> {
         let mut particles = self.particles.clone();
         let mut surface = match &self.redistancing {
             LevelSurface::Material(surface) => LevelSurface::Material(Box::new(surface.fresh())),
@@ -179,7 +193,8 @@ impl<const D: usize> AdvectedSystem<D> {
         let Self { parts, psi, columns, .. } = self;
         ask(&mut surface, parts, &self.particles, *psi, columns, &mut answers, interrupt, &mut phases)?;
         columns.store(&mut particles, *psi, &answers, parts.half_band);
-        Ok((particles, surface))
+        let coverage = Coverage::new(&surface, &answers, particles.len());
+        Ok(Copied { particles, surface, coverage })
     }
 }
 
