@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod case_files;
+mod bad_runs;
 mod droplets;
 mod droplets_in_balance;
 mod droplets_in_frames;

@@ -37,8 +37,8 @@ impl Row {
     }
 }
 
-/// Runs the bad cases, the examples and the verification cases (with `full` the long ones too) and hands a line of each to `show`.
-/// With `full` the table is written. Returns whether every check fires where it must and nowhere else.
+/// Runs the bad cases, the examples and the verification cases (with `full` the long ones too), hands a line of each to `show` and writes the
+/// table. Returns whether every check fires where it must and nowhere else.
 ///
 /// # Errors
 /// [`VerifyError`].
@@ -73,10 +73,8 @@ pub fn run(request: &Request, mut show: impl FnMut(&str) -> io::Result<()>) -> R
             }
         }
     }
-    if request.full {
-        fs::create_dir_all(&request.results)?;
-        fs::write(request.results.join(DOCUMENT), compose(&rows))?;
-    }
+    fs::create_dir_all(&request.results)?;
+    fs::write(request.results.join(DOCUMENT), compose(&rows, request))?;
     Ok(rows.iter().all(Row::is_met))
 }
 
@@ -127,7 +125,7 @@ fn findings(health: &HealthRecord) -> String {
     codes.join(", ")
 }
 
-fn compose(rows: &[Row]) -> String {
+fn compose(rows: &[Row], request: &Request) -> String {
     let date = clock::now();
     let machine = process::cpu_name().unwrap_or_else(|| "unknown".to_owned());
     let missed = rows.iter().filter(|row| !row.is_met()).count();
@@ -136,10 +134,12 @@ fn compose(rows: &[Row]) -> String {
     let _ = write!(
         text,
         "# Checks: where they fire, and where they must not\n\n\
-         Written by `meniscus verify --checks --full` on {}; machine: {machine} ({}), one core; build {}. {} runs, {missed} missed.\n\
+         Written by `meniscus verify --checks{}{}` on {}; machine: {machine} ({}), one core; build {}. {} runs, {missed} missed.\n\
          The limits and their reasons stand in the README of each scene (`src/scenes/KIND/README.md`, Checks).\n\n\
          ## Bad runs\n\nEach is a file of `tests/validation/bad`.\n\n\
          | run | what | must | does | verdict |\n| --- | --- | --- | --- | --- |\n",
+        if request.full { " --full" } else { "" },
+        if request.only.is_empty() { String::new() } else { format!(" --only {}", request.only.join(",")) },
         &date[..10.min(date.len())],
         build::isa(),
         build::name(),
