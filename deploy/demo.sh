@@ -5,6 +5,11 @@ set -euo pipefail
 
 program=$(realpath "$1")
 out=$(realpath -m "${2:-demo-output}")
+# Only what an earlier demo has left is deleted.
+if [ -d "$out" ] && [ -n "$(ls -A "$out")" ] && [ ! -f "$out/service.log" ]; then
+    echo "$out has files that no demo has left: give another directory" >&2
+    exit 1
+fi
 rm -rf "$out"
 mkdir -p "$out"
 data=$(mktemp -d)
