@@ -98,7 +98,7 @@ fn steps_allocate_nothing_after_warm_up() {
         pool(1).install(|| {
             let mut simulation = build(&body, plan);
             for _ in 0..6 {
-                simulation.step().unwrap();
+                simulation.advance().unwrap();
             }
             if body.get("adaptivity").is_some() {
                 let fields = simulation.fields(Selection::All);
@@ -108,7 +108,7 @@ fn steps_allocate_nothing_after_warm_up() {
             }
             for step in 7..12 {
                 let before = ALLOCATIONS.get();
-                simulation.step().unwrap();
+                simulation.advance().unwrap();
                 let made = ALLOCATIONS.get() - before;
                 assert_eq!(made, 0, "step {step} of {body}");
             }
