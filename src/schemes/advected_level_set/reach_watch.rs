@@ -16,19 +16,19 @@ struct Limits {
     meaning: &'static str,
 }
 
-/// Where a filament is thinner than the particles resolve, its tip has no closest points. The paper's method has .14 at h = 1/64 and
-/// the automatic ones .05; at 1/16 they have .3, and a filament in space at 1/20 has .4.
+/// Where a filament is thinner than the particles resolve, its tip has no closest points. The paper's method has .22 at h = 1/64, and
+/// the automatic one .08 at 1/64 and .23 at 1/48.
 const BY_SAMPLE: Limits = Limits {
     name: "answers_by_sample",
-    doubt: 0.2,
+    doubt: 0.3,
     most: 0.5,
     meaning: "of the particles in the band have no closest point but the nearest sample",
 };
 
-/// Samples that fits lose are the ends of filaments.
+/// Samples that fits lose are the ends of filaments. The paper's method has .26 at h = 1/64.
 const LOST: Limits = Limits {
     name: "lost_samples",
-    doubt: 0.25,
+    doubt: 0.35,
     most: 0.5,
     meaning: "of the particles next to the surface have no point of it",
 };
@@ -100,9 +100,9 @@ mod tests {
         let good = Coverage { near: 100, lost: 1, asked: 1000, by_sample: 5, out_of_reach: 500 };
         let mut watch = ReachWatch::default();
         assert_eq!(watch.look(good, at).unwrap(), []);
-        let doubtful = Coverage { by_sample: 150, ..good };
+        let doubtful = Coverage { by_sample: 200, ..good };
         let told = watch.look(doubtful, at).unwrap();
-        assert!(told.len() == 1 && told[0].message.starts_with("30.0 %"), "{told:?}");
+        assert!(told.len() == 1 && told[0].message.starts_with("40.0 %"), "{told:?}");
         let mut state = Section::default();
         watch.save(&mut state);
         let mut again = ReachWatch::load(&state).unwrap();

@@ -1,12 +1,12 @@
 //! Transport and redistancing step by step.
 
-use super::enclosed_watch::{self, EnclosedWatch};
+use super::enclosed_watch::{Enclosed, EnclosedWatch};
 use super::errors::{DistanceErrors, MeasuredErrors};
 use super::format_1;
 use super::frame_fields;
 use super::quantities::{AREA, BAND_PARTICLES, CFL, RESCUED_FITS, TIME, TIME_STEP, VOLUME, VOLUME_DRIFT};
 use super::reach_watch::ReachWatch;
-use super::system::{AdvectedSystem, Copied, RedistanceWhen};
+use super::system::{AdvectedSystem, Copied, FieldChoice, RedistanceWhen};
 use crate::closest_point::enclosed_moments::enclosed_area_or_volume;
 use crate::closest_point::{Coverage, FitDiagnostics, LevelSurface};
 use crate::geometry::Vector;
@@ -35,6 +35,8 @@ pub struct AdvectedLevelSet<const D: usize> {
     measured: u64,
     /// Enclosed area or volume at time 0.
     initial_measure: f64,
+    /// Share of the particles inside at time 0.
+    initial_inside_share: f64,
     enclosed_watch: EnclosedWatch,
     reach_watch: ReachWatch,
     max_cfl: f64,
@@ -64,6 +66,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
         // What points from elsewhere bring is a level, and no distance yet.
         let redistanced = system.motion.surface().map(|_| 0);
         Self {
+            initial_inside_share: system.inside_share(),
             system,
             plan,
             redistanced,
@@ -143,11 +146,21 @@ impl<const D: usize> AdvectedLevelSet<D> {
         (self.measure - self.initial_measure) / self.initial_measure
     }
 
+    /// What is watched of the area or volume inside, and its relative change.
+    fn enclosed(&self) -> (Enclosed, f64) {
+        match self.system.parts.field {
+            FieldChoice::Dual => (Enclosed::surface::<D>(), self.drift()),
+            FieldChoice::Overwrite => {
+                (Enclosed::particles(), self.system.inside_share() / self.initial_inside_share - 1.0)
+            }
+        }
+    }
+
     /// Looks at the enclosed area or volume that was just measured.
     fn watch_enclosed(&mut self, now: Clock) -> Result<(), StepError> {
         if self.system.motion.flow().keeps_volume() {
-            let found = self.enclosed_watch.look::<D>(self.drift(), now)?;
-            self.course.findings.extend(found);
+            let (enclosed, drift) = self.enclosed();
+            self.course.findings.extend(self.enclosed_watch.look(&enclosed, drift, now)?);
         }
         Ok(())
     }
@@ -324,7 +337,8 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
 
     fn health(&self) -> Health {
         let volume_drift = Some(self.drift());
-        let mut checks = vec![enclosed_watch::check::<D>(volume_drift, self.system.motion.flow().keeps_volume())];
+        let (enclosed, drift) = self.enclosed();
+        let mut checks = vec![enclosed.check(Some(drift), self.system.motion.flow().keeps_volume())];
         checks.extend(self.reach_watch.checks());
         Health {
             finite: self.system.particles.positions().iter().all(is_finite),

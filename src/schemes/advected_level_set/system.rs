@@ -173,6 +173,13 @@ impl<const D: usize> AdvectedSystem<D> {
         }
     }
 
+    /// Share of the particles with a negative level; those within h/2 of the surface count in part.
+    pub(super) fn inside_share(&self) -> f64 {
+        let level = self.particles.scalar(self.psi);
+        let inside = |psi: &f64| (0.5 - psi / self.parts.spacing).clamp(0.0, 1.0);
+        level.iter().map(inside).sum::<f64>() / level.len().max(1) as f64
+    }
+
     /// How far the answers of the last redistancing can be trusted.
     pub(super) fn coverage(&self) -> Coverage {
         Coverage::new(&self.redistancing, &self.answers, self.particles.len())
