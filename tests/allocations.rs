@@ -6,7 +6,10 @@
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
-use meniscus::simulation::{FieldValues, Selection};
+use meniscus::parallel::Interrupt;
+use meniscus::scene::BuildContext;
+use meniscus::scene::cloud::{Cloud, Clouds};
+use meniscus::simulation::{CpuClock, FieldValues, Selection};
 use serde_json::json;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -114,4 +117,32 @@ fn steps_allocate_nothing_after_warm_up() {
             }
         });
     }
+}
+
+#[test]
+fn steps_on_stretched_points_allocate_nothing_after_warm_up() {
+    let mut cloud = Cloud { level: Some(Vec::new()), ..Cloud::default() };
+    for k in 0..41 * 161 {
+        let (x, y) = (f64::from(k % 41) * 0.05 - 1.0, f64::from(k / 41) * 0.0125 - 1.0);
+        cloud.positions.push([x, y, 0.0]);
+        cloud.level.as_mut().unwrap().push(x.hypot(y) - 0.6);
+    }
+    let body = json!({"kind": "redistance", "spacing": 0.05, "repeat": 12, "shape": {"type": "points", "file": "x"}});
+    pool(1).install(|| {
+        let context = BuildContext {
+            plan: support::PLAN,
+            interrupt: Interrupt::default(),
+            cpu_clock: CpuClock::still(),
+            clouds: Clouds::from([("/shape", cloud)]),
+        };
+        let mut simulation = support::scene(&body).build(context).unwrap();
+        for _ in 0..6 {
+            simulation.step().unwrap();
+        }
+        for step in 7..12 {
+            let before = ALLOCATIONS.get();
+            simulation.step().unwrap();
+            assert_eq!(ALLOCATIONS.get() - before, 0, "step {step}");
+        }
+    });
 }

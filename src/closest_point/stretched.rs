@@ -231,8 +231,8 @@ impl<const D: usize> StretchedSurface<D> {
 
     /// Projects the near-surface particles onto the zeros of their fits.
     fn find_seeds(&mut self) {
-        let mut seeds = std::mem::replace(&mut self.seeds, Seeds::new());
-        seeds.list.clear();
+        let mut seeds = std::mem::take(&mut self.seeds.list);
+        seeds.clear();
         for (patch, fit) in self.fits.iter().enumerate() {
             if patch % LANES >= self.batches[patch / LANES].count {
                 continue;
@@ -241,13 +241,13 @@ impl<const D: usize> StretchedSurface<D> {
             let Some(fit) = fit else { continue };
             self.fit_diagnostics.worst_condition = self.fit_diagnostics.worst_condition.max(fit.condition);
             match self.project(patch, fit, &fit.middle) {
-                Some(seed) => seeds.list.push(seed),
+                Some(seed) => seeds.push(seed),
                 None => add(&self.fit_diagnostics.counts.unprojected, 1),
             }
         }
         let (shortest, longest) = self.spacings;
-        seeds.sort(SEED_CELL * (shortest * longest).sqrt());
-        self.seeds = seeds;
+        self.seeds.list = seeds;
+        self.seeds.sort(SEED_CELL * (shortest * longest).sqrt());
     }
 
     /// The closest point of the surface to `x`; None without a seed within `cutoff`.

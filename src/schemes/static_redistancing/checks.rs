@@ -57,8 +57,8 @@ struct Watch {
     doubt: f64,
     limit: f64,
     unit: &'static str,
-    /// What is wrong with a value beyond the limits.
-    meaning: String,
+    /// What a value beyond the limits means.
+    meaning: fn(f64) -> String,
 }
 
 impl Watched {
@@ -77,7 +77,6 @@ impl Watched {
             (None, Some(_)) => (LIMITS.unreached_remeshed, LIMITS.unreached_remeshed),
             _ => (LIMITS.unreached_doubt, LIMITS.unreached),
         };
-        let share = |value: Option<f64>| format!("{:.2} %", 100.0 * value.unwrap_or(0.0));
         [
             Watch {
                 name: "one_sided_zeros",
@@ -85,10 +84,9 @@ impl Watched {
                 doubt: 0.0,
                 limit: LIMITS.one_sided,
                 unit: "",
-                meaning: format!(
-                    "{} of the particles with a level of zero do not lie between both signs",
-                    share(self.one_sided)
-                ),
+                meaning: |share| {
+                    format!("{} of the particles with a level of zero do not lie between both signs", percent(share))
+                },
             },
             Watch {
                 name: "unreached_queries",
@@ -96,7 +94,7 @@ impl Watched {
                 doubt,
                 limit,
                 unit: "",
-                meaning: format!("no closest point was found for {} of the points", share(self.unreached)),
+                meaning: |share| format!("no closest point was found for {} of the points", percent(share)),
             },
             Watch {
                 name: "lost_samples",
@@ -104,7 +102,7 @@ impl Watched {
                 doubt: LIMITS.lost_doubt,
                 limit: LIMITS.lost,
                 unit: "",
-                meaning: format!("{} of the particles next to the surface have no point of it", share(self.lost)),
+                meaning: |share| format!("{} of the particles next to the surface have no point of it", percent(share)),
             },
             Watch {
                 name: "missed_crossing",
@@ -112,10 +110,9 @@ impl Watched {
                 doubt: LIMITS.missed_doubt,
                 limit: LIMITS.missed,
                 unit: "h",
-                meaning: format!(
-                    "the level changes its sign {:.2} spacings away from the surface that was found",
-                    self.missed.unwrap_or(0.0)
-                ),
+                meaning: |missed| {
+                    format!("the level changes its sign {missed:.2} spacings away from the surface that was found")
+                },
             },
         ]
     }
@@ -139,15 +136,20 @@ impl Watched {
         {
             let Some(value) = value else { continue };
             if value > limit {
+                let meaning = meaning(value);
                 let reason = format!("{meaning} ({name} is {value:.3e}, its limit {limit})");
                 return Err(StepError::Unresolved { reason, step, time });
             }
             if value > doubt && before.value.is_none_or(|value| value <= doubt) {
-                doubts.push(Finding::warning(name, meaning, (step, time)).with_advice(ADVICE));
+                doubts.push(Finding::warning(name, meaning(value), (step, time)).with_advice(ADVICE));
             }
         }
         Ok(doubts)
     }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
 }
 
 /// What may help where a surface is not resolved.
