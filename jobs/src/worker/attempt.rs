@@ -120,11 +120,7 @@ fn attempt(
     let ResolvedBody { scene, options, .. } =
         ResolvedBody::deserialize(&spec.body).map_err(|error| internal(&error))?;
     let scene_sha256 = digest::of_bytes(scene.to_string().as_bytes());
-    // A job that an earlier version resolved goes on to mean the same.
-    let scene = scene::of_earlier_version(scene, SCENES);
-    let scene = scene::parse(&scene, SCENES).map_err(|violations| {
-        Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
-    })?;
+    let scene = parsed(scene)?;
     let threads = options.threads();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool =
@@ -170,6 +166,14 @@ fn attempt(
                 Ok(Verdict::Succeeded)
             }
         }
+    })
+}
+
+/// The scene of a resolved body; a job that an earlier version resolved goes on to mean the same.
+fn parsed(scene: serde_json::Value) -> Result<Box<dyn Scene>, Failure> {
+    let scene = scene::of_earlier_version(scene, SCENES);
+    scene::parse(&scene, SCENES).map_err(|violations| {
+        Failure::Known(Reason::InputDamaged, violations.first().map_or_else(String::new, |v| v.detail.clone()))
     })
 }
 

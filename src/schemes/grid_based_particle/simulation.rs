@@ -212,7 +212,10 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         state.put_real("max_cfl", self.max_cfl);
         state.put_optional("vanished_at", self.vanished);
         state.put_list("errors", &self.errors);
-        state.put_optional("measured_at", self.measured_at);
+        // A state without it, like those of format 1, was measured where it stands.
+        if self.measured_at != Some(self.clock().time) {
+            state.put_optional("measured_at", self.measured_at);
+        }
     }
 
     fn load(&mut self, state: &Section) -> Result<(), LoadError> {
@@ -221,7 +224,7 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         let removals: Removals = state.component("removals")?;
         let (max_cfl, vanished) = (state.real("max_cfl")?, state.optional("vanished_at")?);
         let errors = state.list("errors")?;
-        // States of earlier versions were always measured.
+        // What was measured where it stands is saved without it.
         let measured_at = if state.has("measured_at") { state.optional("measured_at")? } else { Some(clock.time) };
         // From here on nothing fails.
         (self.system.feet, self.system.removals) = (feet, removals);
