@@ -56,6 +56,10 @@ pub struct Crossings {
     /// Of these, particles that do not have a particle of either side within ξ: the level touches zero there, or is zero
     /// over a whole layer.
     pub one_sided: u64,
+    /// Particles next to the surface.
+    pub near: u64,
+    /// Of these, particles without another one of their side within ξ: the surface about them is smaller than a spacing.
+    pub lone: u64,
     /// Largest length by which the distance of a particle exceeds that to a particle of another side, in spacings.
     ///
     /// The surface passes between the two, so that the exact distance is never longer. A missed face shows here with the
@@ -66,13 +70,20 @@ pub struct Crossings {
 impl Crossings {
     fn merged(self, other: Self) -> Self {
         let (zeros, one_sided) = (self.zeros + other.zeros, self.one_sided + other.one_sided);
-        Self { zeros, one_sided, missed: self.missed.max(other.missed) }
+        let (near, lone) = (self.near + other.near, self.lone + other.lone);
+        Self { zeros, one_sided, near, lone, missed: self.missed.max(other.missed) }
     }
 
     /// Share of the particles on the surface without a particle of either side.
     #[must_use]
     pub fn one_sided_share(&self) -> f64 {
         self.one_sided as f64 / self.zeros.max(1) as f64
+    }
+
+    /// Share of the particles next to the surface that are alone on their side of it.
+    #[must_use]
+    pub fn lone_share(&self) -> f64 {
+        self.lone as f64 / self.near.max(1) as f64
     }
 }
 
@@ -91,8 +102,10 @@ impl<const D: usize> LevelSurface<D> {
         let sums = self.near().par_iter().map(|i| {
             let side = sides[*i];
             let (mut nearest, mut has) = (f64::INFINITY, [side == Side::Inside, side == Side::Outside]);
+            let mut is_lone = true;
             self.for_each_near_neighbor(*i, positions, |j, r2| {
                 let other = sides[j];
+                is_lone &= j == *i || side.is_apart_from(other);
                 has[0] |= other == Side::Inside;
                 has[1] |= other == Side::Outside;
                 if side.is_apart_from(other) {
@@ -106,6 +119,8 @@ impl<const D: usize> LevelSurface<D> {
             Crossings {
                 zeros: u64::from(is_on),
                 one_sided: u64::from(is_on && has != [true; 2]),
+                near: 1,
+                lone: u64::from(is_lone && !is_on),
                 missed: missed.max(0.0),
             }
         });

@@ -53,6 +53,11 @@ fn bad_vortices_end() {
 }
 
 #[test]
+fn bad_redistancings_end() {
+    check("redistance/");
+}
+
+#[test]
 fn bad_fronts_and_equations_end_or_are_refused() {
     check("front/");
     check("surface_pde/");

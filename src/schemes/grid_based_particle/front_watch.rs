@@ -1,6 +1,6 @@
 //! What a front watches about itself: its growth, and ends where it must be closed.
 
-use crate::simulation::{Check, Divergence, StepError};
+use crate::simulation::{Check, Divergence, LoadError, Section, StepError};
 use crate::time::Clock;
 
 /// Growth beyond which the foot points are taken to multiply, in multiples of what the motion does to the front. That is an
@@ -9,7 +9,7 @@ const EXPLOSION: f64 = 3.0;
 /// Share of the foot points at open ends beyond which a closed front is taken for torn. The tip of the filament of the single
 /// vortex has two ends, a share below .02 at any spacing that was tried.
 const MOST_ENDS: f64 = 0.25;
-/// Steps between two looks at the ends.
+/// Steps between two looks at the ends, and for which a front must be torn: a body that dies away has ends in its last few steps.
 const STEPS_BETWEEN: u64 = 16;
 
 /// The limits of a front, and what was found last.
@@ -18,12 +18,14 @@ pub(super) struct FrontWatch {
     most_growth: f64,
     /// Share of the foot points at open ends when it was last counted.
     ends: Option<f64>,
+    /// The step since which it is torn.
+    torn_since: Option<u64>,
 }
 
 impl FrontWatch {
     /// A watch of a front whose motion makes it at most so many times as large. `bound` is the exact bound of a law that has one.
     pub(super) fn new(bound: Option<f64>, stretch: f64) -> Self {
-        Self { most_growth: bound.unwrap_or(EXPLOSION * stretch), ends: None }
+        Self { most_growth: bound.unwrap_or(EXPLOSION * stretch), ends: None, torn_since: None }
     }
 
     /// Whether the ends are to be looked for after a step.
@@ -40,7 +42,7 @@ impl FrontWatch {
         Err(StepError::CheckFailed { check, divergence, value: growth, limit, step, time })
     }
 
-    /// Fails where a front that must stay closed has too many ends.
+    /// Fails where a front that must stay closed has had too many ends for many steps.
     pub(super) fn look_at_ends(
         &mut self,
         ends: usize,
@@ -49,11 +51,29 @@ impl FrontWatch {
     ) -> Result<(), StepError> {
         let value = ends as f64 / foot_points.max(1) as f64;
         self.ends = Some(value);
-        if value <= MOST_ENDS {
+        self.torn_since = (value > MOST_ENDS).then(|| self.torn_since.unwrap_or(step));
+        if self.torn_since.is_none_or(|since| step < since + STEPS_BETWEEN) {
             return Ok(());
         }
         let (check, divergence, limit) = ("open_ends", Divergence::Unresolved, MOST_ENDS);
         Err(StepError::CheckFailed { check, divergence, value, limit, step, time })
+    }
+
+    /// Saves since when the front is torn.
+    pub(super) fn save(&self, state: &mut Section) {
+        if let Some(step) = self.torn_since {
+            state.put_count("torn_since", step);
+        }
+    }
+
+    /// Since when the front of a state is torn.
+    pub(super) fn torn_since(state: &Section) -> Result<Option<u64>, LoadError> {
+        state.has("torn_since").then(|| state.count("torn_since")).transpose()
+    }
+
+    /// Goes on from there.
+    pub(super) fn go_on(&mut self, torn_since: Option<u64>) {
+        (self.torn_since, self.ends) = (torn_since, None);
     }
 
     /// The checks, with the present growth.
@@ -70,7 +90,7 @@ impl FrontWatch {
 #[cfg(test)]
 mod tests {
     use super::FrontWatch;
-    use crate::simulation::StepError;
+    use crate::simulation::{Section, StepError};
     use crate::time::Clock;
 
     #[test]
@@ -81,7 +101,13 @@ mod tests {
         assert!(matches!(watch.look_at_growth(6.1, at), Err(StepError::CheckFailed { check: "front_growth", .. })));
         assert!(FrontWatch::new(Some(1.5), 2.0).look_at_growth(1.6, at).is_err());
         assert!(watch.look_at_ends(10, 100, at).is_ok());
-        assert!(matches!(watch.look_at_ends(30, 100, at), Err(StepError::CheckFailed { check: "open_ends", .. })));
+        assert!(watch.look_at_ends(30, 100, at).is_ok(), "a body that dies away is torn for a few steps");
+        let mut state = Section::default();
+        watch.save(&mut state);
+        watch.go_on(FrontWatch::torn_since(&state).unwrap());
+        assert!(watch.look_at_ends(30, 100, Clock { step: 18, ..at }).is_ok());
+        let torn = watch.look_at_ends(30, 100, Clock { step: 19, ..at });
+        assert!(matches!(torn, Err(StepError::CheckFailed { check: "open_ends", .. })));
         assert_eq!(watch.checks(1.0)[1].holds, Some(false));
     }
 }

@@ -26,6 +26,10 @@ struct Limits {
     /// Share of the particles with a level of zero that do not lie between both sides. A corner has one; a level that
     /// is zero in a layer has most.
     one_sided: f64,
+    /// Share of the particles next to the surface that are alone on their side of it. Tips of corners have a few.
+    lone: f64,
+    /// The same share that is a doubt.
+    lone_doubt: f64,
 }
 
 const LIMITS: Limits = Limits {
@@ -37,6 +41,8 @@ const LIMITS: Limits = Limits {
     missed: 0.6,
     missed_doubt: 0.35,
     one_sided: 0.1,
+    lone: 0.08,
+    lone_doubt: 0.02,
 };
 
 /// Values of the checks at the last redistancing.
@@ -48,6 +54,7 @@ pub(super) struct Watched {
     /// None where the points asked about are the nodes of a grid.
     pub missed: Option<f64>,
     pub one_sided: Option<f64>,
+    pub lone: Option<f64>,
 }
 
 /// One value with its limits, and what it means.
@@ -69,10 +76,11 @@ impl Watched {
             lost: Some(coverage.lost_share()),
             missed: crossings.map(|crossings| crossings.missed),
             one_sided: crossings.map(|crossings| crossings.one_sided_share()),
+            lone: crossings.map(|crossings| crossings.lone_share()),
         }
     }
 
-    fn watches(&self) -> [Watch; 4] {
+    fn watches(&self) -> [Watch; 5] {
         let (doubt, limit) = match (self.missed, self.unreached) {
             (None, Some(_)) => (LIMITS.unreached_remeshed, LIMITS.unreached_remeshed),
             _ => (LIMITS.unreached_doubt, LIMITS.unreached),
@@ -112,6 +120,16 @@ impl Watched {
                 unit: "h",
                 meaning: |missed| {
                     format!("the level changes its sign {missed:.2} spacings away from the surface that was found")
+                },
+            },
+            Watch {
+                name: "lone_particles",
+                value: self.lone,
+                doubt: LIMITS.lone_doubt,
+                limit: LIMITS.lone,
+                unit: "",
+                meaning: |share| {
+                    format!("{} of the particles next to the surface are alone on their side of it", percent(share))
                 },
             },
         ]
@@ -161,6 +179,7 @@ impl Component for Watched {
         section.put_optional("lost", self.lost);
         section.put_optional("missed", self.missed);
         section.put_optional("one_sided", self.one_sided);
+        section.put_optional("lone", self.lone);
     }
 
     fn load(section: &Section) -> Result<Self, LoadError> {
@@ -169,6 +188,8 @@ impl Component for Watched {
             lost: section.optional("lost")?,
             missed: section.optional("missed")?,
             one_sided: section.optional("one_sided")?,
+            // Earlier versions did not count them.
+            lone: if section.has("lone") { section.optional("lone")? } else { None },
         })
     }
 }
@@ -182,7 +203,8 @@ mod tests {
     #[test]
     fn good_values_pass_doubts_are_found_and_bad_values_end_the_run_with_a_sentence() {
         let coverage = Coverage { near: 100, lost: 0, asked: 10_000, by_sample: 1, out_of_reach: 0 };
-        let good = Watched::new(coverage, Some(Crossings { zeros: 10, one_sided: 0, missed: 1e-6 }));
+        let good =
+            Watched::new(coverage, Some(Crossings { zeros: 10, one_sided: 0, near: 100, lone: 1, missed: 1e-6 }));
         assert_eq!(good.judge(&Watched::default(), AT), Ok(Vec::new()));
         assert!(good.checks().iter().all(|check| check.holds == Some(true)));
         let doubtful = Watched { missed: Some(0.5 * (LIMITS.missed + LIMITS.missed_doubt)), ..good };
@@ -197,13 +219,13 @@ mod tests {
              step 2, time 2"
         );
         assert_eq!(bad.checks()[1].holds, Some(false));
-        let layer = Watched::new(coverage, Some(Crossings { zeros: 10, one_sided: 4, missed: 0.0 }));
+        let layer = Watched::new(coverage, Some(Crossings { zeros: 10, one_sided: 4, ..Crossings::default() }));
         assert!(layer.judge(&good, AT).is_err());
     }
 
     #[test]
     fn watched_values_survive_a_round_trip() {
-        let watched = Watched { unreached: Some(0.25), lost: Some(0.0), missed: None, one_sided: None };
+        let watched = Watched { unreached: Some(0.25), lost: Some(0.0), missed: None, one_sided: None, lone: None };
         let mut section = Section::default();
         watched.save(&mut section);
         assert_eq!(Watched::load(&section).unwrap(), watched);
