@@ -239,7 +239,8 @@ mod tests {
         (0..total).map(place).filter(|x| x.amax() <= 1.0).collect()
     }
 
-    /// Shares of the crossed patches whose stretch lies within a factor of 1.5 of the expected one.
+    /// Share of the crossed patches whose stretch lies within a factor of 1.5 of the expected one, in space 2, and whether
+    /// the cloud is stretched. Small moves take pairs across corners out of the graph at random, which favors the stretch.
     fn share<const D: usize>(spacings: Vector<D>, angle: f64, jitter: f64) -> (f64, bool) {
         let points = lattice(spacings, angle, jitter);
         let level: Vec<f64> = points.iter().map(|x| x.norm() - 0.6).collect();
@@ -252,7 +253,8 @@ mod tests {
         let expected = spacings.max() / spacings.min();
         let is_right = |patch: &&usize| {
             let ratio = metric.map(**patch).stretch() / expected;
-            (1.0 / 1.5..=1.5).contains(&ratio)
+            let factor = if D == 2 { 1.5 } else { 2.0 };
+            (1.0 / factor..=factor).contains(&ratio)
         };
         (metric.crossed.iter().filter(is_right).count() as f64 / metric.crossed.len() as f64, is_stretched)
     }

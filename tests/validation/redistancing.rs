@@ -251,7 +251,7 @@ fn layers_that_are_not_resolved_end_with_a_sentence() {
 fn spacings_that_are_not_those_of_the_points_are_refused() {
     let points = ball_in_lattice(&[1.0 / 16.0, 1.0 / 64.0], 0.0, 0.0);
     let found = build(&points, 0.5, 1).err().unwrap();
-    assert!(found.contains("the points are stretched: they lie 1.56"), "{found}");
+    assert!(found.contains("the points are stretched: they lie"), "{found}");
     let points = ball_in_lattice(&[1.0 / 16.0, 1.0 / 16.0], 0.0, 0.0);
     assert!(build(&points, 0.5, 1).err().unwrap().contains("apart"));
 }

@@ -62,6 +62,9 @@ impl EnclosedWatch {
     ) -> Result<Option<Finding>, StepError> {
         let Enclosed { name, what, most, doubtful } = *enclosed;
         let value = drift.abs();
+        if value <= doubtful {
+            return Ok(None);
+        }
         let message = format!(
             "the {what} has changed by {:.1} %, though the flow keeps it: the surface is finer than the particles resolve",
             100.0 * drift
@@ -70,7 +73,7 @@ impl EnclosedWatch {
             let reason = format!("{message} ({name} is {value:.3}, its limit {most})");
             return Err(StepError::Unresolved { reason, step, time });
         }
-        if value <= doubtful || self.is_told {
+        if self.is_told {
             return Ok(None);
         }
         self.is_told = true;
@@ -80,7 +83,9 @@ impl EnclosedWatch {
 
     /// Saves what was told.
     pub(super) fn save(&self, state: &mut Section) {
-        state.put_count("enclosed_doubt_told", u64::from(self.is_told));
+        if self.is_told {
+            state.put_count("enclosed_doubt_told", 1);
+        }
     }
 
     /// What was told up to a state; earlier versions told nothing.

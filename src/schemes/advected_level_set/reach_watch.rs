@@ -62,29 +62,34 @@ impl ReachWatch {
         [check(BY_SAMPLE, self.by_sample), check(LOST, self.lost)]
     }
 
-    /// Saves the shares.
+    /// Saves the shares that there are.
     pub(super) fn save(&self, state: &mut Section) {
-        state.put_optional(BY_SAMPLE.name, self.by_sample);
-        state.put_optional(LOST.name, self.lost);
+        for (limits, share) in [(BY_SAMPLE, self.by_sample), (LOST, self.lost)] {
+            if let Some(share) = share {
+                state.put_real(limits.name, share);
+            }
+        }
     }
 
     /// The shares of a state; earlier versions have none.
     pub(super) fn load(state: &Section) -> Result<Self, LoadError> {
-        let share = |name| if state.has(name) { state.optional(name) } else { Ok(None) };
+        let share = |name| state.has(name).then(|| state.real(name)).transpose();
         Ok(Self { by_sample: share(BY_SAMPLE.name)?, lost: share(LOST.name)? })
     }
 }
 
 fn judge(limits: &Limits, before: f64, value: f64, Clock { step, time }: Clock) -> Result<Option<Finding>, StepError> {
     let Limits { name, doubt, most, meaning } = limits;
+    if value <= *doubt {
+        return Ok(None);
+    }
     let message = format!("{:.1} % {meaning}", 100.0 * value);
     if value > *most {
         let reason = format!("{message} ({name} is {value:.3}, its limit {most})");
         return Err(StepError::Unresolved { reason, step, time });
     }
-    let is_new = value > *doubt && before <= *doubt;
     let advice = "a smaller spacing resolves thinner filaments";
-    Ok(is_new.then(|| Finding::warning(name, message, (step, time)).with_advice(advice)))
+    Ok((before <= *doubt).then(|| Finding::warning(name, message, (step, time)).with_advice(advice)))
 }
 
 #[cfg(test)]

@@ -182,7 +182,9 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
         self.course.save(state);
         state.put_section("particles", |section| save_particles(&self.system.particles, section));
         state.put_component("redistancing", self.system.redistancing.fit_diagnostics());
-        state.put_component("watched", &self.watched);
+        if self.watched != Watched::default() {
+            state.put_component("watched", &self.watched);
+        }
         if let Source::Grid(remeshing) = &self.system.source {
             state.put_reals("remeshed_level", remeshing.values());
         }
@@ -195,7 +197,7 @@ impl<const D: usize> Simulation for StaticRedistancing<D> {
             Source::Grid(remeshing) => Some(state.reals_of("remeshed_level", remeshing.values().len())?),
             _ => None,
         };
-        // Checkpoints of 0.2.0 have no values of checks.
+        // There are none before the first redistancing, nor in checkpoints of 0.2.0.
         let watched = if state.has("watched") { state.component("watched")? } else { Watched::default() };
         state.section("particles", |section| load_particles(&mut self.system.particles, section))?;
         // From here on nothing fails.
