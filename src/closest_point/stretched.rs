@@ -84,12 +84,6 @@ impl<const D: usize> StretchedSurface<D> {
         self.spacing
     }
 
-    /// The metric of the cloud.
-    #[must_use]
-    pub fn metric(&self) -> &CloudMetric<D> {
-        &self.metric
-    }
-
     /// Indices of the particles next to the surface.
     #[must_use]
     pub fn near(&self) -> &[usize] {

@@ -114,14 +114,21 @@ pub async fn retry(
     Ok(response)
 }
 
+/// The trigger of an action with its reason; None of a deletion.
+fn trigger_of(action: Action) -> Option<(Trigger, Option<Reason>)> {
+    match action {
+        Action::Cancel => Some((Trigger::Cancel, Some(Reason::UserCancel))),
+        Action::Pause => Some((Trigger::Pause, Some(Reason::UserPause))),
+        Action::Resume => Some((Trigger::Resume, None)),
+        Action::Delete => None,
+    }
+}
+
 /// Does an action to one job; the reason why not.
 fn act_on(store: &Store, action: Action, job: &JobRow) -> Result<Option<String>, ApiError> {
-    let (trigger, reason) = match action {
-        Action::Cancel => (Trigger::Cancel, Some(Reason::UserCancel)),
-        Action::Pause => (Trigger::Pause, Some(Reason::UserPause)),
-        Action::Resume => (Trigger::Resume, None),
-        Action::Delete if store.delete(&job.id)? => return Ok(None),
-        Action::Delete => return Ok(Some(format!("a job that is {} has not ended", job.state.word()))),
+    let Some((trigger, reason)) = trigger_of(action) else {
+        let is_deleted = store.delete(&job.id)?;
+        return Ok((!is_deleted).then(|| format!("a job that is {} has not ended", job.state.word())));
     };
     match store.change(&job.id, trigger, &Change { reason, ..Change::default() }) {
         Ok(_) => Ok(None),
@@ -132,12 +139,7 @@ fn act_on(store: &Store, action: Action, job: &JobRow) -> Result<Option<String>,
 
 /// Whether an action would be done to a job in this state; the reason why not.
 fn refusal(action: Action, state: JobState) -> Option<String> {
-    let can = match action {
-        Action::Cancel => state.after(Trigger::Cancel).is_some(),
-        Action::Pause => state.after(Trigger::Pause).is_some(),
-        Action::Resume => state.after(Trigger::Resume).is_some(),
-        Action::Delete => state.is_terminal(),
-    };
+    let can = trigger_of(action).map_or(state.is_terminal(), |(trigger, _)| state.after(trigger).is_some());
     (!can).then(|| format!("a job that is {} cannot {}", state.word(), action.word()))
 }
 

@@ -88,16 +88,21 @@ pub fn compare(directory: &Path, store: Option<&Store>) -> Result<FoundFolders, 
     let mut found = FoundFolders::default();
     // A deletion that has begun is no loss.
     let leaving: HashSet<String> = store.map(Store::intended_deletions).transpose()?.into_iter().flatten().collect();
+    let known = store.map(Store::attempts).transpose()?.unwrap_or_default();
     for folder in folders_of_ours(&directory.join(JOBS), "job_")? {
         let id = name_of(&folder);
         if leaving.contains(&format!("{JOBS}/{id}")) {
             continue;
         }
-        let row = store.map(|store| store.job(&id)).transpose()?.flatten();
-        match (latest_attempt(&folder, &id), row) {
-            (Some((last_attempt, _)), Some(row)) if last_attempt <= row.attempt => {}
-            (Some((last_attempt, spec)), row) => {
-                found.jobs.push(FoundJob { id, last_attempt, spec, is_known: row.is_some() });
+        let (numbers, listed) = (attempt_numbers(&folder), known.get(&id));
+        // Of what the database knows no file is opened: there may be very many jobs.
+        if listed.is_some_and(|attempt| numbers.first().is_none_or(|last| last <= attempt)) {
+            continue;
+        }
+        match (latest_attempt(&folder, &id, numbers), listed) {
+            (Some((last_attempt, _)), Some(attempt)) if last_attempt <= *attempt => {}
+            (Some((last_attempt, spec)), listed) => {
+                found.jobs.push(FoundJob { id, last_attempt, spec, is_known: listed.is_some() });
             }
             (None, Some(_)) => {}
             (None, None) => found.orphans.push(folder),
@@ -195,12 +200,16 @@ fn name_of(folder: &Path) -> String {
     folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The latest attempt of a job folder with a sound specification.
-fn latest_attempt(folder: &Path, job: &str) -> Option<(u64, AttemptSpec)> {
-    let numbers = std::fs::read_dir(folder.join("attempts")).ok()?;
-    let mut numbers: Vec<u64> =
-        numbers.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
+/// Numbers of the attempts in a job folder, the latest first.
+fn attempt_numbers(folder: &Path) -> Vec<u64> {
+    let entries = std::fs::read_dir(folder.join("attempts")).into_iter().flatten().flatten();
+    let mut numbers: Vec<u64> = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
     numbers.sort_unstable_by(|a, b| b.cmp(a));
+    numbers
+}
+
+/// The latest attempt of a job folder with a sound specification.
+fn latest_attempt(folder: &Path, job: &str, numbers: Vec<u64>) -> Option<(u64, AttemptSpec)> {
     numbers.into_iter().find_map(|number| {
         let text = std::fs::read(attempt_directory(folder, number).join(ATTEMPT_SPEC)).ok()?;
         let spec: AttemptSpec = serde_json::from_slice(&text).ok()?;

@@ -59,6 +59,8 @@ pub struct Observers<'a> {
 
 /// Age of the kept state from which on a step that begins keeps a new one: a step that is dropped on request costs no more.
 const KEPT_STATE_AGE: Duration = Duration::from_millis(500);
+/// Least time between a record and one that tells of a measurement.
+const MEASUREMENT_INTERVAL: Duration = Duration::from_millis(100);
 
 impl Observers<'_> {
     /// What has been written and spent so far.
@@ -154,7 +156,9 @@ impl Observer for Observers<'_> {
     }
 
     fn before_measurement(&mut self, simulation: &dyn Simulation) -> Result<Request, ObserverError> {
-        if let Some(progress) = self.progress.observe(simulation, &self.findings, true) {
+        // Fast steps with a measurement each would write little else.
+        let must = self.progress.is_silent_for(MEASUREMENT_INTERVAL);
+        if let Some(progress) = self.progress.observe(simulation, &self.findings, must) {
             self.sink.put(&Record::Progress(Progress { phase: "measuring".to_owned(), ..progress }), false)?;
         }
         let step = simulation.clock().step;

@@ -59,21 +59,26 @@ impl FrontWatch {
         Err(StepError::CheckFailed { check, divergence, value, limit, step, time })
     }
 
-    /// Saves since when the front is torn.
+    /// Saves what was found last.
     pub(super) fn save(&self, state: &mut Section) {
+        if let Some(share) = self.ends {
+            state.put_real("open_ends", share);
+        }
         if let Some(step) = self.torn_since {
             state.put_count("torn_since", step);
         }
     }
 
-    /// Since when the front of a state is torn.
-    pub(super) fn torn_since(state: &Section) -> Result<Option<u64>, LoadError> {
-        state.has("torn_since").then(|| state.count("torn_since")).transpose()
+    /// The same watch with what was found last in a state.
+    pub(super) fn restored(self, state: &Section) -> Result<Self, LoadError> {
+        let ends = state.has("open_ends").then(|| state.real("open_ends")).transpose()?;
+        let torn_since = state.has("torn_since").then(|| state.count("torn_since")).transpose()?;
+        Ok(Self { ends, torn_since, ..self })
     }
 
-    /// Goes on from there.
-    pub(super) fn go_on(&mut self, torn_since: Option<u64>) {
-        (self.torn_since, self.ends) = (torn_since, None);
+    /// Forgets the ends of a front that has vanished.
+    pub(super) fn forget_ends(&mut self) {
+        (self.ends, self.torn_since) = (None, None);
     }
 
     /// The checks, with the present growth.
@@ -104,7 +109,8 @@ mod tests {
         assert!(watch.look_at_ends(30, 100, at).is_ok(), "a body that dies away is torn for a few steps");
         let mut state = Section::default();
         watch.save(&mut state);
-        watch.go_on(FrontWatch::torn_since(&state).unwrap());
+        let mut watch = FrontWatch::new(None, 2.0).restored(&state).unwrap();
+        assert_eq!(watch.checks(1.0)[1].value, Some(0.3));
         assert!(watch.look_at_ends(30, 100, Clock { step: 18, ..at }).is_ok());
         let torn = watch.look_at_ends(30, 100, Clock { step: 19, ..at });
         assert!(matches!(torn, Err(StepError::CheckFailed { check: "open_ends", .. })));

@@ -105,7 +105,7 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
     fn count_open_ends(&mut self, now: Clock) -> Result<(), StepError> {
         if self.system.feet.is_empty() {
             // What has vanished has no ends.
-            self.watch.go_on(None);
+            self.watch.forget_ends();
         } else if self.system.config.law.keeps_fronts_closed() {
             self.ends = self.system.open_ends();
             self.watch.look_at_ends(self.ends.len(), self.system.feet.len(), now)?;
@@ -230,10 +230,10 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         let errors = state.list("errors")?;
         // What was measured where it stands is saved without it.
         let measured_at = if state.has("measured_at") { state.optional("measured_at")? } else { Some(clock.time) };
-        let torn_since = FrontWatch::torn_since(state)?;
+        let watch = self.watch.restored(state)?;
         // From here on nothing fails.
         (self.system.feet, self.system.removals) = (feet, removals);
-        self.watch.go_on(torn_since);
+        self.watch = watch;
         (self.max_cfl, self.vanished, self.errors) = (max_cfl, vanished, errors);
         self.measured_at = measured_at;
         self.ends.clear();

@@ -188,8 +188,7 @@ impl Component for Watched {
             lost: section.optional("lost")?,
             missed: section.optional("missed")?,
             one_sided: section.optional("one_sided")?,
-            // Earlier versions did not count them.
-            lone: if section.has("lone") { section.optional("lone")? } else { None },
+            lone: section.optional("lone")?,
         })
     }
 }

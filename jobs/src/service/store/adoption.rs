@@ -12,6 +12,7 @@ use crate::spec::attempt_spec::AttemptSpec;
 use crate::spec::records::{self, Verdict};
 use crate::spec::states::{Reason, State, Trigger};
 use rusqlite::{OptionalExtension, params};
+use std::collections::HashMap;
 
 impl Store {
     /// Enters a job that the database does not know, as it was submitted.
@@ -41,6 +42,9 @@ impl Store {
             }
             let lost: Vec<String> =
                 job.uploads.iter().filter(|id| !knows("uploads", id).unwrap_or(false)).cloned().collect();
+            if !lost.is_empty() {
+                tracing::warn!(job = spec.job, uploads = lost.join(", "), "uploads of an adopted job are lost; if it needs them it fails");
+            }
             job.uploads.retain(|id| !lost.contains(id));
             let place = submission::Place { id: &spec.job, clock_s };
             submission::insert(transaction, &place, &job, start.and_then(|start| start.sha256.as_deref()))?;
@@ -163,6 +167,17 @@ impl Store {
             )?;
             Ok(())
         })
+    }
+
+    /// The latest attempt of every job.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn attempts(&self) -> Result<HashMap<String, u64>, StoreError> {
+        let connection = self.read();
+        let mut statement = connection.prepare_cached("SELECT id, attempt FROM jobs")?;
+        let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get::<_, i64>(1)? as u64)))?;
+        Ok(rows.collect::<Result<_, _>>()?)
     }
 
     /// Whether the database knows an upload or a job by its id.

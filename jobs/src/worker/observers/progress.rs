@@ -129,6 +129,12 @@ impl ProgressMeter {
         (Some(eta), Some(basis))
     }
 
+    /// Whether the last record is at least so old.
+    #[must_use]
+    pub fn is_silent_for(&self, time: Duration) -> bool {
+        self.last.is_none_or(|last| last.elapsed() >= time)
+    }
+
     /// A record of the present state, at most every 0.4 s unless it `must` be made.
     pub fn observe(&mut self, simulation: &dyn Simulation, findings: &FindingLog, must: bool) -> Option<Progress> {
         let clock = simulation.clock();
