@@ -8,6 +8,7 @@
 
 pub mod spec;
 pub mod parallel;
+pub mod formulas;
 pub mod geometry;
 pub mod linear_algebra;
 pub mod smoothing_kernels;

@@ -12,7 +12,7 @@ pub use view::View;
 pub use work::PhaseWork;
 
 use crate::parallel::Interrupt;
-use crate::simulation::{CpuClock, Finding, OutputPlan, Quantity, Simulation};
+use crate::simulation::{CpuClock, Finding, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::{Declaration, Given, Group, Json, Object, Preset, Violation, group, suggest};
 use serde_json::json;
 
@@ -164,6 +164,11 @@ pub trait Scene: Send + Sync {
     /// Entries of all operators together that a run can write, about; zero where a scene makes none.
     fn operator_entries(&self, _estimate: &Estimate) -> f64 {
         0.0
+    }
+
+    /// Regions that integrals can be taken over.
+    fn regions(&self) -> Vec<Region> {
+        Vec::new()
     }
 
     /// Points from outside that the scene needs to be built.

@@ -5,6 +5,7 @@ pub mod advected_level_set;
 pub mod capillary_wave;
 pub mod embedding_closest_point;
 pub mod exact_motion;
+pub mod flow_divergence;
 pub mod front_stretch;
 pub mod grid_based_particle;
 pub mod measured_errors;

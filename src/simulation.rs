@@ -6,6 +6,7 @@ pub mod course;
 pub mod fields;
 pub mod finding;
 pub mod format_1;
+pub mod measures;
 pub mod output_plan;
 pub mod phases;
 pub mod quantity;
@@ -16,6 +17,7 @@ pub mod section;
 pub use course::Course;
 pub use fields::{Field, FieldValues, Fields, Mark, Selection};
 pub use finding::{Check, Divergence, Finding, Health, Severity};
+pub use measures::{Measure, Measures, Probe, Reduction, Region};
 pub use output_plan::OutputPlan;
 pub use phases::{CpuClock, Phases};
 pub use quantity::{Observables, Quantity};
@@ -25,6 +27,7 @@ pub use section::{Component, Entry, LoadError, Section};
 
 use crate::linear_algebra::SparseRows;
 use crate::time::Clock;
+use crate::time::integrators::PathError;
 
 /// A running scene. Its future depends on the scene and [`Simulation::save`] alone.
 pub trait Simulation: Send {
@@ -115,6 +118,12 @@ pub trait Simulation: Send {
     /// Number of particles.
     fn particle_count(&self) -> usize;
 
+    /// The area or volume of a region that each point of a frame stands for, as its scene promises
+    /// ([`crate::scene::Scene::regions`]); None of a region that the scene has not.
+    fn weights(&self, _region: Region) -> Option<Vec<f64>> {
+        None
+    }
+
     /// Operators that a client may ask for as files, made where they are not there yet.
     ///
     /// # Errors
@@ -160,6 +169,16 @@ pub enum StepError {
         field: &'static str,
         /// Index of the particle.
         particle: usize,
+        /// Number of the step.
+        step: u64,
+        /// Scene time of the step.
+        time: f64,
+    },
+    /// Something that was given has no value where it is needed.
+    #[error("{reason}, at step {step}, time {time}")]
+    Undefined {
+        /// What has no value, and where.
+        reason: String,
         /// Number of the step.
         step: u64,
         /// Scene time of the step.
@@ -259,6 +278,17 @@ fn advice(time_step: f64, stable: f64, bound: &str) -> String {
         "the step of {time_step:.3e} is within the limits ({bound} allows {stable:.3e}), so particles have crowded: a higher \
          speed of sound or a finer spacing is needed"
     )
+}
+
+impl StepError {
+    /// The error of a step in which points could not be carried along.
+    #[must_use]
+    pub fn from_path(error: PathError, Clock { step, time }: Clock) -> Self {
+        match error {
+            PathError::Interrupted(_) => Self::Interrupted,
+            PathError::Undefined(reason) => Self::Undefined { reason, step, time },
+        }
+    }
 }
 
 impl From<crate::parallel::Interrupted> for StepError {

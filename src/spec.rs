@@ -13,7 +13,7 @@ pub mod violation;
 
 pub use choice::{AtLeast, Choice, Variant, Word};
 pub use group::{Declaration, Field, Group};
-pub use parameter::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Parameter, Raw, Sign, Whole, whole};
+pub use parameter::{Coordinates, Interval, Items, Listed, NOT_NEGATIVE, POSITIVE, Parameter, Raw, Sign, Whole, whole};
 pub use places::Places;
 pub use preset::{Given, Key, Preset};
 pub use violation::{Violation, escape, suggest};

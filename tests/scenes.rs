@@ -9,6 +9,8 @@ mod support;
 mod droplets;
 #[path = "scenes/fronts.rs"]
 mod fronts;
+#[path = "scenes/own_inputs.rs"]
+mod own_inputs;
 #[path = "scenes/surfaces.rs"]
 mod surfaces;
 
@@ -54,6 +56,7 @@ fn bodies() -> Vec<Value> {
     }));
     bodies.extend(surfaces::bodies());
     bodies.extend(fronts::bodies());
+    bodies.extend(own_inputs::bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
         "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,

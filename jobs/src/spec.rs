@@ -11,6 +11,7 @@ mod json_numbers;
 pub mod records;
 pub mod report;
 pub mod requests;
+pub mod own_measures;
 pub mod run_options;
 pub mod states;
 pub mod strict_json;

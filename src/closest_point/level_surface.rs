@@ -9,7 +9,6 @@ use super::rescue::FitDiagnostics;
 use super::stretched::StretchedSurface;
 use crate::geometry::Vector;
 use crate::parallel::{Interrupt, Interrupted};
-use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
 /// The zero of a level set that particles carry.
 #[derive(Debug)]
@@ -172,14 +171,5 @@ impl<const D: usize> LevelSurface<D> {
     /// The fit diagnostics, for adding those of an earlier part of the run or of a copy.
     pub fn fit_diagnostics_mut(&mut self) -> &mut FitDiagnostics {
         each!(self, surface => surface.fit_diagnostics_mut())
-    }
-
-    /// Mean and maximum of a non-negative function over the sample points; (0, 0) without sample points.
-    pub fn mean_and_max(&self, function: impl Fn(&Vector<D>) -> f64 + Sync) -> (f64, f64) {
-        let values: Vec<f64> = self.sample_points().par_iter().map(&function).collect();
-        // `f64::max` would drop a NaN.
-        let has_nan = values.iter().any(|v| v.is_nan());
-        let max = if has_nan { f64::NAN } else { values.iter().copied().fold(0.0, f64::max) };
-        (values.iter().sum::<f64>() / values.len().max(1) as f64, max)
     }
 }

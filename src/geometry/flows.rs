@@ -1,11 +1,13 @@
 //! Prescribed velocity fields u(x, t), one file per flow, and the parameter that chooses one.
 
+pub mod formula_flow;
 pub mod rays;
 pub mod rotation;
 pub mod single_vortex;
 pub mod translation;
 pub mod vortex_3d;
 
+pub use formula_flow::FormulaFlow;
 pub use rays::Rays;
 pub use rotation::Rotation;
 pub use single_vortex::SingleVortex;
@@ -14,6 +16,7 @@ pub use vortex_3d::Vortex3d;
 
 use super::Vector;
 use super::dimension::in_dimension;
+use crate::formulas::{Count, FormulaList, NamedNumbers, constants};
 use crate::spec::{Choice, Coordinates, POSITIVE, Parameter, Violation};
 use serde_json::json;
 
@@ -38,6 +41,29 @@ impl Stretch {
 pub trait Flow<const D: usize>: Send + Sync {
     /// Velocity u(x, t).
     fn velocity(&self, x: &Vector<D>, time: f64) -> Vector<D>;
+
+    /// Velocities at several points, each at its own time. A flow that computes many at once faster than one by one does so;
+    /// every velocity is that of [`Self::velocity`] to the last bit.
+    fn velocities(&self, points: &[Vector<D>], times: &[f64], velocities: &mut [Vector<D>]) {
+        for ((velocity, x), time) in velocities.iter_mut().zip(points).zip(times) {
+            *velocity = self.velocity(x, *time);
+        }
+    }
+
+    /// Why there is no velocity at a place and time, in words with numbers; None where there is one.
+    fn fault(&self, _x: &Vector<D>, _time: f64) -> Option<String> {
+        None
+    }
+
+    /// ∇·u at several points, where it is not known to be 0 beforehand; None for built-in flows, which have none.
+    fn divergences(&self, _points: &[Vector<D>], _time: f64) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// What the flow costs beside a built-in one, for estimates.
+    fn relative_cost(&self) -> f64 {
+        1.0
+    }
 
     /// An upper bound of |u| at all times over the points that start in the box from `low` to `high`. It limits time
     /// steps.
@@ -102,54 +128,79 @@ crate::choice! {
             /// velocity
             velocity: Coordinates;
         }
+        /// a flow of one's own: formulas of x, y, z and t
+        Formula = "formula" {
+            /// the components of the velocity
+            velocity: FormulaList, in Count(2, 3);
+            /// numbers that the formulas call by name
+            parameters: NamedNumbers = constants();
+            /// time after which every point is back at its start; null where none is
+            period: Option<f64>, in POSITIVE;
+        }
     }
 }
 
 /// Names of the flows that exist in the plane, and in space.
 const EXISTING: [&[&str]; 2] =
-    [&["single_vortex", "rotation", "translation"], &["vortex_3d", "rotation", "translation"]];
+    [&["single_vortex", "rotation", "translation", "formula"], &["vortex_3d", "rotation", "translation", "formula"]];
 
 impl FlowChoice {
-    /// The velocity field in `D` dimensions.
+    /// The velocity field in `D` dimensions, for a run until `end_time`. Pointers of errors begin with `pointer`.
     ///
     /// # Errors
-    /// Where it does not exist in this dimension.
-    pub fn flow<const D: usize>(&self) -> Result<Box<dyn Flow<D>>, Violation> {
+    /// Where it does not exist in this dimension, and all that is wrong with formulas.
+    pub fn flow<const D: usize>(&self, end_time: f64, pointer: &str) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
+        let choice = Chosen { choice: self, pointer };
         match self {
-            Self::SingleVortex { period } => self.in_plane(SingleVortex { period: *period }),
-            Self::Vortex3d { period } => self.in_space(Vortex3d { period: *period }),
+            Self::SingleVortex { period } => choice.in_plane(SingleVortex { period: *period }),
+            Self::Vortex3d { period } => choice.in_space(Vortex3d { period: *period }),
             Self::Rotation { center, angular_velocity } => {
-                Ok(Box::new(Rotation { center: vector("center", center)?, angular_velocity: *angular_velocity }))
+                let center = choice.vector("center", center)?;
+                Ok(Box::new(Rotation { center, angular_velocity: *angular_velocity }))
             }
-            Self::Translation { velocity } => Ok(Box::new(Translation { velocity: vector("velocity", velocity)? })),
+            Self::Translation { velocity } => {
+                Ok(Box::new(Translation { velocity: choice.vector("velocity", velocity)? }))
+            }
+            Self::Formula { velocity, parameters, period } => {
+                Ok(Box::new(FormulaFlow::<D>::new(velocity, parameters, *period, end_time, pointer)?))
+            }
         }
     }
+}
 
+/// A choice and where it stands.
+struct Chosen<'a> {
+    choice: &'a FlowChoice,
+    pointer: &'a str,
+}
+
+impl Chosen<'_> {
     /// A flow of the plane, where the scene has two dimensions.
-    fn in_plane<const D: usize>(&self, flow: impl Flow<2> + 'static) -> Result<Box<dyn Flow<D>>, Violation> {
+    fn in_plane<const D: usize>(&self, flow: impl Flow<2> + 'static) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
         let flow: Box<dyn Flow<2>> = Box::new(flow);
         in_dimension(flow).ok_or_else(|| self.exists_elsewhere::<D>("the plane"))
     }
 
     /// A flow of space, where the scene has three dimensions.
-    fn in_space<const D: usize>(&self, flow: impl Flow<3> + 'static) -> Result<Box<dyn Flow<D>>, Violation> {
+    fn in_space<const D: usize>(&self, flow: impl Flow<3> + 'static) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
         let flow: Box<dyn Flow<3>> = Box::new(flow);
         in_dimension(flow).ok_or_else(|| self.exists_elsewhere::<D>("space"))
     }
 
-    fn exists_elsewhere<const D: usize>(&self, place: &str) -> Violation {
-        let detail = format!("{} is a flow of {place}, the scene has {D} dimensions", self.name());
-        Violation::new("/flow/type", "conflict", detail, self.name(), json!(EXISTING[D - 2]))
+    fn exists_elsewhere<const D: usize>(&self, place: &str) -> Vec<Violation> {
+        let name = self.choice.name();
+        let detail = format!("{name} is a flow of {place}, the scene has {D} dimensions");
+        vec![Violation::new(format!("{}/type", self.pointer), "conflict", detail, name, json!(EXISTING[D - 2]))]
     }
-}
 
-/// A vector parameter, where it has the dimension of the scene.
-fn vector<const D: usize>(name: &str, numbers: &Coordinates) -> Result<Vector<D>, Violation> {
-    if numbers.len() == D {
-        return Ok(Vector::<D>::from_column_slice(numbers));
+    /// A vector parameter, where it has the dimension of the scene.
+    fn vector<const D: usize>(&self, name: &str, numbers: &Coordinates) -> Result<Vector<D>, Vec<Violation>> {
+        if numbers.len() == D {
+            return Ok(Vector::<D>::from_column_slice(numbers));
+        }
+        let (at, detail) = (format!("{}/{name}", self.pointer), format!("the scene has {D} dimensions"));
+        Err(vec![Violation::new(at, "conflict", detail, numbers.to_json(), json!(format!("{D} numbers")))])
     }
-    let (at, detail) = (format!("/flow/{name}"), format!("the scene has {D} dimensions"));
-    Err(Violation::new(at, "conflict", detail, numbers.to_json(), json!(format!("{D} numbers"))))
 }
 
 /// Support for the tests of flows.
@@ -192,11 +243,11 @@ mod tests {
     #[test]
     fn a_flow_exists_in_its_dimension_alone() {
         let vortex = FlowChoice::SingleVortex { period: None };
-        assert!(vortex.flow::<2>().is_ok());
-        let found = vortex.flow::<3>().err().unwrap();
-        assert_eq!((found.pointer.as_str(), found.got.as_str()), ("/flow/type", Some("single_vortex")));
+        assert!(vortex.flow::<2>(1.0, "/flow").is_ok());
+        let found = vortex.flow::<3>(1.0, "/law/flow").err().unwrap().remove(0);
+        assert_eq!((found.pointer.as_str(), found.got.as_str()), ("/law/flow/type", Some("single_vortex")));
         let rotation = FlowChoice::Rotation { center: [0.5, 0.5].into(), angular_velocity: 2.0 };
-        assert!(rotation.flow::<2>().is_ok() && rotation.flow::<3>().is_err());
+        assert!(rotation.flow::<2>(1.0, "/flow").is_ok() && rotation.flow::<3>(1.0, "/flow").is_err());
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod flow;
 mod formulation;
 mod layer;
 mod numbers;
+mod own_motion;
 mod plan;
 mod preset;
 pub mod spec;

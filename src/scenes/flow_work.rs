@@ -29,5 +29,5 @@ pub fn path_units<const D: usize>(flow: &dyn Flow<D>, paths: f64, end_time: f64)
     let halfway = flow.return_time().map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
     let at_end = if flow.is_back(end_time) { 0.0 } else { end_time };
     let length = if flow.is_rigid() { 0.0 } else { at_end + halfway.unwrap_or(0.0) };
-    paths * length * PATH
+    paths * length * PATH * flow.relative_cost()
 }

@@ -5,7 +5,8 @@ use crate::geometry::{Domain, Flow, Surface, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::parallel::{Interrupt, Interrupted};
 use crate::time::PathIntegrator;
-use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+use crate::time::integrators::PATHS;
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 use std::sync::Arc;
 
 /// A surface and the flow that moves it.
@@ -93,25 +94,57 @@ impl<const D: usize> ExactMotion<D> {
         self.flow.as_ref()
     }
 
-    /// The signed distance of a point close to the surface at a time, to first order: φ(X)/|∇φ(X)|, X the backward map and φ the distance
-    /// at the start. In space, where the surface has no outline to carry along.
-    #[must_use]
-    pub fn distance_nearby(&self, x: &Vector<D>, time: f64) -> Option<f64> {
-        let surface = self.surface()?;
-        let start = |x: &Vector<D>| surface.signed_distance(&TUNING.nearby.advance(self.flow.as_ref(), x, time, -time));
-        let here = start(x);
-        let gradient = Vector::<D>::from_fn(|d, _| {
-            let mut aside = *x;
-            aside[d] += TUNING.offset;
-            (start(&aside) - here) / TUNING.offset
+    /// Signed distances of points close to the surface at a time, to first order: φ(X)/|∇φ(X)|, X the backward map and φ the distance
+    /// at the start. In space, where the surface has no outline to carry along. None where the surface is not known.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when the run is asked to stop.
+    pub fn distances_nearby(
+        &self,
+        points: &[Vector<D>],
+        time: f64,
+        interrupt: &Interrupt,
+    ) -> Result<Option<Vec<f64>>, Interrupted> {
+        let Some(surface) = self.surface() else { return Ok(None) };
+        let mut distances = vec![0.0; points.len()];
+        points.par_chunks(PATHS).zip(distances.par_chunks_mut(PATHS)).for_each(|(points, distances)| {
+            if interrupt.is_raised() {
+                return;
+            }
+            let start = |points: &[Vector<D>]| {
+                let mut starts = [Vector::<D>::zeros(); PATHS];
+                starts[..points.len()].copy_from_slice(points);
+                TUNING.nearby.advance_all(self.flow.as_ref(), &mut starts[..points.len()], time, -time);
+                starts.map(|x| surface.signed_distance(&x))
+            };
+            let here = start(points);
+            let mut gradients = [Vector::<D>::zeros(); PATHS];
+            for d in 0..D {
+                let mut aside = [Vector::<D>::zeros(); PATHS];
+                for (aside, x) in aside.iter_mut().zip(points) {
+                    *aside = *x;
+                    aside[d] += TUNING.offset;
+                }
+                let there = start(&aside[..points.len()]);
+                for (k, gradient) in gradients[..points.len()].iter_mut().enumerate() {
+                    gradient[d] = (there[k] - here[k]) / TUNING.offset;
+                }
+            }
+            for (k, distance) in distances.iter_mut().enumerate() {
+                *distance = here[k] / gradients[k].norm();
+            }
         });
-        Some(here / gradient.norm())
+        interrupt.check()?;
+        Ok(Some(distances))
     }
 
-    /// The approximate position at a time of a point of the surface at the start.
-    #[must_use]
-    pub fn place_about(&self, start: &Vector<D>, time: f64) -> Vector<D> {
-        TUNING.rough.advance(self.flow.as_ref(), start, 0.0, time)
+    /// Moves points of the surface at the start to their approximate positions at a time.
+    pub fn carry_about(&self, points: &mut [Vector<D>], time: f64, interrupt: &Interrupt) {
+        points.par_chunks_mut(PATHS).for_each(|block| {
+            if !interrupt.is_raised() {
+                TUNING.rough.advance_all(self.flow.as_ref(), block, 0.0, time);
+            }
+        });
     }
 
     /// The surface at a time, resolved for particles of a spacing; None where it is not known.
@@ -139,10 +172,12 @@ impl<const D: usize> ExactMotion<D> {
         for chain in &outline {
             joined.extend((0..chain.len()).map(|k| k + 1 < chain.len()));
         }
-        let end = |x: &Vector<D>| {
-            if interrupt.is_raised() { *x } else { TUNING.tight.advance(self.flow.as_ref(), x, 0.0, time) }
-        };
-        let points: Vec<Vector<D>> = starts.par_iter().map(end).collect();
+        let mut points = starts;
+        points.par_chunks_mut(PATHS).for_each(|block| {
+            if !interrupt.is_raised() {
+                TUNING.tight.advance_all(self.flow.as_ref(), block, 0.0, time);
+            }
+        });
         interrupt.check()?;
         let mut cells = CellList::new(Domain::unbounded());
         cells.rebuild(points.iter().copied(), TUNING.cell_edge * spacing);
@@ -182,25 +217,53 @@ impl<const D: usize> ExactFront<'_, D> {
         is_known.then(|| self.motion.flow.rigid_path(start, self.time).unwrap_or(*start))
     }
 
-    /// The signed distance of a point from the surface.
-    #[must_use]
-    pub fn signed_distance(&self, x: &Vector<D>) -> f64 {
+    /// Signed distances of points from the surface.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when the run is asked to stop.
+    pub fn signed_distances(&self, points: &[Vector<D>], interrupt: &Interrupt) -> Result<Vec<f64>, Interrupted> {
+        let mut distances = vec![0.0; points.len()];
+        points.par_chunks(PATHS).zip(distances.par_chunks_mut(PATHS)).for_each(|(points, distances)| {
+            if !interrupt.is_raised() {
+                self.distances_of_block(points, distances);
+            }
+        });
+        interrupt.check()?;
+        Ok(distances)
+    }
+
+    /// Signed distances of up to [`PATHS`] points.
+    fn distances_of_block(&self, points: &[Vector<D>], distances: &mut [f64]) {
         let flow = self.motion.flow.as_ref();
-        match &self.advected {
+        let Some(front) = &self.advected else {
             // A rigid motion keeps distances; every other surface known by a formula is back at its start.
-            None => {
+            for (distance, x) in distances.iter_mut().zip(points) {
                 let start = flow.rigid_path(x, -self.time).unwrap_or(*x);
-                self.surface.signed_distance(&start)
+                *distance = self.surface.signed_distance(&start);
             }
-            Some(front) => {
-                let start_distance = |integrator: PathIntegrator| {
-                    self.surface.signed_distance(&integrator.advance(flow, x, self.time, -self.time))
-                };
-                // Only the side matters here; far from the surface a rough path tells it.
-                let rough = start_distance(TUNING.rough);
-                let side = if rough.abs() > TUNING.rough_side { rough } else { start_distance(TUNING.tight) };
-                front.distance(x).copysign(side)
+            return;
+        };
+        let at_start = |integrator: PathIntegrator, points: &mut [Vector<D>], distances: &mut [f64]| {
+            integrator.advance_all(flow, points, self.time, -self.time);
+            for (distance, x) in distances.iter_mut().zip(points) {
+                *distance = self.surface.signed_distance(x);
             }
+        };
+        // Only the side matters here; far from the surface a rough path tells it.
+        let mut starts = [Vector::<D>::zeros(); PATHS];
+        starts[..points.len()].copy_from_slice(points);
+        at_start(TUNING.rough, &mut starts[..points.len()], distances);
+        // A NaN is no side: the tight path tells it too.
+        let is_near = |side: f64| !(side.abs() > TUNING.rough_side);
+        let near: Vec<usize> = (0..points.len()).filter(|k| is_near(distances[*k])).collect();
+        let mut starts: Vec<Vector<D>> = near.iter().map(|k| points[*k]).collect();
+        let mut sides = [0.0; PATHS];
+        at_start(TUNING.tight, &mut starts, &mut sides);
+        for (k, side) in near.into_iter().zip(sides) {
+            distances[k] = side;
+        }
+        for (distance, x) in distances.iter_mut().zip(points) {
+            *distance = front.distance(x).copysign(*distance);
         }
     }
 }
@@ -238,11 +301,15 @@ mod tests {
         Some(Box::new(Ball { center: Vector::<2>::new(0.5, 0.75), radius: 0.15 }))
     }
 
+    fn distance_of(front: &super::ExactFront<'_, 2>, x: Vector<2>) -> f64 {
+        front.signed_distances(&[x], &Interrupt::default()).unwrap()[0]
+    }
+
     #[test]
     fn a_returned_vortex_is_the_start() {
         let motion = ExactMotion::new(ball(), Arc::new(SingleVortex { period: Some(8.0) }));
         let front = motion.front(8.0, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
-        assert!((front.signed_distance(&Vector::<2>::new(0.5, 1.0)) - 0.1).abs() < 1e-15);
+        assert!((distance_of(&front, Vector::<2>::new(0.5, 1.0)) - 0.1).abs() < 1e-15);
     }
 
     #[test]
@@ -252,9 +319,11 @@ mod tests {
         for k in 0..8 {
             let angle = 0.8 * f64::from(k);
             let start = Vector::<2>::new(0.5 + 0.15 * angle.cos(), 0.75 + 0.15 * angle.sin());
-            let near = motion.place_about(&start, 0.7) + Vector::<2>::new(3e-4, -2e-4);
-            let distance = front.signed_distance(&near);
-            let nearby = motion.distance_nearby(&near, 0.7).unwrap();
+            let mut near = [start];
+            motion.carry_about(&mut near, 0.7, &Interrupt::default());
+            let near = near[0] + Vector::<2>::new(3e-4, -2e-4);
+            let distance = distance_of(&front, near);
+            let nearby = motion.distances_nearby(&[near], 0.7, &Interrupt::default()).unwrap().unwrap()[0];
             assert!((nearby - distance).abs() < 2e-2 * distance.abs() + 1e-6, "{nearby} {distance}");
         }
     }
@@ -266,7 +335,7 @@ mod tests {
         let front = motion.front(2.0 - 2e-8, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         for x in [Vector::<2>::new(0.5, 1.0), Vector::<2>::new(0.42, 0.7), Vector::<2>::new(0.655, 0.75)] {
             let exact = (x - Vector::<2>::new(0.5, 0.75)).norm() - 0.15;
-            assert!((front.signed_distance(&x) - exact).abs() < 1e-7);
+            assert!((distance_of(&front, x) - exact).abs() < 1e-7);
         }
     }
 
@@ -276,6 +345,6 @@ mod tests {
         let motion = ExactMotion::new(ball(), Arc::new(rotation));
         let front = motion.front(std::f64::consts::FRAC_PI_2, 1.0 / 64.0, &Interrupt::default()).unwrap().unwrap();
         // A quarter turn takes the center to (0.25, 0.5).
-        assert!((front.signed_distance(&Vector::<2>::new(0.25, 0.8)) - 0.15).abs() < 1e-10);
+        assert!((distance_of(&front, Vector::<2>::new(0.25, 0.8)) - 0.15).abs() < 1e-10);
     }
 }

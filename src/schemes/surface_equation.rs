@@ -15,6 +15,8 @@ mod eigenmodes;
 mod evolution;
 mod field_bounds;
 pub mod fields;
+mod formula_field;
+mod formula_terms;
 mod geodesic_distance;
 mod format_1;
 mod material_cells;
@@ -37,8 +39,10 @@ pub use advection::{Advection, Course};
 pub use cloud::{Copies, SurfaceCloud};
 pub use curvature::Curvature;
 pub use eigenmodes::Eigenmodes;
-pub use evolution::{Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse};
+pub use evolution::{Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse, Source};
 pub use fields::ExactField;
+pub use formula_field::{FormulaField, Sites, VARIABLES};
+pub use formula_terms::{FormulaTerms, MOST_SPECIES};
 pub use geodesic_distance::GeodesicDistance;
 pub use method::{Form, Method};
 pub use motion::Motion;
@@ -46,7 +50,7 @@ pub use moving_surface::{MovingParts, MovingSurface};
 pub use pointwise::Pointwise;
 pub use poisson::{Condition, Poisson};
 pub use problem::Problem;
-pub use reactions::{Model, Reaction};
+pub use reactions::{Model, Reaction, Terms};
 pub use row_quality::RowQuality;
 pub use simulation::SurfaceEquation;
 pub use solver::Solver;
@@ -62,7 +66,7 @@ pub fn all_observables() -> Vec<&'static Quantity> {
 #[must_use]
 pub fn all_fields() -> Vec<&'static Quantity> {
     without_repetition(&[
-        &Evolution::shown_fields(true, true),
+        &Evolution::shown_fields(MOST_SPECIES, true),
         &Advection::<3>::shown_fields(true),
         &Pointwise::shown_fields(true),
         &Poisson::shown_fields(true),

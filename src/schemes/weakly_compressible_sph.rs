@@ -67,7 +67,7 @@ pub use config::{
 };
 pub use droplets::ball_curvature;
 pub use fluids::Fluid;
-pub use interactions::{BodyForce, TensionForce};
+pub use interactions::{BodyForce, FormulaForce, TensionForce};
 pub use kernel_choice::KernelChoice;
 pub use level_update::LevelUpdate;
 pub use pacing::measurement_interval;

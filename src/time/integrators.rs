@@ -1,10 +1,12 @@
-//! Integration of the path dx/dt = u(x, t) of one point in a prescribed flow, one file per scheme.
+//! Integration of paths dx/dt = u(x, t) in a prescribed flow, one file per scheme.
 
 pub mod dopri5;
 pub mod rk4;
 pub mod tvd_rk2;
 
 use crate::geometry::{Flow, Vector};
+use crate::parallel::{Interrupt, Interrupted};
+use std::sync::{Mutex, PoisonError};
 
 /// An integration scheme for paths.
 ///
@@ -29,15 +31,110 @@ pub enum PathIntegrator {
     },
 }
 
+/// Points whose paths are integrated together.
+pub const PATHS: usize = 64;
+
+/// Why points could not be carried along.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PathError {
+    /// The run was asked to drop the step.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+    /// The flow has no velocity at a place, which the text names.
+    #[error("{0}")]
+    Undefined(String),
+}
+
+/// The longer of two ways, or the first error: a reduction that keeps the order of its terms.
+///
+/// # Errors
+/// Those of the ways.
+pub fn longer(a: Result<f64, PathError>, b: Result<f64, PathError>) -> Result<f64, PathError> {
+    Ok(a?.max(b?))
+}
+
 impl PathIntegrator {
     /// The position at `time + step` of the point that is at `x` at `time`. A negative `step` goes back in time.
     #[must_use]
     pub fn advance<const D: usize>(self, flow: &dyn Flow<D>, x: &Vector<D>, time: f64, step: f64) -> Vector<D> {
-        match self {
-            Self::Rk4 => rk4::advance(flow, x, time, step),
-            Self::TvdRk2 => tvd_rk2::advance(flow, x, time, step),
-            Self::Dopri5 { tolerance } => dopri5::advance(flow, x, time, step, tolerance),
+        let mut point = [*x];
+        self.block::<D, 1>(flow, &mut point, time, step);
+        point[0]
+    }
+
+    /// Moves any number of points from `time` to `time + step`. Each ends where [`Self::advance`] takes it, to the last bit.
+    pub fn advance_all<const D: usize>(self, flow: &dyn Flow<D>, points: &mut [Vector<D>], time: f64, step: f64) {
+        for block in points.chunks_mut(PATHS) {
+            self.block::<D, PATHS>(flow, block, time, step);
         }
+    }
+
+    /// Moves up to [`PATHS`] points and returns the longest of their ways.
+    ///
+    /// # Errors
+    /// A raised interrupt, and a path that meets a place without a velocity. Without an explanation the end of a path may be not
+    /// finite.
+    pub fn carry<const D: usize>(
+        self,
+        flow: &dyn Flow<D>,
+        points: &mut [Vector<D>],
+        time: f64,
+        step: f64,
+        interrupt: &Interrupt,
+    ) -> Result<f64, PathError> {
+        interrupt.check()?;
+        let mut starts = [Vector::<D>::zeros(); PATHS];
+        let starts = &mut starts[..points.len()];
+        starts.copy_from_slice(points);
+        self.advance_all(flow, points, time, step);
+        let mut longest = 0.0_f64;
+        for (start, end) in starts.iter().zip(points) {
+            let way = (*end - *start).norm_squared();
+            if !way.is_finite()
+                && let Some(reason) = self.explain(flow, start, time, step)
+            {
+                return Err(PathError::Undefined(reason));
+            }
+            longest = longest.max(way);
+        }
+        Ok(longest.sqrt())
+    }
+
+    fn block<const D: usize, const N: usize>(self, flow: &dyn Flow<D>, points: &mut [Vector<D>], time: f64, step: f64) {
+        match self {
+            Self::Rk4 => rk4::advance::<D, N>(flow, points, time, step),
+            Self::TvdRk2 => tvd_rk2::advance::<D, N>(flow, points, time, step),
+            Self::Dopri5 { tolerance } => dopri5::advance::<D, N>(flow, points, time, step, tolerance),
+        }
+    }
+
+    /// Why a path does not end at a finite place, where the flow knows it: the first place on it without a velocity.
+    #[must_use]
+    pub fn explain<const D: usize>(self, flow: &dyn Flow<D>, x: &Vector<D>, time: f64, step: f64) -> Option<String> {
+        let recorder = Recorder { flow, first: Mutex::new(None) };
+        let _ = self.advance(&recorder, x, time, step);
+        let (place, time) = recorder.first.into_inner().unwrap_or_else(PoisonError::into_inner)?;
+        flow.fault(&place, time)
+    }
+}
+
+/// A flow that remembers the first place where it has no velocity.
+struct Recorder<'a, const D: usize> {
+    flow: &'a dyn Flow<D>,
+    first: Mutex<Option<(Vector<D>, f64)>>,
+}
+
+impl<const D: usize> Flow<D> for Recorder<'_, D> {
+    fn velocity(&self, x: &Vector<D>, time: f64) -> Vector<D> {
+        let velocity = self.flow.velocity(x, time);
+        if velocity.iter().any(|component| !component.is_finite()) {
+            self.first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert((*x, time));
+        }
+        velocity
+    }
+
+    fn top_speed(&self, low: &Vector<D>, high: &Vector<D>) -> f64 {
+        self.flow.top_speed(low, high)
     }
 }
 
@@ -64,6 +161,20 @@ mod tests {
             let error = |steps| (end(integrator, &flow, steps) - exact).norm().log2();
             let slope = (error(8) - error(64)) / 3.0;
             assert!((slope - order).abs() < 0.1, "{integrator:?}: order {slope}");
+        }
+    }
+
+    #[test]
+    fn many_points_end_where_single_ones_do() {
+        let flow = SingleVortex { period: Some(8.0) };
+        let starts: Vec<Vector<2>> =
+            (0..150).map(|k| Vector::<2>::new(0.1 + 0.005 * f64::from(k), 0.9 - 0.003 * f64::from(k))).collect();
+        for integrator in [PathIntegrator::Rk4, PathIntegrator::TvdRk2, PathIntegrator::Dopri5 { tolerance: 1e-9 }] {
+            let mut ends = starts.clone();
+            integrator.advance_all(&flow, &mut ends, 0.5, 1.5);
+            for (start, end) in starts.iter().zip(&ends) {
+                assert_eq!(integrator.advance(&flow, start, 0.5, 1.5), *end, "{integrator:?}");
+            }
         }
     }
 

@@ -13,6 +13,7 @@ pub use restart::RestartSpec;
 pub use sources::{BodyError, JobSource, NoSources, Origin, RestartSource, Sources};
 
 use crate::spec::forecast::{self, Forecast, WORKER_BASE_BYTES};
+use crate::spec::own_measures::{Kept, OwnMeasures};
 use crate::spec::run_options::{CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions};
 use meniscus::scene::{self, CloudSizes, CloudSource, Estimate, Scene};
 use meniscus::scenes::SCENES;
@@ -143,6 +144,7 @@ pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Res
     let estimate = scene.as_ref().map(|scene| scene.estimate(&sizes));
     if let (Some(scene), Some(estimate), Some(limits)) = (&scene, estimate, &limits) {
         errors.extend(check_operators(given, scene.as_ref(), &estimate));
+        errors.extend(check_measures(given, scene.as_ref()));
         errors.extend(check_memory(start.prefix, scene.as_ref(), &estimate, limits.memory_bytes));
     }
     if let (Some(source), Some(estimate)) = (&start.source, estimate) {
@@ -268,6 +270,14 @@ fn check_operators(given: Given, scene: &dyn Scene, estimate: &Estimate) -> Opti
         .then(|| Violation::new("/output/operators", "conflict", detail, format.to_json(), Value::Null))
 }
 
+/// What is wrong with the probes and measures for a scene.
+fn check_measures(given: Given, scene: &dyn Scene) -> Vec<Violation> {
+    let probes = given.read_inside(JobSpec::output(), OutputSpec::probes()).flatten();
+    let measures = given.read_inside(JobSpec::output(), OutputSpec::measures()).flatten();
+    let (probes, measures) = (probes.unwrap_or_default(), measures.unwrap_or_default());
+    OwnMeasures { probes: &probes.0, measures: &measures.0 }.plan(scene).err().unwrap_or_default()
+}
+
 /// The limits, with what the service gives where nothing is asked for.
 fn limits(given: Given, allowance: Allowance, errors: &mut Vec<Violation>) -> Option<Limits> {
     let mut granted = |asked: Option<u64>, name: &str, most: u64| {
@@ -307,8 +317,13 @@ fn check_end(source: &RestartSource, estimate: &Estimate) -> Option<Violation> {
 fn run_options(spec: &JobSpec, fields: Vec<String>, limits: Limits) -> RunOptions {
     let output = spec.output.clone().unwrap_or_default();
     let checkpoint = Checkpoints::from(spec.checkpoint.clone().unwrap_or_default());
-    let OutputSpec { every_time, series_every_steps, operators, .. } = output;
-    RunOptions { output: Output { every_time, fields, series_every_steps, operators }, checkpoint, limits }
+    let OutputSpec { every_time, series_every_steps, operators, probes, measures, .. } = output;
+    let (probes, measures) = (Kept(probes.unwrap_or_default()), Kept(measures.unwrap_or_default()));
+    RunOptions {
+        output: Output { every_time, fields, series_every_steps, probes, measures, operators },
+        checkpoint,
+        limits,
+    }
 }
 
 fn forecast(scene: &dyn Scene, estimate: Estimate, options: &RunOptions) -> Forecast {

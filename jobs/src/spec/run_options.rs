@@ -1,7 +1,8 @@
 //! Output, checkpoints and limits of a run: how they are declared, and what they are once everything is filled in.
 
+use crate::spec::own_measures::{Kept, MOST_MEASURES, MeasureSpec, OwnMeasures, ProbeSpec};
 use meniscus::simulation::OutputPlan;
-use meniscus::spec::{Json, NOT_NEGATIVE, Object, POSITIVE, Parameter, Violation, Word, whole};
+use meniscus::spec::{Items, Json, Listed, NOT_NEGATIVE, Object, POSITIVE, Parameter, Violation, Word, whole};
 use meniscus::{group, words};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -39,6 +40,10 @@ group! {
         fields: Option<FieldNames> => restart_safe;
         /// the operators that a scene makes, as files of this format
         operators: Option<OperatorFormat> => restart_safe;
+        /// fields at places in the series
+        probes: Option<Listed<ProbeSpec>>, in Items(0, MOST_MEASURES) => restart_safe;
+        /// integrals, means and extremes of formulas of fields in the series
+        measures: Option<Listed<MeasureSpec>>, in Items(0, MOST_MEASURES) => restart_safe;
         /// a series row every so many steps
         series_every_steps: u64 = 10, in whole(1, u64::MAX) => restart_safe;
     }
@@ -124,9 +129,23 @@ pub struct Output {
     pub fields: Vec<String>,
     /// Steps between rows of the series.
     pub series_every_steps: u64,
+    /// Fields at places in the series.
+    #[serde(default, skip_serializing_if = "Kept::is_empty")]
+    pub probes: Kept<ProbeSpec>,
+    /// Integrals, means and extremes in the series.
+    #[serde(default, skip_serializing_if = "Kept::is_empty")]
+    pub measures: Kept<MeasureSpec>,
     /// Format of the files of operators; none are written where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub operators: Option<OperatorFormat>,
+}
+
+impl Output {
+    /// Probes and measures.
+    #[must_use]
+    pub fn own_measures(&self) -> OwnMeasures<'_> {
+        OwnMeasures { probes: &self.probes.0.0, measures: &self.measures.0.0 }
+    }
 }
 
 /// When to write checkpoints.

@@ -223,7 +223,7 @@ impl From<&StepError> for Reason {
             StepError::TooFast { .. } => Self::DivergedCfl,
             StepError::TimeStepFloor { .. } => Self::DivergedDtFloor,
             StepError::Unsolved { .. } => Self::DivergedUnsolved,
-            StepError::NonFinite { .. } => Self::DivergedNonfinite,
+            StepError::NonFinite { .. } | StepError::Undefined { .. } => Self::DivergedNonfinite,
             StepError::Interrupted => Self::UserCancel,
         }
     }

@@ -6,6 +6,7 @@ use crate::spec::attempt_files;
 use crate::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
 use crate::spec::body::ResolvedBody;
 use crate::spec::health::FindingLog;
+use crate::spec::own_measures::check_fields;
 use crate::spec::records::{FileRecord, Record, RecordSink, Verdict};
 use crate::spec::run_options::RunOptions;
 use crate::spec::states::Reason;
@@ -22,7 +23,7 @@ use crate::worker::report;
 use meniscus::scene::{self, BuildContext, Scene};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
-use meniscus::simulation::{CpuClock, LoadError, RunError, Section, Simulation, StepError, run};
+use meniscus::simulation::{CpuClock, LoadError, Measures, RunError, Section, Simulation, StepError, run};
 use serde::Deserialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -133,7 +134,8 @@ fn attempt(
         let mut simulation = build(spec, scene.as_ref(), &options, control)?;
         let start = restore(spec, simulation.as_mut(), sink, log)?;
         progress.continue_phases(start.counters.phases.clone());
-        let mut observers = prepare(spec, directory, &options, control, sink, &start, (progress, log))?;
+        let measures = measures(&options, scene.as_ref(), simulation.as_ref())?;
+        let mut observers = prepare(spec, directory, (&options, measures), control, sink, &start, (progress, log))?;
         let step = simulation.clock().step;
         tell_start(&mut observers, &start, step)?;
         log.line(&format!("start at step {step}, {} particles", simulation.particle_count()));
@@ -222,6 +224,19 @@ fn build(
         let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
         Failure::Known(Reason::InputDamaged, cause)
     })
+}
+
+/// The probes and measures of a run.
+fn measures(options: &RunOptions, scene: &dyn Scene, simulation: &dyn Simulation) -> Result<Measures, Failure> {
+    let refuse = |cause: String| Failure::Known(Reason::InputDamaged, cause);
+    let planned = options.output.own_measures().plan(scene).map_err(|found| {
+        let cause = found.first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail));
+        refuse(cause)
+    })?;
+    match check_fields(&planned, simulation) {
+        Some(cause) => Err(refuse(cause)),
+        None => Ok(planned),
+    }
 }
 
 /// What an attempt goes on from.
@@ -315,7 +330,7 @@ fn refuse(
 fn prepare<'a>(
     spec: &AttemptSpec,
     directory: &Path,
-    options: &RunOptions,
+    (options, measures): (&RunOptions, Measures),
     control: &'a Control,
     sink: &'a mut dyn RecordSink,
     start: &Start,
@@ -338,7 +353,7 @@ fn prepare<'a>(
             counters.frames.clone(),
             counters.frames_before,
         ),
-        series: Series::open(directory, spec.epoch, plan, earlier)?,
+        series: Series::open(directory, spec.epoch, plan, measures, earlier)?,
         checkpoints: Checkpoints::new(
             directory.to_owned(),
             spec.job.clone(),

@@ -2,6 +2,7 @@
 
 use super::cases::{Case, DEFAULT_DIFFUSION};
 use super::formulation::{Scope, Start};
+use super::own_motion::formula_force;
 use super::spec::{
     Balance, DensityChoice, DiscretizationChoice, Droplet, FluidSpec, Fluids, ForceChoice, GeometryChoice, KernelWord,
     LatticeWord, Shifting,
@@ -41,13 +42,15 @@ impl Fluids {
     }
 }
 
-/// The body force in `D` dimensions.
+/// The body force in a box (lower corner and lengths) until a time.
 pub(super) fn body_force<const D: usize>(
     force: &ForceChoice,
     fluids: &Fluids,
+    extent: (&Vector<D>, &Vector<D>, f64),
     errors: &mut Vec<Violation>,
 ) -> Option<BodyForce<D>> {
     match force {
+        ForceChoice::Formula { acceleration, parameters } => formula_force(acceleration, parameters, extent, errors),
         ForceChoice::None => None,
         ForceChoice::Pulse { coefficient, duration, a, b, c } => {
             let lengths = Vector::<D>::from_fn(|d, _| [*a, *b, *c][d]);

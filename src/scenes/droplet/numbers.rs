@@ -33,6 +33,8 @@ pub(super) struct SceneNumbers {
     pub gravity: f64,
     /// Size of the velocity at the start.
     start_speed: f64,
+    /// Largest speed of the fluids at the start about that velocity.
+    own_speed: f64,
     /// Longest side of the box.
     length: f64,
 }
@@ -41,12 +43,12 @@ impl SceneNumbers {
     pub fn new<const D: usize>(
         shape: Option<&Shape>,
         [tension, largest_tension]: [f64; 2],
-        [gravity, start_speed]: [f64; 2],
+        [gravity, start_speed, own_speed]: [f64; 3],
         lengths: &Vector<D>,
     ) -> Self {
         let radius = shape.and_then(smallest_radius::<D>);
         let curvature = (D - 1) as f64 / radius.unwrap_or(0.5 * lengths.min());
-        Self { radius, curvature, tension, largest_tension, gravity, start_speed, length: lengths.max() }
+        Self { radius, curvature, tension, largest_tension, gravity, start_speed, own_speed, length: lengths.max() }
     }
 
     /// The largest speed that a scene is expected to reach, that of the start included.
@@ -57,7 +59,9 @@ impl SceneNumbers {
     /// The largest speed about the velocity of the start that a scene is expected to reach, 0.3 √(2τκ/ρ) + √(2gL).
     pub fn expected_inner_speed(&self, spec: &Droplet) -> f64 {
         let density = spec.fluids.inside.density.min(spec.fluids.outside.density);
-        TUNING.capillary * (2.0 * self.largest_tension * self.curvature / density).sqrt() + self.falling_speed()
+        TUNING.capillary * (2.0 * self.largest_tension * self.curvature / density).sqrt()
+            + self.falling_speed()
+            + self.own_speed
     }
 
     fn falling_speed(&self) -> f64 {
@@ -66,7 +70,8 @@ impl SceneNumbers {
 
     /// The least speed of sound of a fluid of the scene.
     pub fn least_sound_speed(&self, fluid: &FluidSpec) -> f64 {
-        least_sound_speed(fluid, self.radius, self.largest_tension, self.gravity * self.length)
+        let fall = (self.gravity * self.length).max(self.own_speed * self.own_speed);
+        least_sound_speed(fluid, self.radius, self.largest_tension, fall)
     }
 
     /// A warning for each fluid that is softer than c² = 100 max(τ/(ρR), gL).
@@ -89,7 +94,7 @@ impl SceneNumbers {
             let least = self.least_sound_speed(fluid);
             if fluid.sound_speed < 0.5 * least && !spec.allow_soft {
                 let detail = format!(
-                    "the fluid would be compressed: c² = 100 max(τ/(ρR), gL) asks for {least:.4}, half of it is the least; \
+                    "the fluid would be compressed: c² = 100 max(τ/(ρR), gL, u²) asks for {least:.4}, half of it is the least; \
                      allow_soft lets it through"
                 );
                 let pointer = format!("/fluids/{name}/sound_speed");

@@ -6,6 +6,7 @@ use super::flow::{FlowPlan, body_force};
 use super::formulation::{Scope, level_and_curvature, pressures};
 use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave};
 use super::numbers::SceneNumbers;
+use super::own_motion::{StartMotion, start_motion};
 use super::spec::{
     Corners, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen,
     TensionWord,
@@ -29,7 +30,7 @@ use crate::schemes::weakly_compressible_sph::{
     DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
     TensionLaw, WeaklyCompressibleSph, measurement_interval,
 };
-use crate::simulation::{Finding, OutputPlan, Quantity, Simulation};
+use crate::simulation::{Finding, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -37,6 +38,8 @@ use std::collections::BTreeMap;
 pub(super) struct DropletScene<const D: usize> {
     pub(super) spec: Droplet,
     pub(super) shape: Shape,
+    /// Motion of the fluids at the start, where it is given.
+    motion: Option<StartMotion>,
     pub(super) low: Vector<D>,
     pub(super) high: Vector<D>,
     lattice: StartLattice<D>,
@@ -172,16 +175,23 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let tension = *spec.surface_tension.get_or_insert(case.tension);
     let gravity = match spec.body_force.as_ref() {
         Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().map(|g| g * g).sum::<f64>().sqrt(),
-        Some(ForceChoice::Pulse { .. } | ForceChoice::None) | None => 0.0,
+        Some(ForceChoice::Pulse { .. } | ForceChoice::Formula { .. } | ForceChoice::None) | None => 0.0,
     };
     let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, &mut errors));
-    let speeds = [gravity, velocity.norm()];
+    let motion = start_motion::<D>(&spec, shape.as_ref().map(|(shape, _)| shape), &mut errors);
+    let own_speed = motion.as_ref().map_or(0.0, |motion| motion.top_speed(&low, &lengths));
+    let speeds = [gravity, velocity.norm(), own_speed];
     let start = StartBox { shape: shape.as_ref().map(|(shape, _)| shape), low, lengths };
     let tensions = [tension, tension * largest_tension(&spec, &start)];
     let numbers = SceneNumbers::new(start.shape, tensions, speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
     let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
+    let extent = (&low, &lengths, spec.end_time);
+    let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
+    let body_force = body_force(force, &spec.fluids, extent, &mut errors);
     let mut config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
+    config.body_force = body_force;
+    config.is_at_rest = motion.is_none();
     config.start_velocity = velocity;
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
     config.wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, &lengths));
@@ -208,7 +218,20 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         spec.time_step = given_step;
     }
     let clouds = points.into_iter().collect();
-    Ok(Box::new(DropletScene { spec, shape, low, high, lattice, numbers, config, time_step, steps, chosen, clouds }))
+    Ok(Box::new(DropletScene {
+        spec,
+        shape,
+        motion,
+        low,
+        high,
+        lattice,
+        numbers,
+        config,
+        time_step,
+        steps,
+        chosen,
+        clouds,
+    }))
 }
 
 /// What the scheme is made of; the spec gets what was left open.
@@ -220,8 +243,6 @@ fn sph_config<const D: usize>(
     given_step: Option<f64>,
     errors: &mut Vec<Violation>,
 ) -> SphConfig<D> {
-    let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
-    let body_force = body_force(force, &spec.fluids, errors);
     let pressure = pressures(spec, flow.scope, errors);
     SphConfig {
         spacing: spec.spacing,
@@ -240,12 +261,13 @@ fn sph_config<const D: usize>(
         discretization: flow.discretization,
         density: flow.density,
         is_shifted: *spec.shifting.get_or_insert(flow.default_shifting) == Shifting::Pst,
-        body_force,
+        body_force: None,
         integrator: match spec.integrator {
             IntegratorWord::KickDriftKick => Integrator::KickDriftKick,
             IntegratorWord::PredictorCorrector => Integrator::PredictorCorrector,
         },
         start_velocity: Vector::<D>::zeros(),
+        is_at_rest: true,
         wave: None,
         expected_speed,
         is_adaptive: given_step.is_none() && spec.steps.is_none(),
@@ -335,6 +357,14 @@ impl<const D: usize> Scene for DropletScene<D> {
 
     fn fields(&self) -> Vec<&'static Quantity> {
         weakly_compressible_sph::frame_fields::shown(&self.config)
+    }
+
+    fn regions(&self) -> Vec<Region> {
+        let mut regions = vec![Region::All, Region::Inside, Region::Outside];
+        if self.config.has_tension() && matches!(self.config.geometry, Geometry::Pcp { .. }) {
+            regions.push(Region::Interface);
+        }
+        regions
     }
 
     fn clouds(&self) -> Vec<CloudReference> {
@@ -446,7 +476,11 @@ impl<const D: usize> Scene for DropletScene<D> {
             (self.levels_of_points(&context, &positions).map_err(|found| vec![found])?, f64::NAN)
         };
         let cell = lengths.product() / self.count() as f64;
-        let drop = Drop { positions, level, measure };
+        let velocities = match &self.motion {
+            Some(motion) => Some(self.start_velocities(motion, &positions, &level)?),
+            None => None,
+        };
+        let drop = Drop { positions, level, velocities, measure };
         let system = SphSystem::new(self.config.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
             vec![Violation::new("/domain", "range", error.to_string(), self.spec.domain.to_json(), error.least)]
         })?;
@@ -456,6 +490,23 @@ impl<const D: usize> Scene for DropletScene<D> {
         let mut simulation = WeaklyCompressibleSph::new(system, self.time_step, end_time, plan, clock, chosen);
         simulation.course_mut().findings.extend(self.warnings());
         Ok(Box::new(simulation))
+    }
+}
+
+impl<const D: usize> DropletScene<D> {
+    /// Velocities of the particles at the start.
+    fn start_velocities(
+        &self,
+        motion: &StartMotion,
+        positions: &[Vector<D>],
+        level: &[f64],
+    ) -> Result<Vec<Vector<D>>, Vec<Violation>> {
+        // Points from outside have no parts.
+        let parts = self.shape.parts::<D>("/shape").unwrap_or_default();
+        let of_parts: Vec<Vec<f64>> = parts.iter().map(|part| self.levels(part.as_ref(), positions)).collect();
+        let nearest =
+            |i: usize| (0..of_parts.len()).min_by(|a, b| of_parts[*a][i].total_cmp(&of_parts[*b][i])).unwrap_or(0);
+        motion.at(positions, level, nearest).map_err(|found| vec![found])
     }
 }
 

@@ -1,5 +1,6 @@
 //! The parameters of a `droplet` scene.
 
+use crate::formulas::{Count, FormulaList, FormulaLists, NamedNumbers, constants};
 use crate::scenes::pcp_spec::PcpSpec;
 use crate::scenes::shapes::Shape;
 use crate::spec::choice::with_defaults;
@@ -275,6 +276,27 @@ crate::choice! {
             /// what balances the force in the periodic box; fluids of two densities need mean
             balance: Balance = Balance::None;
         }
+        /// a force of one's own
+        Formula = "formula" {
+            /// components of the acceleration: formulas of x, y, z, `inside` (1 in the drop, 0 elsewhere) and t
+            acceleration: FormulaList, in Count(2, 3);
+            /// numbers that the formulas call by name
+            parameters: NamedNumbers = constants();
+        }
+    }
+}
+
+crate::group! {
+    /// Velocities at the start, as formulas of x, y and z, or as numbers.
+    pub struct InitialVelocitySpec {
+        /// components in the fluid inside; 0 when not given
+        inside: Option<FormulaList>, in Count(2, 3);
+        /// components in each part of a union, instead of `inside`
+        parts: Option<FormulaLists>;
+        /// components in the fluid outside; 0 when not given
+        outside: Option<FormulaList>, in Count(2, 3);
+        /// numbers that the formulas call by name
+        parameters: NamedNumbers = constants();
     }
 }
 
@@ -314,6 +336,8 @@ crate::group! {
         spacing: f64 = 0.031_25, in POSITIVE;
         /// velocity of both fluids at the start; 0 when not given
         velocity: Option<Coordinates>;
+        /// velocities of the fluids at the start, on top of `velocity`; 0 when not given
+        initial_velocity: Option<InitialVelocitySpec>;
         /// scene time at the end
         end_time: f64 = 1.0, in POSITIVE => restart_safe;
         /// time step Δt, kept whatever the speeds; when neither it nor steps is given, the longest stable one, cut into parts

@@ -1,9 +1,11 @@
 //! From the law as a parameter to the law that moves a front.
 
 use super::spec::Law;
+use crate::formulas::FormulaText;
+use crate::geometry::Vector;
 use crate::scenes::gbpm_spec::Motion;
 use crate::schemes::grid_based_particle::FrontLaw;
-use crate::schemes::grid_based_particle::laws::{MeanCurvature, NormalSpeed, PrescribedFlow};
+use crate::schemes::grid_based_particle::laws::{FormulaSpeed, MeanCurvature, NormalSpeed, PrescribedFlow};
 use crate::spec::Violation;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -13,7 +15,7 @@ impl Law {
     pub fn ray_speed(&self) -> Option<f64> {
         match self {
             Self::GeometricalOptics { speed } => Some(*speed),
-            Self::Normal { .. } | Self::MeanCurvature | Self::Flow { .. } => None,
+            Self::Normal { .. } | Self::MeanCurvature | Self::Flow { .. } | Self::Formula { .. } => None,
         }
     }
 
@@ -22,7 +24,9 @@ impl Law {
         match self {
             Self::Flow { .. } => Motion::Flow,
             Self::MeanCurvature => Motion::Curvature,
-            Self::Normal { .. } | Self::GeometricalOptics { .. } => Motion::Speed,
+            // A parameter k cannot be told from the curvature before names are looked up; it is refused as a name.
+            Self::Formula { speed, .. } if mentions_curvature(speed) => Motion::Curvature,
+            Self::Normal { .. } | Self::GeometricalOptics { .. } | Self::Formula { .. } => Motion::Speed,
         }
     }
 
@@ -30,16 +34,29 @@ impl Law {
     ///
     /// # Errors
     /// Where the law does not exist in this dimension.
-    pub fn for_surface<const D: usize, const M: usize>(&self) -> Result<Arc<dyn FrontLaw<D, M>>, Violation> {
+    pub fn for_surface<const D: usize, const M: usize>(
+        &self,
+        end_time: f64,
+        flow_pointer: &str,
+        extent: (Vector<D>, Vector<D>),
+    ) -> Result<Arc<dyn FrontLaw<D, M>>, Vec<Violation>> {
         Ok(match self {
             Self::Normal { speed } => Arc::new(NormalSpeed { speed: *speed }),
             Self::MeanCurvature => Arc::new(MeanCurvature),
-            Self::Flow { flow } => Arc::new(PrescribedFlow::<D>::new(flow.flow::<D>()?.into())),
+            Self::Formula { speed, parameters } => {
+                Arc::new(FormulaSpeed::<D>::new(speed, parameters, extent, end_time, "/law")?)
+            }
+            Self::Flow { flow } => Arc::new(PrescribedFlow::<D>::new(flow.flow::<D>(end_time, flow_pointer)?.into())),
             Self::GeometricalOptics { .. } => {
                 let detail = "a wave front is a curve, not a surface of this dimension";
-                let allowed = json!(["normal", "mean_curvature", "flow"]);
-                return Err(Violation::new("/law/type", "conflict", detail, Value::Null, allowed));
+                let allowed = json!(["normal", "mean_curvature", "flow", "formula"]);
+                return Err(vec![Violation::new("/law/type", "conflict", detail, Value::Null, allowed)]);
             }
         })
     }
+}
+
+/// Whether a formula names the curvature.
+fn mentions_curvature(speed: &FormulaText) -> bool {
+    speed.0.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).any(|word| word == "k")
 }

@@ -4,11 +4,13 @@ use super::choice::{Completed, FrontChoice, FrontPlan, Resolved};
 use super::method::{BYTES, FrontQuestion, REFINED_BYTES, is_within_grid, labels, plan_method};
 use super::spec::Front;
 use super::wavefront;
+use crate::geometry::Vector;
 use crate::geometry::flows::Stretch;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::CloudSizes;
 use crate::scene::work::PhaseWork;
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
+use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::{error_units, path_units};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
 use crate::scenes::shapes::Shape;
@@ -86,9 +88,15 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
         Ok(surface) => errors.extend(check_extent(surface.as_ref(), 4.0 * choice.spacing, choice.spacing)),
         Err(found) => errors.extend(found.iter().cloned()),
     }
-    let law = choice.law.for_surface::<D, M>();
-    errors.extend(law.as_ref().err().map(|found| at_law(found.clone(), choice.pointer)));
+    // Where the motion of another scene is done as a front, its flow stands at the top.
+    let flow_pointer = if choice.pointer.is_empty() { "/law/flow" } else { "/flow" };
     let extent = surface.as_ref().ok().map(|surface| surface.bounding_box());
+    let about = extent.unwrap_or((Vector::<D>::zeros(), Vector::<D>::repeat(1.0)));
+    let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about);
+    errors.extend(law.as_ref().err().into_iter().flatten().cloned());
+    if let (Ok(law), Ok(surface)) = (&law, &surface) {
+        errors.extend(law.flow().and_then(|flow| check_return(flow, surface.as_ref(), flow_pointer)));
+    }
     let question = FrontQuestion {
         law: law.as_deref().ok(),
         extent,
@@ -96,16 +104,8 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
         is_within_grid: &|levels| extent.is_none_or(|extent| is_within_grid(extent, choice.spacing, levels)),
     };
     let plan = plan_method(&choice, &question, complete, errors)?;
-    let law = law.map_err(|found| vec![found])?;
+    let law = law?;
     Ok(Box::new(FrontScene { choice, law, plan }))
-}
-
-/// A violation of a flow, where the flow is a part of the law.
-fn at_law(mut violation: Violation, pointer: &str) -> Violation {
-    if pointer.is_empty() {
-        violation.pointer = format!("/law{}", violation.pointer);
-    }
-    violation
 }
 
 impl<const D: usize, const M: usize> FrontScene<D, M> {

@@ -1,5 +1,6 @@
 //! The parameters of a `front` scene.
 
+use crate::formulas::{FormulaText, NamedNumbers, constants};
 use crate::geometry::flows::FlowChoice;
 use crate::scenes::gbpm_spec::{GbpmSpec, TopologyWord};
 use crate::scenes::integrators::IntegratorChoice;
@@ -17,6 +18,13 @@ crate::choice! {
         }
         /// velocity −κ n
         MeanCurvature = "mean_curvature",
+        /// a speed of one's own along the outward normal
+        Formula = "formula" {
+            /// the speed: a formula of x, y, z, the normal nx, ny, nz, the curvature k (∇·n) and t
+            speed: FormulaText;
+            /// numbers that the formula calls by name
+            parameters: NamedNumbers = constants();
+        }
         /// a prescribed velocity field
         Flow = "flow" {
             /// the velocity field

@@ -3,9 +3,10 @@
 use super::spec::{FieldChoice, InitialChoice};
 use super::surfaces::Shape;
 use crate::geometry::Vector;
-use crate::schemes::surface_equation::ExactField;
+use crate::schemes::surface_equation::{ExactField, FormulaField};
 use crate::spec::{Coordinates, Parameter, Violation};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// Wave vector that is not given, by the extent of the surface.
 const DEFAULT_WAVE: [f64; 3] = [2.0, -1.0, 3.0];
@@ -79,6 +80,15 @@ impl Site<'_> {
                 ExactField::SinPlusCos { m: *m as u32 }
             }
             FieldChoice::PlaneWave { k } => ExactField::PlaneWave { k: self.wave_vector(k, errors) },
+            FieldChoice::Formula { value, parameters } => {
+                match FormulaField::new(value, parameters, self.pointer, "value") {
+                    Ok(field) => ExactField::Formula(Arc::new(field)),
+                    Err(found) => {
+                        errors.extend(found);
+                        ExactField::PlaneWave { k: Vector::<3>::from(DEFAULT_WAVE) }
+                    }
+                }
+            }
         }
     }
 

@@ -9,12 +9,21 @@ use crate::schemes::surface_equation::{Course, ExactField, Motion, MovingParts};
 use crate::spec::{Coordinates, Parameter, Violation};
 use serde_json::json;
 
+/// Where the motion stands in the scene.
+const POINTER: &str = "/problem/motion";
+
 /// A planned motion.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum MotionPlan {
-    Flow(FlowChoice),
-    Expansion { rate: f64, center: Vector<3> },
-    Normal { speed: f64 },
+    /// A flow, and the time at the end.
+    Flow(FlowChoice, f64),
+    Expansion {
+        rate: f64,
+        center: Vector<3>,
+    },
+    Normal {
+        speed: f64,
+    },
 }
 
 /// A place, with as many numbers as the space has dimensions.
@@ -33,12 +42,13 @@ pub(super) fn place(numbers: &Coordinates, shape: &Shape, pointer: &str, errors:
 pub(super) fn plan(choice: &MotionChoice, shape: &Shape, end_time: f64, errors: &mut Vec<Violation>) -> MotionPlan {
     match choice {
         MotionChoice::Flow(flow) => {
-            let refused = if shape.is_curve() { flow.flow::<2>().err() } else { flow.flow::<3>().err() };
-            errors.extend(refused.map(|refused| {
-                let pointer = refused.pointer.replacen("/flow", "/problem/motion", 1);
-                Violation { pointer, ..refused }
-            }));
-            MotionPlan::Flow(flow.clone())
+            let refused = if shape.is_curve() {
+                flow.flow::<2>(end_time, POINTER).err()
+            } else {
+                flow.flow::<3>(end_time, POINTER).err()
+            };
+            errors.extend(refused.into_iter().flatten());
+            MotionPlan::Flow(flow.clone(), end_time)
         }
         MotionChoice::Expansion { rate, center } => {
             let at = "/problem/motion/center";
@@ -58,13 +68,13 @@ pub(super) fn plan(choice: &MotionChoice, shape: &Shape, end_time: f64, errors: 
 
 impl MotionPlan {
     /// Whether [`Self::course`] knows the field.
-    pub fn has_course(&self, field: ExactField, diffusivity: f64, shape: &Shape) -> bool {
+    pub fn has_course(&self, field: &ExactField, diffusivity: f64, shape: &Shape) -> bool {
         self.course(field, diffusivity, shape, Vec::new()).is_some()
     }
 
     /// An eigenfunction on a circle or a sphere whose radius R(t) alone changes, with values at the start: these times
     /// (R₀/R)^M exp(−λ₀ R₀² d ∫ dt/R²).
-    fn course(&self, field: ExactField, diffusivity: f64, shape: &Shape, values: Vec<f64>) -> Option<Course> {
+    fn course(&self, field: &ExactField, diffusivity: f64, shape: &Shape, values: Vec<f64>) -> Option<Course> {
         let radius = shape.radius()?;
         let decay = diffusivity * field.decay(radius)? * radius * radius;
         let power = if shape.is_curve() { 1 } else { 2 };
@@ -86,7 +96,7 @@ impl MotionPlan {
                 };
                 Box::new(share)
             }
-            Self::Expansion { .. } | Self::Flow(_) => return None,
+            Self::Expansion { .. } | Self::Flow(..) => return None,
         };
         Some(Box::new(move |time| {
             let share = share(time);
@@ -100,13 +110,13 @@ impl MotionPlan {
     /// One [`Violation`] where the flow does not exist in the dimension of the surface.
     pub fn parts<const D: usize>(
         &self,
-        field: ExactField,
+        field: &ExactField,
         diffusivity: f64,
         shape: &Shape,
         values: &[f64],
     ) -> Result<MovingParts<D>, Vec<Violation>> {
         let motion = match self {
-            Self::Flow(flow) => Motion::Flow(flow.flow::<D>().map_err(|refused| vec![refused])?),
+            Self::Flow(flow, end_time) => Motion::Flow(flow.flow::<D>(*end_time, POINTER)?),
             Self::Expansion { rate, center } => {
                 Motion::Expansion { rate: *rate, center: Vector::<D>::from_fn(|d, _| center[d]) }
             }

@@ -73,7 +73,7 @@ impl ProblemChoice {
                 vec![PhaseWork::every_step("solver/solution", 20.0 * application * steps)]
             }
             Self::Evolution { start, integrator, .. } => {
-                let fields = if let Start::Reaction { .. } = start { 2.0 } else { 1.0 };
+                let fields = start.fields();
                 let inner = if let EvolutionIntegrator::Controlled { .. } = integrator { inner_steps } else { 1.0 };
                 vec![PhaseWork::every_step("evolution", 6.0 * fields * application * steps * inner)]
             }
@@ -85,7 +85,7 @@ impl ProblemChoice {
     pub fn inner_steps(&self, time_step: f64, spacing: f64, reach: f64) -> f64 {
         let rate = match self {
             Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => {
-                diffusivity[0].max(diffusivity[1]) / (2.0 * spacing * spacing)
+                diffusivity.iter().copied().fold(0.0, f64::max) / (2.0 * spacing * spacing)
             }
             Self::Advection { velocity, diffusivity, .. } => {
                 2.0 * velocity.top_speed(reach) / spacing + 4.0 * diffusivity / (spacing * spacing)

@@ -13,34 +13,90 @@ use crate::geometry::random::CounterRandom;
 use crate::operators::charts::tangent::Metric;
 use crate::schemes::surface_equation::{
     Advection, Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse,
-    ExactField, GeodesicDistance, Model, MovingSurface, Pointwise, Poisson, Problem, Reaction, Solver, SurfaceCloud,
-    SurfaceGradient, surface_gradient,
+    ExactField, FormulaField, FormulaTerms, GeodesicDistance, Model, MovingSurface, Pointwise, Poisson, Problem,
+    Reaction, Sites, Solver, Source, SurfaceCloud, SurfaceGradient, Terms, surface_gradient,
 };
 use crate::simulation::Quantity;
 use crate::spec::{Choice, Parameter, Places, Violation};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// The planned problem.
 #[derive(Debug, Clone)]
 pub(super) enum ProblemChoice {
-    LaplaceBeltrami { field: ExactField },
-    Gradient { field: ExactField },
-    Poisson { field: ExactField, is_dirichlet: bool, solver: Solver },
-    Curvature { of_heights: bool },
-    Eigenvalues { count: usize },
-    GeodesicDistance { from: Option<Vec<Vector<3>>> },
-    Moving { initial: ExactField, motion: MotionPlan, diffusivity: f64, end_time: f64, time_step: f64 },
-    Advection { initial: ExactField, velocity: Velocity, diffusivity: f64, end_time: f64, time_step: f64 },
-    Evolution { start: Start, end_time: f64, time_step: f64, integrator: EvolutionIntegrator },
+    LaplaceBeltrami {
+        field: ExactField,
+    },
+    Gradient {
+        field: ExactField,
+    },
+    /// `has_source`: the field is the right-hand side, and no exact solution is known.
+    Poisson {
+        field: ExactField,
+        has_source: bool,
+        is_dirichlet: bool,
+        solver: Solver,
+    },
+    Curvature {
+        of_heights: bool,
+    },
+    Eigenvalues {
+        count: usize,
+    },
+    GeodesicDistance {
+        from: Option<Vec<Vector<3>>>,
+    },
+    Moving {
+        initial: ExactField,
+        motion: MotionPlan,
+        diffusivity: f64,
+        end_time: f64,
+        time_step: f64,
+    },
+    Advection {
+        initial: ExactField,
+        velocity: Velocity,
+        diffusivity: f64,
+        end_time: f64,
+        time_step: f64,
+    },
+    Evolution {
+        start: Start,
+        end_time: f64,
+        time_step: f64,
+        integrator: EvolutionIntegrator,
+    },
 }
 
 /// What evolves from where.
 #[derive(Debug, Clone)]
 pub(super) enum Start {
-    Field(ExactField),
-    Reaction { model: Model, diffusivity: [f64; 2], noise: f64, manufactured: Option<ExactField> },
+    Field(ExactField, Option<Arc<FormulaField>>),
+    Reaction {
+        terms: Terms,
+        initial: Vec<Arc<FormulaField>>,
+        diffusivity: Vec<f64>,
+        noise: f64,
+        manufactured: Option<ExactField>,
+    },
 }
 
+impl Start {
+    /// Number of fields that evolve, those weighed more whose terms are long formulas.
+    pub fn fields(&self) -> f64 {
+        match self {
+            Self::Field(..) => 1.0,
+            // Twenty operations cost about as much as a row of the operator.
+            Self::Reaction { terms: Terms::Formulas(terms), diffusivity, .. } => {
+                diffusivity.len() as f64 + terms.operations() as f64 / 20.0
+            }
+            Self::Reaction { diffusivity, .. } => diffusivity.len() as f64,
+        }
+    }
+}
+
+/// Where the field of a problem stands.
+const FIELD: &str = "/problem/field";
 /// Steps of a run whose Δt is not given.
 const DEFAULT_STEPS: f64 = 100.0;
 
@@ -68,14 +124,22 @@ pub(super) fn plan(
             let field = field.get_or_insert(FieldChoice::PlaneWave { k: None });
             ProblemChoice::Gradient { field: site("/problem/field").field(field, errors) }
         }
-        ProblemSpec::Poisson { field, condition } => {
-            let field = field.get_or_insert_with(|| default_field(shape));
-            let field = site("/problem/field").field(field, errors);
+        ProblemSpec::Poisson { field, source, condition } => {
             check_poisson(shape, *condition, name, errors);
-            ProblemChoice::Poisson { field, is_dirichlet: *condition == ConditionWord::Dirichlet, solver }
+            let has_source = source.is_some();
+            check_source(field.as_ref(), source.as_ref(), *condition, errors);
+            let field = match source {
+                Some(source) => site("/problem/source").field(source, errors),
+                None => site("/problem/field").field(field.get_or_insert_with(|| default_field(shape)), errors),
+            };
+            ProblemChoice::Poisson { field, has_source, is_dirichlet: *condition == ConditionWord::Dirichlet, solver }
         }
-        ProblemSpec::Diffusion { initial, end_time, time_step, integrator, .. } => {
-            let start = Start::Field(start(site("/problem/initial"), initial, errors));
+        ProblemSpec::Diffusion { initial, source, parameters, end_time, time_step, integrator, .. } => {
+            let source = source.as_ref().and_then(|source| {
+                let field = FormulaField::new(source, parameters, "/problem", "source");
+                field.map(Arc::new).map_err(|found| errors.extend(found)).ok()
+            });
+            let start = Start::Field(start(site("/problem/initial"), initial, errors), source);
             let integrator = match integrator.get_or_insert_with(|| default_integrator(shape)) {
                 EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
                 EvolutionChoice::Bdf2 => EvolutionIntegrator::Bdf2(solver),
@@ -136,12 +200,28 @@ fn reaction_diffusion(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<Vi
         return None;
     };
     let exact = manufactured.as_mut().map(|field| site.field(field, errors));
-    if let (Shape::Points(_), Some(_)) = (site.shape, exact) {
+    if let (Shape::Points(_), Some(_)) = (site.shape, &exact) {
         let detail = "forcing takes the exact operator, which is not known on points from outside";
         errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
     }
-    let diffusivity = [*diffusivity, *second_diffusivity];
-    let start = Start::Reaction { model: reaction(model), diffusivity, noise: *noise, manufactured: exact };
+    let both = vec![*diffusivity, *second_diffusivity];
+    let (terms, initial, diffusivity) = match model {
+        ModelChoice::Formula { .. } => {
+            if exact.is_some() {
+                let detail = "forcing belongs to the models; formulas can have their own";
+                errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
+            }
+            formula_reaction(model, errors)?
+        }
+        ModelChoice::GrayScott { feed, kill } => {
+            (Terms::Model(Model::GrayScott { feed: *feed, kill: *kill }), Vec::new(), both)
+        }
+        ModelChoice::Brusselator { a, b } => (Terms::Model(Model::Brusselator { a: *a, b: *b }), Vec::new(), both),
+        ModelChoice::Schnakenberg { a, b, gamma } => {
+            (Terms::Model(Model::Schnakenberg { a: *a, b: *b, gamma: *gamma }), Vec::new(), both)
+        }
+    };
+    let start = Start::Reaction { terms, initial, diffusivity, noise: *noise, manufactured: exact };
     let integrator = explicit(*tolerance, *time_step);
     let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
     Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
@@ -170,12 +250,52 @@ fn default_integrator(shape: &Shape) -> EvolutionChoice {
     }
 }
 
-/// The reaction of a choice.
-fn reaction(choice: &ModelChoice) -> Model {
-    match *choice {
-        ModelChoice::GrayScott { feed, kill } => Model::GrayScott { feed, kill },
-        ModelChoice::Brusselator { a, b } => Model::Brusselator { a, b },
-        ModelChoice::Schnakenberg { a, b, gamma } => Model::Schnakenberg { a, b, gamma },
+/// Terms, fields at the start and diffusivities of a reaction.
+type ReactionParts = (Terms, Vec<Arc<FormulaField>>, Vec<f64>);
+
+/// A reaction by formulas; None, with errors, where something is wrong with it.
+fn formula_reaction(model: &ModelChoice, errors: &mut Vec<Violation>) -> Option<ReactionParts> {
+    const POINTER: &str = "/problem/model";
+    let ModelChoice::Formula { species, rates, diffusivities, initial, parameters } = model else { return None };
+    let before = errors.len();
+    for (name, found) in [("diffusivities", diffusivities.len()), ("initial", initial.0.len())] {
+        if found != species.len() {
+            let detail = format!("there are {} substances, and {found} of these", species.len());
+            errors.push(Violation::new(format!("{POINTER}/{name}"), "conflict", detail, found, json!(species.len())));
+        }
+    }
+    let terms = FormulaTerms::new(species, rates, parameters, POINTER);
+    let terms = terms.map_err(|found| errors.extend(found)).ok();
+    let starts: Vec<Option<Arc<FormulaField>>> = initial
+        .at("initial")
+        .iter()
+        .map(|(place, text)| {
+            let field = FormulaField::new(text, parameters, POINTER, place);
+            field.map(Arc::new).map_err(|found| errors.extend(found)).ok()
+        })
+        .collect();
+    let starts: Option<Vec<_>> = starts.into_iter().collect();
+    (errors.len() == before).then_some((Terms::Formulas(terms?), starts?, diffusivities.clone()))
+}
+
+/// What a source of a Poisson equation does not go together with.
+fn check_source(
+    field: Option<&FieldChoice>,
+    source: Option<&FieldChoice>,
+    condition: ConditionWord,
+    errors: &mut Vec<Violation>,
+) {
+    if source.is_none() {
+        return;
+    }
+    if field.is_some() {
+        let detail = "the right-hand side is that of a field, or a source; give one of them";
+        errors.push(Violation::new("/problem/field", "conflict", detail, field.map(Choice::name), Value::Null));
+    }
+    if condition == ConditionWord::Dirichlet {
+        let detail = "points hold the exact solution, which is not known of a source";
+        let at = "/problem/condition";
+        errors.push(Violation::new(at, "conflict", detail, condition.to_json(), json!(["zero_mean"])));
     }
 }
 
@@ -193,8 +313,24 @@ fn check_poisson(shape: &Shape, condition: ConditionWord, name: &str, errors: &m
 }
 
 /// A field at the points of a cloud.
-fn values<const D: usize>(field: &ExactField, cloud: &SurfaceCloud<D>) -> Vec<f64> {
-    cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect()
+///
+/// # Errors
+/// One [`Violation`] where a formula has no value.
+fn values<const D: usize>(
+    field: &ExactField,
+    cloud: &SurfaceCloud<D>,
+    pointer: &str,
+) -> Result<Vec<f64>, Vec<Violation>> {
+    if let ExactField::Formula(formula) = field {
+        let told = formula.values(&sites(cloud), 0.0);
+        return told.map_err(|fault| vec![Violation::new(pointer, "data", fault, formula.text(), Value::Null)]);
+    }
+    Ok(cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect())
+}
+
+/// The unknowns of a cloud as sites of formulas.
+fn sites<const D: usize>(cloud: &SurfaceCloud<D>) -> Sites {
+    Sites::new(&cloud.points[..cloud.rows], &cloud.normals[..cloud.rows])
 }
 
 /// Δ_S of it, by the exact normals and curvatures of a shape that has them.
@@ -203,7 +339,8 @@ fn operated<const D: usize>(field: &ExactField, shape: &Shape, cloud: &SurfaceCl
         let x = raised(x);
         Some(field.laplace_beltrami(&x, &shape.normal(&x)?, *curvature))
     };
-    let is_known = cloud.curvatures.len() == cloud.rows;
+    let is_of_place = !matches!(field, ExactField::Formula(formula) if !formula.is_of_place());
+    let is_known = cloud.curvatures.len() == cloud.rows && is_of_place;
     is_known.then(|| cloud.points.iter().zip(&cloud.curvatures).map(at).collect()).flatten()
 }
 
@@ -244,24 +381,27 @@ impl ProblemChoice {
     pub fn fields(&self, shape: &Shape) -> Vec<&'static Quantity> {
         let is_exact = !matches!(shape, Shape::Points(_));
         match self {
-            Self::LaplaceBeltrami { .. } => Pointwise::shown_fields(is_exact),
+            Self::LaplaceBeltrami { field } => {
+                let is_of_place = !matches!(field, ExactField::Formula(formula) if !formula.is_of_place());
+                Pointwise::shown_fields(is_exact && is_of_place)
+            }
             Self::Gradient { .. } => surface_gradient::shown_fields(),
-            Self::Poisson { .. } => Poisson::shown_fields(is_exact),
+            Self::Poisson { has_source, .. } => Poisson::shown_fields(is_exact && !has_source),
             Self::Curvature { .. } => Curvature::shown_fields(shape.dimension()),
             Self::Eigenvalues { .. } => Eigenmodes::shown_fields(),
             Self::GeodesicDistance { .. } => GeodesicDistance::shown_fields(),
             Self::Moving { motion, initial, diffusivity, .. } => {
-                MovingSurface::<3>::shown_fields(motion.has_course(*initial, *diffusivity, shape))
+                MovingSurface::<3>::shown_fields(motion.has_course(initial, *diffusivity, shape))
             }
             Self::Advection { velocity, initial, diffusivity, .. } => {
-                Advection::<3>::shown_fields(velocity.has_course(*initial, *diffusivity, shape))
+                Advection::<3>::shown_fields(velocity.has_course(initial, *diffusivity, shape))
             }
-            Self::Evolution { start: Start::Field(field), .. } => Evolution::shown_fields(
-                false,
-                matches!(field, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. }),
-            ),
-            Self::Evolution { start: Start::Reaction { manufactured, .. }, .. } => {
-                Evolution::shown_fields(true, manufactured.is_some())
+            Self::Evolution { start: Start::Field(field, source), .. } => {
+                let is_mode = matches!(field, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. });
+                Evolution::shown_fields(1, is_mode && source.is_none())
+            }
+            Self::Evolution { start: Start::Reaction { diffusivity, manufactured, .. }, .. } => {
+                Evolution::shown_fields(diffusivity.len(), manufactured.is_some())
             }
         }
     }
@@ -269,7 +409,7 @@ impl ProblemChoice {
     /// The field that is operated on, its values and its exact operator.
     pub fn known(&self, shape: &Shape, cloud: &SurfaceCloud<3>) -> Option<(ExactField, Vec<f64>, Vec<f64>)> {
         let Self::LaplaceBeltrami { field } = self else { return None };
-        Some((*field, values(field, cloud), operated(field, shape, cloud)?))
+        Some((field.clone(), values(field, cloud, FIELD).ok()?, operated(field, shape, cloud)?))
     }
 
     /// The problem on a surface that stays.
@@ -286,14 +426,14 @@ impl ProblemChoice {
         Ok(match self {
             Self::Moving { .. } => return Err(Vec::new()),
             Self::LaplaceBeltrami { field } => {
-                Box::new(Pointwise::new(values(field, cloud), operated(field, shape, cloud)))
+                Box::new(Pointwise::new(values(field, cloud, FIELD)?, operated(field, shape, cloud)))
             }
             Self::Gradient { field } => {
                 let at = |x: &Vector<D>| field.gradient(&raised(x), &shape.normal(&raised(x))?);
                 let exact: Option<Vec<Vector<3>>> = cloud.points[..cloud.rows].iter().map(at).collect();
                 let flat = |g: &Vector<3>| Vector::<D>::from_fn(|d, _| g[d]);
                 let exact = exact.map(|exact| exact.iter().map(flat).collect());
-                Box::new(SurfaceGradient::new(values(field, cloud), exact))
+                Box::new(SurfaceGradient::new(values(field, cloud, FIELD)?, exact))
             }
             Self::Eigenvalues { count } => {
                 let shift = -shape.least_eigenvalue();
@@ -301,7 +441,7 @@ impl ProblemChoice {
             }
             Self::Advection { initial, velocity, diffusivity, .. } => {
                 let (values, at) = (start_values(initial, cloud)?, |x: &Vector<D>, n: &Vector<D>| velocity.at(x, n));
-                let course = velocity.course(*initial, *diffusivity, shape, cloud);
+                let course = velocity.course(initial, *diffusivity, shape, cloud);
                 if D == 2 {
                     Box::new(Advection::new::<1>(values, &at, *diffusivity, course, cloud))
                 } else {
@@ -310,8 +450,8 @@ impl ProblemChoice {
             }
             Self::GeodesicDistance { from } => Box::new(distance(from.as_deref(), shape, cloud)),
             Self::Curvature { of_heights } => Box::new(Curvature::new(cloud.rows, *of_heights)),
-            Self::Poisson { field, is_dirichlet, solver } => {
-                let values = values(field, cloud);
+            Self::Poisson { field, has_source, is_dirichlet, solver } => {
+                let values = values(field, cloud, if *has_source { "/problem/source" } else { FIELD })?;
                 let condition = if !cloud.held.is_empty() {
                     Condition::Dirichlet(cloud.held.clone())
                 } else if *is_dirichlet {
@@ -319,16 +459,23 @@ impl ProblemChoice {
                 } else {
                     Condition::ZeroMean { alpha: shape.least_eigenvalue() }
                 };
-                let (right, exact) = match operated(field, shape, cloud) {
+                let operated = if *has_source { None } else { operated(field, shape, cloud) };
+                let (right, exact) = match operated {
                     Some(operated) => (operated, Some(values)),
                     None => (values, None),
                 };
                 Box::new(Poisson::new(right, exact, condition, *solver, cloud))
             }
             Self::Evolution { start, integrator, .. } => {
-                let (initial, reaction, exact) = begin(start, shape, cloud, seed);
-                check_not_zero(&initial[..cloud.rows])?;
-                let parts = EvolutionParts { initial, reaction, time_step, integrator: *integrator, exact };
+                let (initial, reaction, exact) = begin(start, shape, cloud, seed)?;
+                let source = match start {
+                    Start::Field(_, Some(field)) => Some(Source { field: Arc::clone(field), sites: sites(cloud) }),
+                    _ => None,
+                };
+                if source.is_none() {
+                    check_not_zero(&initial[..cloud.rows])?;
+                }
+                let parts = EvolutionParts { initial, reaction, source, time_step, integrator: *integrator, exact };
                 Box::new(Evolution::new(parts, cloud))
             }
         })
@@ -352,7 +499,7 @@ pub(super) fn start_values<const D: usize>(
     field: &ExactField,
     cloud: &SurfaceCloud<D>,
 ) -> Result<Vec<f64>, Vec<Violation>> {
-    let values = values(field, cloud);
+    let values = values(field, cloud, "/problem/initial")?;
     check_not_zero(&values).map(|()| values)
 }
 
@@ -387,40 +534,95 @@ fn held<const D: usize>(shape: &Shape, cloud: &SurfaceCloud<D>) -> Vec<usize> {
 }
 
 /// Fields at the start, the reaction, and what is known of the course.
+type Beginning = (Vec<f64>, Option<Reaction>, ExactCourse);
+
+/// How an evolution begins.
 fn begin<const D: usize>(
     start: &Start,
     shape: &Shape,
     cloud: &SurfaceCloud<D>,
     seed: u64,
-) -> (Vec<f64>, Option<Reaction>, ExactCourse) {
+) -> Result<Beginning, Vec<Violation>> {
     match start {
-        Start::Field(field) => {
-            let exact = field.decay(shape.reach()).map_or(ExactCourse::Unknown, ExactCourse::Decay);
-            (values(field, cloud), None, exact)
+        Start::Field(field, source) => {
+            let decay = field.decay(shape.reach()).filter(|_| source.is_none());
+            let exact = decay.map_or(ExactCourse::Unknown, ExactCourse::Decay);
+            Ok((values(field, cloud, "/problem/initial")?, None, exact))
         }
-        Start::Reaction { model, diffusivity, noise, manufactured } => {
-            let known = |field: &ExactField| Some((values(field, cloud), operated(field, shape, cloud)?));
-            let known = manufactured.as_ref().and_then(known);
-            let is_exact = known.is_some();
-            let reaction = Reaction { model: *model, diffusivity: *diffusivity, manufactured: known };
-            let random = CounterRandom::new(seed ^ 0x7265_6163);
-            let rest = model.rest();
-            let at = |i: usize| match (&reaction.manufactured, model) {
-                (Some((field, _)), _) => reaction.exact(field[i], 0.0),
-                (None, Model::GrayScott { .. }) => {
-                    // The second substance is sown on a cap.
-                    let [u, v] = if shape.is_on_cap(&raised(&cloud.points[i])) { [0.5, 0.25] } else { rest };
-                    let off = noise * random.symmetric(&[i as i64]);
-                    [u, v * (1.0 + off)]
+        Start::Reaction { terms, initial, diffusivity, noise, manufactured } => {
+            let known = match manufactured {
+                Some(field) => {
+                    let values = values(field, cloud, "/problem/manufactured")?;
+                    operated(field, shape, cloud).map(|operated| (values, operated))
                 }
-                (None, Model::Brusselator { .. } | Model::Schnakenberg { .. }) => {
-                    [0, 1].map(|k| rest[k] * (1.0 + noise * random.symmetric(&[i as i64, k as i64])))
+                None => None,
+            };
+            let exact = if known.is_some() { ExactCourse::Manufactured } else { ExactCourse::Unknown };
+            let random = CounterRandom::new(seed ^ 0x7265_6163);
+            let (terms, values) = match terms {
+                Terms::Formulas(terms) => {
+                    let values =
+                        starts_of_formulas(initial, cloud, |i, k| noise * random.symmetric(&[i as i64, k as i64]))?;
+                    (Terms::Formulas(terms.with_sites(sites(cloud))), values)
+                }
+                Terms::Model(model) => {
+                    let disturbed = Disturbed { model: *model, noise: *noise, random };
+                    (Terms::Model(*model), disturbed.values(known.as_ref().map(|(field, _)| &field[..]), shape, cloud))
                 }
             };
-            let both: Vec<[f64; 2]> = (0..cloud.rows).map(at).collect();
-            let values = both.iter().map(|b| b[0]).chain(both.iter().map(|b| b[1])).collect();
-            let exact = if is_exact { ExactCourse::Manufactured } else { ExactCourse::Unknown };
-            (values, Some(reaction), exact)
+            let reaction = Reaction { terms, diffusivity: diffusivity.clone(), manufactured: known };
+            Ok((values, Some(reaction), exact))
         }
+    }
+}
+
+/// Substances by formulas at the start, with a random disturbance by their values.
+fn starts_of_formulas<const D: usize>(
+    initial: &[Arc<FormulaField>],
+    cloud: &SurfaceCloud<D>,
+    noise: impl Fn(usize, usize) -> f64,
+) -> Result<Vec<f64>, Vec<Violation>> {
+    let sites = sites(cloud);
+    let mut values = Vec::with_capacity(initial.len() * cloud.rows);
+    let mut errors = Vec::new();
+    for (k, field) in initial.iter().enumerate() {
+        match field.values(&sites, 0.0) {
+            Ok(found) => values.extend(found.iter().enumerate().map(|(i, value)| value * (1.0 + noise(i, k)))),
+            Err(fault) => {
+                let at = format!("/problem/model/initial/{k}");
+                errors.push(Violation::new(at, "data", fault, field.text(), Value::Null));
+            }
+        }
+    }
+    if errors.is_empty() { Ok(values) } else { Err(errors) }
+}
+
+/// The state of a model without a pattern, disturbed.
+struct Disturbed {
+    model: Model,
+    noise: f64,
+    random: CounterRandom,
+}
+
+impl Disturbed {
+    /// Both substances at the points; `field` is that of a manufactured solution.
+    fn values<const D: usize>(&self, field: Option<&[f64]>, shape: &Shape, cloud: &SurfaceCloud<D>) -> Vec<f64> {
+        let Self { model, noise, random } = self;
+        let rest = model.rest();
+        let exact = Reaction { terms: Terms::Model(*model), diffusivity: Vec::new(), manufactured: None };
+        let at = |i: usize| match (field, model) {
+            (Some(field), _) => exact.exact(field[i], 0.0),
+            (None, Model::GrayScott { .. }) => {
+                // The second substance is sown on a cap.
+                let [u, v] = if shape.is_on_cap(&raised(&cloud.points[i])) { [0.5, 0.25] } else { rest };
+                let off = noise * random.symmetric(&[i as i64]);
+                [u, v * (1.0 + off)]
+            }
+            (None, Model::Brusselator { .. } | Model::Schnakenberg { .. }) => {
+                [0, 1].map(|k| rest[k] * (1.0 + noise * random.symmetric(&[i as i64, k as i64])))
+            }
+        };
+        let both: Vec<[f64; 2]> = (0..cloud.rows).map(at).collect();
+        both.iter().map(|b| b[0]).chain(both.iter().map(|b| b[1])).collect()
     }
 }

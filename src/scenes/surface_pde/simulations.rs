@@ -37,7 +37,7 @@ pub(super) fn build<const D: usize, const M: usize>(
 ) -> Result<Box<dyn Simulation>, Vec<Violation>> {
     if let ProblemChoice::Moving { initial, motion, diffusivity, .. } = problem {
         let values = start_values(initial, &cloud)?;
-        let parts = motion.parts::<D>(*initial, *diffusivity, shape, &values)?;
+        let parts = motion.parts::<D>(initial, *diffusivity, shape, &values)?;
         let moving = MovingSurface::new(cloud, values, parts, fixed, interrupt, cpu_clock);
         return Ok(Box::new(match outside {
             Some(Outside { origin, findings, marks, counted }) => moving.on_points(origin, (findings, marks), counted),

@@ -1,9 +1,11 @@
 //! The parameters of a `surface_pde` scene.
 
 use super::transport_spec::{MotionChoice, VelocityChoice};
+use crate::formulas::{Count, FormulaList, FormulaText, NamedNumbers, constants};
 use crate::scene::cloud::PointsSource;
+use crate::schemes::surface_equation::MOST_SPECIES;
 use crate::spec::choice::with_defaults;
-use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Places, Sign, whole};
+use crate::spec::{Coordinates, Interval, Items, NOT_NEGATIVE, POSITIVE, Places, Sign, whole};
 
 crate::words! {
     /// What happens to points that coincide with others, and to points far from all others.
@@ -105,6 +107,13 @@ crate::choice! {
             /// wave number, half the number of points at most
             m: u64 = 1, in whole(1, 100_000_000);
         }
+        /// a field of one's own: a formula of x, y, z and of the unit normal nx, ny, nz
+        Formula = "formula" {
+            /// the value
+            value: FormulaText;
+            /// numbers that the formula calls by name
+            parameters: NamedNumbers = constants();
+        }
     }
 }
 
@@ -179,7 +188,7 @@ crate::choice! {
 }
 
 crate::choice! {
-    /// A reaction of two substances u and v.
+    /// A reaction of substances.
     pub enum ModelChoice {
         /// −u v² + F (1 − u), u v² − (F + k) v
         GrayScott = "gray_scott" {
@@ -204,6 +213,19 @@ crate::choice! {
             /// rate γ
             gamma: f64 = 1.0, in POSITIVE;
         }
+        /// reaction terms of one's own, of one to six substances
+        Formula = "formula" {
+            /// names of the substances, which the rates call them by
+            species: Vec<String>, in Items(1, MOST_SPECIES);
+            /// rate of each substance: a formula of the substances, x, y, z, the unit normal nx, ny, nz and t
+            rates: FormulaList, in Count(1, MOST_SPECIES);
+            /// diffusivity of each substance
+            diffusivities: Vec<f64>, in Items(1, MOST_SPECIES);
+            /// each substance at the start: a formula of x, y, z, nx, ny, nz
+            initial: FormulaList, in Count(1, MOST_SPECIES);
+            /// numbers that the formulas call by name
+            parameters: NamedNumbers = constants();
+        }
     }
 }
 
@@ -227,13 +249,19 @@ crate::choice! {
         Poisson = "poisson" {
             /// the field; `spherical_harmonic` on spheres, `sin_plus_cos` on circles, else `plane_wave` when not given
             field: Option<FieldChoice>;
+            /// a right-hand side s instead of `field`: Δₛ u = s less its mean
+            source: Option<FieldChoice>;
             /// points next to the plane x = 0 (on a circle the one at (R, 0)) hold their value, or u has no mean
             condition: ConditionWord = ConditionWord::ZeroMean;
         }
-        /// ∂u/∂t = Δₛ u
+        /// ∂u/∂t = Δₛ u + s
         Diffusion = "diffusion" {
             /// u at the start; `truncated_gaussian` on bumps, else an eigenfunction, when not given
             initial: Option<InitialChoice>;
+            /// a source s: a formula of x, y, z, the unit normal nx, ny, nz and t
+            source: Option<FormulaText>;
+            /// numbers that the source calls by name
+            parameters: NamedNumbers = constants();
             /// end time T
             end_time: f64 = 1.0, in POSITIVE;
             /// time step Δt; when not given, a hundredth of T, which `dopri5` divides as its tolerance asks
@@ -282,15 +310,15 @@ crate::choice! {
             /// when not given
             from: Option<Places>;
         }
-        /// two substances that react and diffuse
+        /// substances that react and diffuse
         ReactionDiffusion = "reaction_diffusion" {
             /// the reaction
             model: ModelChoice = with_defaults("brusselator");
-            /// diffusivity of the first substance
+            /// diffusivity of the first substance; `diffusivities` of formulas take its place
             diffusivity: f64 = 0.005, in POSITIVE;
-            /// diffusivity of the second substance
+            /// diffusivity of the second substance; `diffusivities` of formulas take its place
             second_diffusivity: f64 = 0.05, in POSITIVE;
-            /// amplitude of the random disturbance at the start
+            /// amplitude of the random disturbance at the start, by the values
             noise: f64 = 0.1, in NOT_NEGATIVE;
             /// a field f for which forcing makes u = u₀ (1 + f cos t/4), v = v₀ (1 − f cos t/4) exact
             manufactured: Option<FieldChoice>;

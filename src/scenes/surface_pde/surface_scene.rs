@@ -19,7 +19,7 @@ use crate::schemes::embedding_closest_point::{EmbeddingClosestPoint, EmbeddingPa
 use crate::schemes::surface_equation::quantities::{CURVATURE, NORMAL, VALUE};
 use crate::schemes::surface_equation::{Form, Method, SurfaceCloud};
 use crate::simulation::fields::COMMON_FIELDS;
-use crate::simulation::{CpuClock, OutputPlan, Quantity, Simulation};
+use crate::simulation::{CpuClock, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::Violation;
 use serde_json::Value;
 
@@ -143,6 +143,10 @@ impl Scene for SurfaceScene {
             }
             Scheme::Embedding { .. } => 0.0,
         }
+    }
+
+    fn regions(&self) -> Vec<Region> {
+        vec![Region::Surface, Region::All]
     }
 
     fn clouds(&self) -> Vec<CloudReference> {

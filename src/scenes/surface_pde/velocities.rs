@@ -99,7 +99,7 @@ impl Velocity {
     }
 
     /// Whether [`Self::course`] knows one.
-    pub fn has_course(&self, field: ExactField, diffusivity: f64, shape: &Shape) -> bool {
+    pub fn has_course(&self, field: &ExactField, diffusivity: f64, shape: &Shape) -> bool {
         let Self::Rotation { omega, center } = self else { return false };
         let turns = match shape {
             Shape::Torus(_) => omega[0] == 0.0 && omega[1] == 0.0,
@@ -112,7 +112,7 @@ impl Velocity {
     /// The course of a field that turns with a surface of revolution and decays if it is an eigenfunction; None where it is not known.
     pub fn course<const D: usize>(
         &self,
-        field: ExactField,
+        field: &ExactField,
         diffusivity: f64,
         shape: &Shape,
         cloud: &SurfaceCloud<D>,
@@ -122,6 +122,7 @@ impl Velocity {
             return None;
         }
         let decay = diffusivity * shape.radius().and_then(|radius| field.decay(radius)).unwrap_or(0.0);
+        let field = field.clone();
         let points: Vec<Vector<3>> = cloud.points[..cloud.rows].iter().map(raised).collect();
         let (axis, rate) = (omega.try_normalize(0.0).unwrap_or_else(Vector::<3>::z), omega.norm());
         Some(Box::new(move |time| {

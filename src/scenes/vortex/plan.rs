@@ -7,6 +7,7 @@ use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
+use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
@@ -143,18 +144,24 @@ fn plan<const D: usize>(mut spec: Vortex) -> Planned {
     }))
 }
 
+/// The flow of a scene.
+fn flow<const D: usize>(spec: &Vortex) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
+    spec.flow.flow::<D>(spec.end_time, "/flow")
+}
+
 fn check_shape_and_flow<const D: usize>(spec: &Vortex, errors: &mut Vec<Violation>) {
+    let flow = flow::<D>(spec).map_err(|found| errors.extend(found)).ok();
     match &spec.shape {
         Shape::Points { .. } => {}
         shape => match shape.surface::<D>("/shape") {
             Ok(surface) => {
                 let half_band = 0.5 * spec.band_h * spec.spacing;
                 errors.extend(check_extent(surface.as_ref(), half_band, spec.spacing));
+                errors.extend(flow.and_then(|flow| check_return(flow.as_ref(), surface.as_ref(), "/flow")));
             }
             Err(found) => errors.extend(found),
         },
     }
-    errors.extend(spec.flow.flow::<D>().err());
 }
 
 /// The parameters that `auto` stands for: what was measured best for the choice of field.
@@ -301,7 +308,7 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn family(&self) -> String {
         // A rigid motion is known without sines of every place.
-        let motion = if self.spec.flow.flow::<D>().is_ok_and(|flow| flow.is_rigid()) { "/rigid" } else { "" };
+        let motion = if flow::<D>(&self.spec).is_ok_and(|flow| flow.is_rigid()) { "/rigid" } else { "" };
         format!("vortex/{D}/{}{motion}", work_estimate::method_name(&self.method))
     }
 
@@ -313,7 +320,8 @@ impl<const D: usize> Scene for VortexScene<D> {
             PathIntegrator::TvdRk2 => 2.0,
             PathIntegrator::Dopri5 { .. } => 14.0,
         };
-        let flow = self.spec.flow.flow::<D>().ok();
+        let flow = flow::<D>(&self.spec).ok();
+        let cost = flow.as_ref().map_or(1.0, |flow| flow.relative_cost());
         let turn = flow.as_ref().and_then(|flow| flow.return_time());
         let halfway = turn.map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
         let (times, course) = match self.when {
@@ -333,7 +341,7 @@ impl<const D: usize> Scene for VortexScene<D> {
             _ => 1.0,
         };
         let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, stretch, times, course);
-        work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages));
+        work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages * cost));
         work.push(PhaseWork { phase: "measure", units: particles * times, course });
         let errors =
             |flow: &dyn Flow<D>| error_units(surface.as_deref(), flow, self.lattice.spacing, particles, end_time);
@@ -343,7 +351,7 @@ impl<const D: usize> Scene for VortexScene<D> {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let flow = self.spec.flow.flow::<D>().map_err(|violation| vec![violation])?;
+        let flow = flow::<D>(&self.spec)?;
         let parts = AdvectedParts {
             spacing: self.lattice.spacing,
             half_band: self.half_band,

@@ -12,6 +12,7 @@ use crate::closest_point::{Coverage, FitDiagnostics, LevelSurface};
 use crate::geometry::Vector;
 use crate::parallel::Interrupted;
 use crate::particles::Particles;
+use crate::schemes::flow_divergence::divergence_diagnostic;
 use crate::schemes::measured_errors::{ErrorNorms, closest_point_diagnostics, rescued};
 use crate::simulation::components::{load_particles, save_particles};
 use crate::simulation::course::{check_finite_vectors, first_broken, is_finite};
@@ -21,7 +22,6 @@ use crate::simulation::{
     Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
-use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 
 /// An advected level set as a simulation.
@@ -117,19 +117,15 @@ impl<const D: usize> AdvectedLevelSet<D> {
             return Ok(MeasuredErrors { time, measure_relative, distances: None });
         };
         let interrupt = &system.interrupt;
-        let distance = |x: &Vector<D>| if interrupt.is_raised() { 0.0 } else { front.signed_distance(x) };
         let band = particles.flag(system.columns.in_band);
         let phi = particles.scalar(system.columns.phi);
-        let differences: Vec<f64> = (0..particles.len())
-            .into_par_iter()
-            .filter(|&i| band[i] == 1)
-            .map(|i| phi[i] - distance(&particles.positions()[i]))
-            .collect();
+        let in_band: Vec<usize> = (0..particles.len()).filter(|&i| band[i] == 1).collect();
+        let places: Vec<Vector<D>> = in_band.iter().map(|&i| particles.positions()[i]).collect();
         let mut norms = ErrorNorms::default();
-        for difference in differences {
-            norms.add(difference);
+        for (i, distance) in in_band.into_iter().zip(front.signed_distances(&places, interrupt)?) {
+            norms.add(phi[i] - distance);
         }
-        let (samples_mean, samples_max) = surface.mean_and_max(|x| distance(x).abs());
+        let (samples_mean, samples_max) = mean_and_max(&front.signed_distances(&surface.sample_points(), interrupt)?);
         interrupt.check()?;
         // Over an empty band there is no error, which is not an error of zero.
         let distances = (!norms.is_empty()).then(|| DistanceErrors {
@@ -200,6 +196,14 @@ impl<const D: usize> AdvectedLevelSet<D> {
     }
 }
 
+/// Mean and largest of |distance|; a NaN is not hidden.
+fn mean_and_max(distances: &[f64]) -> (f64, f64) {
+    // `f64::max` would drop a NaN.
+    let has_nan = distances.iter().any(|distance| distance.is_nan());
+    let max = if has_nan { f64::NAN } else { distances.iter().fold(0.0_f64, |max, distance| max.max(distance.abs())) };
+    (distances.iter().map(|distance| distance.abs()).sum::<f64>() / distances.len().max(1) as f64, max)
+}
+
 impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     fn course(&self) -> &Course {
         &self.course
@@ -216,7 +220,8 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         let before = self.clock();
         let next = self.course.next();
         let (system, time_step) = (&mut self.system, self.course.pace.time_step);
-        let way = self.course.phases.measure("advection", || system.advect(before.time, time_step))?;
+        let way = self.course.phases.measure("advection", || system.advect(before.time, time_step));
+        let way = way.map_err(|error| StepError::from_path(error, next))?;
         check_finite_vectors("position", self.system.particles.positions(), next)?;
         self.max_cfl = self.max_cfl.max(way);
         if self.is_redistancing_due(next.step) {
@@ -330,7 +335,12 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
         Report {
             errors: self.errors.iter().flat_map(|e| e.entries(D)).collect(),
             health: self.health(),
-            diagnostics: closest_point_diagnostics(self.system.redistancing.fit_diagnostics()),
+            diagnostics: {
+                let (system, time) = (&self.system, self.clock().time);
+                let mut diagnostics = closest_point_diagnostics(system.redistancing.fit_diagnostics());
+                diagnostics.extend(divergence_diagnostic(system.motion.flow(), system.particles.positions(), time));
+                diagnostics
+            },
             method: self.course.method.clone(),
         }
     }

@@ -6,12 +6,13 @@ use crate::closest_point::{
 };
 use crate::geometry::lattice::Lattice;
 use crate::geometry::{Domain, Surface, Vector};
-use crate::parallel::{BLOCK, Interrupt, Interrupted};
+use crate::parallel::{Interrupt, Interrupted};
 use crate::particles::{Particles, ScalarKey};
 use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::simulation::{CpuClock, Phases};
 use crate::time::PathIntegrator;
+use crate::time::integrators::{PATHS, PathError, longer};
 use rayon::prelude::{ParallelIterator, ParallelSliceMut};
 
 /// What is transported, and what distances are written to.
@@ -128,28 +129,15 @@ impl<const D: usize> AdvectedSystem<D> {
     }
 
     /// Moves every particle along its path; returns the longest way in spacings.
-    pub(super) fn advect(&mut self, time: f64, step: f64) -> Result<f64, Interrupted> {
+    pub(super) fn advect(&mut self, time: f64, step: f64) -> Result<f64, PathError> {
         let (flow, integrator, interrupt) = (self.motion.flow(), self.parts.integrator, &self.interrupt);
         let longest = self
             .particles
             .positions_mut()
-            .par_chunks_mut(BLOCK)
-            .map(|block| {
-                if interrupt.is_raised() {
-                    return 0.0;
-                }
-                let mut longest = 0.0_f64;
-                for x in block {
-                    let next = integrator.advance(flow, x, time, step);
-                    longest = longest.max((next - *x).norm_squared());
-                    *x = next;
-                }
-                longest
-            })
-            // A maximum does not depend on the order of its terms.
-            .reduce(|| 0.0, f64::max);
-        interrupt.check()?;
-        Ok(longest.sqrt() / self.parts.spacing)
+            .par_chunks_mut(PATHS)
+            .map(|block| integrator.carry(flow, block, time, step, interrupt))
+            .reduce(|| Ok(0.0), longer)?;
+        Ok(longest / self.parts.spacing)
     }
 
     /// Rebuilds the surface from ψ and writes distance, closest point, normal and curvature of the band.

@@ -1,10 +1,13 @@
 //! The laws that move a front. One file a law.
 
+mod formula_speed;
 mod geometrical_optics;
 mod mean_curvature;
 mod normal_speed;
 mod prescribed_flow;
+mod staged_motion;
 
+pub use formula_speed::FormulaSpeed;
 pub use geometrical_optics::GeometricalOptics;
 pub use mean_curvature::MeanCurvature;
 pub use normal_speed::NormalSpeed;
@@ -19,6 +22,7 @@ use crate::geometry::surfaces::Ball;
 use crate::geometry::{Flow, Surface, Vector};
 use crate::parallel::{Interrupt, Interrupted};
 use crate::time::PathIntegrator;
+use crate::time::integrators::PathError;
 
 /// A law that moves a front of M dimensions in a space of D dimensions.
 ///
@@ -36,16 +40,16 @@ pub trait FrontLaw<const D: usize, const M: usize>: Send + Sync {
     /// Moves all particles through one step. Returns the longest displacement in spacings of the finest level.
     ///
     /// # Errors
-    /// [`Interrupted`] when the run is asked to stop.
-    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, Interrupted>;
+    /// [`PathError`]: the run is asked to stop, or what moves the front is not defined at a particle.
+    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, PathError>;
 
-    /// Displacement of a particle along its normal in one step, as far as its curvature determines it.
-    fn normal_displacement(&self, _curvature: f64, _step: f64) -> f64 {
+    /// Displacement of particle `i` along its normal in one step that starts at `time`, as far as the front determines it.
+    fn normal_displacement(&self, _feet: &FootPoints<D>, _i: usize, _time: f64, _step: f64) -> f64 {
         0.0
     }
 
-    /// Direction in which a particle moves: 1 along its normal, −1 against it.
-    fn facing(&self, _curvature: f64) -> f64 {
+    /// Direction in which particle `i` moves: 1 along its normal, −1 against it.
+    fn facing(&self, _feet: &FootPoints<D>, _i: usize) -> f64 {
         1.0
     }
 
@@ -207,6 +211,8 @@ pub struct Stages<const D: usize> {
     starts: Vec<Vector<D>>,
     /// Weighted sums of the velocities of the stages.
     slopes: Vec<Vector<D>>,
+    /// Velocities of the present stage.
+    velocities: Vec<Vector<D>>,
 }
 
 #[cfg(test)]

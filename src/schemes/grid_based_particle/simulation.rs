@@ -11,6 +11,7 @@ use super::quantities;
 use super::removals::Removals;
 use super::system::FrontSystem;
 use crate::geometry::surfaces::Ball;
+use crate::schemes::flow_divergence::divergence_diagnostic;
 use crate::schemes::measured_errors::entry;
 use crate::simulation::course::is_finite;
 use crate::simulation::{
@@ -256,7 +257,13 @@ impl<const D: usize, const M: usize> Simulation for GridBasedParticles<D, M> {
         Report {
             errors,
             health: self.health(),
-            diagnostics: self.system.removals.diagnostics(),
+            diagnostics: {
+                let (system, time) = (&self.system, self.clock().time);
+                let mut diagnostics = system.removals.diagnostics();
+                let flow = system.config.law.flow();
+                diagnostics.extend(flow.and_then(|flow| divergence_diagnostic(flow, &system.feet.positions, time)));
+                diagnostics
+            },
             method: self.course.method.clone(),
         }
     }

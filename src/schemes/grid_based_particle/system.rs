@@ -14,6 +14,7 @@ use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupted;
 use crate::simulation::{Phases, StepError};
 use crate::time::Clock;
+use crate::time::integrators::PathError;
 
 /// A front in D dimensions; M dimensions lie along it, M = D − 1 of a surface.
 pub struct FrontSystem<const D: usize, const M: usize> {
@@ -96,11 +97,11 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     pub(super) fn advance(&mut self, from: Clock, to: Clock, step: f64, phases: &mut Phases) -> Result<f64, StepError> {
         let clock = phases.clock();
         let start = clock();
-        let displacement = self.move_particles(from.time, step)?;
+        let displacement = self.move_particles(from.time, step).map_err(|error| StepError::from_path(error, to))?;
         self.check_finite(to)?;
         let moved = clock();
         phases.book("front/motion", moved - start);
-        self.remove_swept(step)?;
+        self.remove_swept(from.time, step)?;
         let swept = clock();
         phases.book("front/topology", swept - moved);
         self.resample()?;
@@ -110,7 +111,7 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     }
 
     /// Moves the particles by the law. Returns the longest displacement in spacings of the finest level.
-    fn move_particles(&mut self, time: f64, step: f64) -> Result<f64, Interrupted> {
+    fn move_particles(&mut self, time: f64, step: f64) -> Result<f64, PathError> {
         let Self { config, feet, reconstructor, stages, .. } = self;
         let config = &*config;
         let mut renew_geometry = |feet: &mut FootPoints<D>| reconstructor.renew_geometry(feet, config);
@@ -132,13 +133,13 @@ impl<const D: usize, const M: usize> FrontSystem<D, M> {
     }
 
     /// Removes the particles that another segment has passed, where segments merge.
-    fn remove_swept(&mut self, step: f64) -> Result<(), Interrupted> {
+    fn remove_swept(&mut self, time: f64, step: f64) -> Result<(), Interrupted> {
         if !self.config.merges() {
             return Ok(());
         }
         let Self { config, feet, reconstructor, keep, removals, .. } = self;
         reconstructor.sort(feet, &config.grid);
-        let displacement = |i: usize| config.law.normal_displacement(feet.curvatures[i], step);
+        let displacement = |i: usize| config.law.normal_displacement(feet, i, time, step);
         SweepTest { feet, cells: reconstructor.cells(), config, displacement }.mark_unswept(keep)?;
         let removed = keep.iter().filter(|keep| !**keep).count();
         if removed > 0 {

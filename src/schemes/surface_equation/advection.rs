@@ -6,7 +6,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::{Use, Wanted};
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::{INTEGRAL, LARGEST, LEAST, REFERENCE, VALUE};
 use crate::geometry::Vector;
 use crate::geometry::frame::tangents;
@@ -350,7 +350,7 @@ impl<const D: usize> Problem<D> for Advection<D> {
     }
 
     fn watched(&self) -> Watched<'_> {
-        [("value", &self.values), ("", &[])]
+        watch([("value", &self.values)])
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -73,6 +73,15 @@ impl<const D: usize> SurfaceCloud<D> {
         if self.graph.is_empty() { self.areas.as_deref() } else { Some(&self.graph.areas) }
     }
 
+    /// What each unknown stands for: its area, or where areas are not known its share of all points.
+    #[must_use]
+    pub fn weights(&self) -> Vec<f64> {
+        match &self.areas {
+            Some(areas) => areas[..self.rows].to_vec(),
+            None => vec![1.0 / self.rows.max(1) as f64; self.rows],
+        }
+    }
+
     /// Σ area f, or the mean where areas are not known.
     #[must_use]
     pub fn integral(&self, field: &[f64]) -> f64 {

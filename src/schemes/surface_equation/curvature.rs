@@ -4,7 +4,7 @@
 use super::cloud::SurfaceCloud;
 use super::format_1;
 use super::method::Wanted;
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::{CURVATURE_MEAN, GAUSS_INTEGRAL};
 use super::shape_tensor::{self, ShapeTensor};
 use super::triangle_curvature;
@@ -154,7 +154,7 @@ impl<const D: usize> Problem<D> for Curvature {
     }
 
     fn watched(&self) -> Watched<'_> {
-        [("mean_curvature", &self.mean), ("gauss_curvature", &self.gauss)]
+        watch([("mean_curvature", &self.mean), ("gauss_curvature", &self.gauss)])
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -5,7 +5,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::{Operators, Use, Wanted};
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::{RESIDUAL, VALUE};
 use crate::linear_algebra::SparseRows;
 use crate::linear_algebra::krylov::least_modes::{Mode, NotFound, ShiftedInverse};
@@ -187,7 +187,7 @@ impl<const D: usize> Problem<D> for Eigenmodes {
 
     fn watched(&self) -> Watched<'_> {
         let last = self.modes.last().map_or(&[][..], |mode| &mode.vector);
-        [("value", last), ("", &[])]
+        watch([("value", last)])
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -6,10 +6,12 @@ use super::cloud::SurfaceCloud;
 use super::conservative;
 use super::field_bounds::FieldBounds;
 use super::format_1;
+use super::formula_field::{FormulaField, Sites};
+use super::formula_terms::MOST_SPECIES;
 use super::method::{Operators, Use, Wanted};
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::{INTEGRAL, LARGEST, LEAST, PROBES, RATE, REFERENCE, VALUE};
-use super::reactions::Reaction;
+use super::reactions::{Reaction, Terms};
 use super::solver::{LinearSystem, Solver, Workspace};
 use crate::linear_algebra::SparseRows;
 use crate::parallel::Interrupt;
@@ -17,12 +19,38 @@ use crate::schemes::measured_errors::{against_exact, entry};
 use crate::simulation::{Check, Diagnostic, ErrorEntry, Finding, LoadError, Observables, Quantity, Section, StepError};
 use crate::time::Clock;
 use crate::time::embedded_pair::EmbeddedPair;
-use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// Computed value of the second substance.
-static SECOND_VALUE: Quantity =
-    Quantity { name: "second_value", unit: "of the field", doc: "Computed value of the second substance." };
+/// A computed substance.
+macro_rules! substance {
+    ($name:literal, $which:literal) => {
+        Quantity { name: $name, unit: "of the field", doc: concat!("Computed value of the ", $which, " substance.") }
+    };
+}
+
+/// The substances beyond the first.
+static MORE_VALUES: [Quantity; MOST_SPECIES - 1] = [
+    substance!("second_value", "second"),
+    substance!("third_value", "third"),
+    substance!("fourth_value", "fourth"),
+    substance!("fifth_value", "fifth"),
+    substance!("sixth_value", "sixth"),
+];
+
+/// The quantity of a substance.
+fn substance(k: usize) -> &'static Quantity {
+    if k == 0 { &VALUE } else { &MORE_VALUES[(k - 1).min(MOST_SPECIES - 2)] }
+}
+
+/// What is made or taken at every point of a surface, as a formula of place and time.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The rate.
+    pub field: Arc<FormulaField>,
+    /// The points.
+    pub sites: Sites,
+}
 
 /// How time is integrated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,10 +80,12 @@ pub enum ExactCourse {
 /// Fields, reaction and integrator of an evolution.
 #[derive(Debug, Clone)]
 pub struct EvolutionParts {
-    /// u, or u and then v.
+    /// The substances, one after another.
     pub initial: Vec<f64>,
-    /// Reaction of u and v; without one it is pure diffusion.
+    /// Reaction of the substances; without one it is diffusion alone.
     pub reaction: Option<Reaction>,
+    /// What is made at every point, without a reaction.
+    pub source: Option<Source>,
     /// Δt of the implicit formula.
     pub time_step: f64,
     /// Integrator of time.
@@ -117,7 +147,7 @@ impl Evolution {
             peaks: cloud.probes.iter().map(|probe| values[*probe]).collect(),
             initial_integral: cloud.integral(&values[..cloud.rows]),
             rate: 0.0,
-            bounds: FieldBounds::new(&values, parts.reaction.as_ref()),
+            bounds: FieldBounds::new(&values, parts.reaction.as_ref(), parts.source.is_some()),
             findings: Vec::new(),
             earlier: Vec::new(),
             defects: Vec::new(),
@@ -135,8 +165,8 @@ impl Evolution {
         to: Clock,
     ) -> Result<(), StepError> {
         let Self { parts, values, pair, inner_step, attempts, .. } = self;
-        let reaction = parts.reaction.as_ref();
-        let mut slope = |u: &[f64], time: f64, out: &mut [f64]| slopes(operator, reaction, u, time, out);
+        let parts = &*parts;
+        let mut slope = |u: &[f64], time: f64, out: &mut [f64]| slopes(operator, parts, u, time, out);
         let EvolutionIntegrator::Controlled { tolerance } = parts.integrator else {
             pair.try_step(values, from.time, to.time, &mut slope);
             pair.accept(values);
@@ -173,8 +203,11 @@ impl Evolution {
                 if *inner_step < LEAST_STEP * whole {
                     let Clock { step, time } = to;
                     if let Some(place) = pair.result().iter().position(|value| !value.is_finite()) {
+                        if let Some(reason) = parts.undefined(values, time) {
+                            return Err(StepError::Undefined { reason, step, time });
+                        }
                         let rows = operator.rows();
-                        let field = if place < rows { "value" } else { "second_value" };
+                        let field = substance(place / rows).name;
                         return Err(StepError::NonFinite { field, particle: place % rows, step, time });
                     }
                     let reason = format!("the tolerance {tolerance:.1e} cannot be kept: the error is {error:.1e}");
@@ -210,7 +243,7 @@ impl Evolution {
             let system = LinearSystem::new(rows, None, solver, is_symmetric).map_err(unsolved)?;
             self.implicit = Some((share, system));
         }
-        let Self { implicit: Some((_, system)), values, previous, right, storage, .. } = self else {
+        let Self { implicit: Some((_, system)), parts, values, previous, right, storage, .. } = self else {
             return Err(unsolved("there is no system".to_owned()));
         };
         right.resize(values.len(), 0.0);
@@ -218,6 +251,13 @@ impl Evolution {
             *right = area(i) * if is_first { *now } else { (4.0 * now - before) / 3.0 };
         }
         previous.copy_from_slice(values);
+        if let Some(source) = &parts.source {
+            let rates = source.field.values(&source.sites, to.time);
+            let rates = rates.map_err(|reason| StepError::Undefined { reason, step: to.step, time: to.time })?;
+            for (i, (right, rate)) in right.iter_mut().zip(&rates).enumerate() {
+                *right += area(i) * share * whole * rate;
+            }
+        }
         let found = system.solve(right, values, interrupt, storage);
         interrupt.check()?;
         self.iterations += found.map_err(unsolved)?.iterations;
@@ -235,7 +275,7 @@ impl Evolution {
         to: Clock,
     ) -> Result<(), StepError> {
         let before = self.bounds.drift;
-        if cloud.areas.is_some() && self.parts.reaction.is_none() && cloud.held.is_empty() {
+        if cloud.areas.is_some() && self.parts.is_plain() && cloud.held.is_empty() {
             self.bounds.drift = (cloud.integral(&self.values) - self.initial_integral) / self.initial_size;
         }
         if let Some(reason) = self.bounds.violation(&self.values) {
@@ -261,9 +301,8 @@ impl Evolution {
 
     /// The fields that frames show, the surface's own excepted.
     #[must_use]
-    pub fn shown_fields(has_second_value: bool, has_reference: bool) -> Vec<&'static Quantity> {
-        let mut fields = vec![&VALUE];
-        fields.extend(has_second_value.then_some(&SECOND_VALUE));
+    pub fn shown_fields(substances: usize, has_reference: bool) -> Vec<&'static Quantity> {
+        let mut fields: Vec<&'static Quantity> = (0..substances).map(substance).collect();
         fields.extend(has_reference.then_some(&REFERENCE));
         fields
     }
@@ -281,7 +320,7 @@ impl Evolution {
 
     /// Number of unknown fields.
     fn fields(&self) -> usize {
-        if self.parts.reaction.is_some() { 2 } else { 1 }
+        self.parts.reaction.as_ref().map_or(1, Reaction::species)
     }
 }
 
@@ -290,29 +329,40 @@ const FIRST_STEP: f64 = 1e-3;
 /// Inner steps below this share of a step end the run.
 const LEAST_STEP: f64 = 1e-9;
 const SAFETY: f64 = 0.9;
-/// Points that a task works on at least.
-const POINTS: usize = 1024;
+impl EvolutionParts {
+    /// Diffusion alone: nothing makes or takes the substance.
+    fn is_plain(&self) -> bool {
+        self.reaction.is_none() && self.source.is_none()
+    }
 
-/// d Δ_S u and the terms of a reaction.
-fn slopes(operator: &SparseRows, reaction: Option<&Reaction>, u: &[f64], time: f64, out: &mut [f64]) {
-    let Some(reaction) = reaction else {
-        operator.apply(u, out);
-        return;
-    };
+    /// Why formulas have no value where the substances have these values, if they have none.
+    fn undefined(&self, values: &[f64], time: f64) -> Option<String> {
+        if let Some(source) = &self.source {
+            return source.field.values(&source.sites, time).err();
+        }
+        match &self.reaction.as_ref()?.terms {
+            Terms::Formulas(terms) => terms.fault(values, time),
+            Terms::Model(_) => None,
+        }
+    }
+}
+
+/// d Δ_S u, the terms of a reaction and what a source makes.
+fn slopes(operator: &SparseRows, parts: &EvolutionParts, u: &[f64], time: f64, out: &mut [f64]) {
     let rows = operator.rows();
-    let ((u, v), (u_out, v_out)) = (u.split_at(rows), out.split_at_mut(rows));
-    operator.apply(u, u_out);
-    operator.apply(v, v_out);
-    let both = u_out.par_iter_mut().zip(v_out.par_iter_mut()).with_min_len(POINTS).enumerate();
-    both.for_each(|(i, (u_out, v_out))| {
-        let rates = reaction.model.rates(u[i], v[i]);
-        let forcing = match &reaction.manufactured {
-            Some((field, laplacian)) => reaction.forcing(field[i], laplacian[i], time),
-            None => [0.0; 2],
-        };
-        *u_out = reaction.diffusivity[0] * *u_out + rates[0] + forcing[0];
-        *v_out = reaction.diffusivity[1] * *v_out + rates[1] + forcing[1];
-    });
+    for (u, out) in u.chunks(rows).zip(out.chunks_mut(rows)) {
+        operator.apply(u, out);
+    }
+    if let Some(reaction) = &parts.reaction {
+        reaction.add(u, time, out);
+    }
+    if let Some(source) = &parts.source {
+        match source.field.values(&source.sites, time) {
+            Ok(rates) => out.iter_mut().zip(rates).for_each(|(out, rate)| *out += rate),
+            // The step is refused, and the formula named.
+            Err(_) => out.fill(f64::NAN),
+        }
+    }
 }
 
 impl<const D: usize> Problem<D> for Evolution {
@@ -349,7 +399,7 @@ impl<const D: usize> Problem<D> for Evolution {
     }
 
     fn columns(&self) -> Vec<&'static Quantity> {
-        Self::shown_fields(self.fields() == 2, self.has_reference())
+        Self::shown_fields(self.fields(), self.has_reference())
     }
 
     fn column(&self, quantity: &Quantity, clock: Clock) -> Vec<f64> {
@@ -358,16 +408,18 @@ impl<const D: usize> Problem<D> for Evolution {
             let mut reference = self.reference(clock.time).unwrap_or_default();
             reference.truncate(rows);
             reference
-        } else if *quantity == SECOND_VALUE {
-            self.values[rows..].to_vec()
         } else {
-            self.values[..rows].to_vec()
+            let k = (0..self.fields()).find(|k| substance(*k) == quantity).unwrap_or(0);
+            self.values[k * rows..(k + 1) * rows].to_vec()
         }
     }
 
     fn watched(&self) -> Watched<'_> {
-        let (first, second) = self.values.split_at(self.values.len() / self.fields());
-        [("value", first), ("second_value", second)]
+        let rows = self.values.len() / self.fields();
+        let mut fields = self.values.chunks(rows).enumerate();
+        watch(std::array::from_fn::<_, MOST_SPECIES, _>(|_| {
+            fields.next().map_or(("", &[][..]), |(k, field)| (substance(k).name, field))
+        }))
     }
 
     fn errors(&self, cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {
@@ -380,12 +432,12 @@ impl<const D: usize> Problem<D> for Evolution {
         }
         // A field whose parts cancel has no mass to be lost.
         let has_mass = self.initial_integral.abs() > 1e-3 * self.initial_size;
-        if cloud.areas.is_some() && self.parts.reaction.is_none() && has_mass && cloud.held.is_empty() {
+        if cloud.areas.is_some() && self.parts.is_plain() && has_mass && cloud.held.is_empty() {
             let drift = cloud.integral(&self.values) / self.initial_integral - 1.0;
             errors.push(entry("mass", "relative", drift.abs(), clock.time, "the integral at the start"));
         }
         if self.parts.reaction.is_some() {
-            let rows = self.values.len() / 2;
+            let rows = self.values.len() / self.fields();
             let mean = cloud.mean(&self.values[..rows]);
             let off: Vec<f64> = self.values[..rows].iter().map(|u| u - mean).collect();
             errors.push(entry("pattern", "std", cloud.root_mean_square(&off), clock.time, "a state without a pattern"));

@@ -1,10 +1,12 @@
 //! Fields whose Laplace–Beltrami operator is known.
 
+use super::formula_field::FormulaField;
 use crate::geometry::Vector;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A field on a surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum ExactField {
     /// Real orthonormal Y_lm on a sphere about the origin: m > 0 ∝ cos mφ, m < 0 ∝ sin |m|φ.
     SphericalHarmonic {
@@ -32,6 +34,8 @@ pub enum ExactField {
         /// Width σ.
         sigma: f64,
     },
+    /// A formula of the place, and of the normal.
+    Formula(Arc<FormulaField>),
 }
 
 impl ExactField {
@@ -49,6 +53,7 @@ impl ExactField {
                 let d = (x - center).norm() / sigma;
                 if d < 0.975 { (-1.0 / (1.0 - d * d)).exp() / (sigma * sigma) } else { 0.0 }
             }
+            Self::Formula(field) => field.value(x),
         }
     }
 
@@ -61,6 +66,7 @@ impl ExactField {
                 let (phase, along) = (k.dot(x), k.dot(n));
                 -(k.norm_squared() - along * along) * phase.sin() - curvature * along * phase.cos()
             }
+            Self::Formula(field) => field.laplace_beltrami(x, n, curvature),
             Self::SinPlusCos { .. } | Self::TruncatedGaussian { .. } => {
                 self.decay(x.norm()).map_or(f64::NAN, |rate| -rate * self.value(x))
             }
@@ -72,7 +78,14 @@ impl ExactField {
     pub fn gradient(&self, x: &Vector<3>, n: &Vector<3>) -> Option<Vector<3>> {
         match self {
             Self::PlaneWave { k } => Some((k - n * k.dot(n)) * k.dot(x).cos()),
-            Self::SphericalHarmonic { .. } | Self::SinPlusCos { .. } | Self::TruncatedGaussian { .. } => None,
+            Self::Formula(field) if field.is_of_place() => {
+                let gradient = field.gradient(x);
+                Some(gradient - n * n.dot(&gradient))
+            }
+            Self::SphericalHarmonic { .. }
+            | Self::SinPlusCos { .. }
+            | Self::TruncatedGaussian { .. }
+            | Self::Formula(_) => None,
         }
     }
 
@@ -82,7 +95,7 @@ impl ExactField {
         match self {
             Self::SphericalHarmonic { l, .. } => Some(f64::from(l * (l + 1)) / (radius * radius)),
             Self::SinPlusCos { m } => Some(f64::from(*m).powi(2) / (radius * radius)),
-            Self::PlaneWave { .. } | Self::TruncatedGaussian { .. } => None,
+            Self::PlaneWave { .. } | Self::TruncatedGaussian { .. } | Self::Formula(_) => None,
         }
     }
 }

@@ -9,7 +9,7 @@
 use super::cloud::SurfaceCloud;
 use super::conservative;
 use super::method::{Operators, Wanted};
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::LARGEST;
 use crate::geometry::Vector;
 use crate::linear_algebra::sparse_cholesky::SparseCholesky;
@@ -280,7 +280,7 @@ impl<const D: usize> Problem<D> for GeodesicDistance {
 
     fn watched(&self) -> Watched<'_> {
         // Points that are not reached have no number.
-        [("distance", &[]), ("", &[])]
+        watch([("distance", &[])])
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -24,7 +24,7 @@ use crate::simulation::quantity::quantities;
 use crate::simulation::section::check_length;
 use crate::simulation::{
     Check, Course, CpuClock, Diagnostic, ErrorEntry, Fields, Finding, Health, LoadError, Mark, Observables, Phases,
-    Report, Section, Selection, Simulation, StepError,
+    Region, Report, Section, Selection, Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
@@ -390,6 +390,10 @@ impl<const D: usize> Simulation for MovingSurface<D> {
             Check::watched("unevenness", Some(self.unevenness()), ""),
         ];
         Health { finite, max_cfl: 0.0, volume_drift: None, checks }
+    }
+
+    fn weights(&self, region: Region) -> Option<Vec<f64>> {
+        matches!(region, Region::All | Region::Surface).then(|| self.areas.clone())
     }
 
     fn particle_count(&self) -> usize {

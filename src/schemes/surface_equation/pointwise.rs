@@ -3,7 +3,7 @@
 use super::cloud::SurfaceCloud;
 use super::format_1;
 use super::method::Wanted;
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::{ERROR_MAX, ERROR_RELATIVE, FIELD, REFERENCE, VALUE};
 use crate::schemes::measured_errors::against_exact;
 use crate::simulation::{ErrorEntry, LoadError, Observables, Quantity, Section, StepError};
@@ -62,7 +62,7 @@ impl<const D: usize> Problem<D> for Pointwise {
     }
 
     fn watched(&self) -> Watched<'_> {
-        [("value", &self.value), ("", &[])]
+        watch([("value", &self.value)])
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -6,7 +6,7 @@
 use super::cloud::SurfaceCloud;
 use super::format_1;
 use super::method::{Use, Wanted};
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::{FIELD, ITERATIONS, REFERENCE, RESIDUAL, VALUE};
 use super::solver::{LinearSystem, Solver, Workspace};
 use crate::linear_algebra::SparseRows;
@@ -193,7 +193,7 @@ impl<const D: usize> Problem<D> for Poisson {
     }
 
     fn watched(&self) -> Watched<'_> {
-        [("value", &self.value), ("", &[])]
+        watch([("value", &self.value)])
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -26,8 +26,13 @@ pub struct Tools<'a, const D: usize> {
     pub to: Clock,
 }
 
-/// Fields by name, no more than two and without an allocation; an unused place has no values.
-pub type Watched<'a> = [(&'static str, &'a [f64]); 2];
+/// Fields by name, no more than six and without an allocation; an unused place has no values.
+pub type Watched<'a> = [(&'static str, &'a [f64]); 6];
+
+/// Fields to be watched.
+pub fn watch<'a, const N: usize>(fields: [(&'static str, &'a [f64]); N]) -> Watched<'a> {
+    std::array::from_fn(|k| fields.get(k).copied().unwrap_or(("", &[])))
+}
 
 /// A problem: its unknowns, and how a step changes them.
 pub trait Problem<const D: usize>: Send {

@@ -1,4 +1,10 @@
-//! Reactions of two substances u and v at every point of a surface, and the forcing that makes a known solution exact.
+//! Reactions of substances at every point of a surface, and the forcing that makes a known solution exact.
+
+use super::formula_terms::FormulaTerms;
+use rayon::prelude::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
+
+/// Points that a task works on at least.
+const POINTS: usize = 1024;
 
 /// The reaction terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,13 +66,22 @@ impl Model {
     }
 }
 
-/// A reaction of two substances that diffuse.
+/// The reaction terms of a model, or of formulas.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Terms {
+    /// Two substances.
+    Model(Model),
+    /// One to six.
+    Formulas(FormulaTerms),
+}
+
+/// A reaction of substances that diffuse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reaction {
     /// Values of the reaction terms.
-    pub model: Model,
-    /// Of u and v.
-    pub diffusivity: [f64; 2],
+    pub terms: Terms,
+    /// Of each substance.
+    pub diffusivity: Vec<f64>,
     /// f and Δ_S f at the points, where the forcing makes [`Reaction::manufactured`] exact.
     pub manufactured: Option<(Vec<f64>, Vec<f64>)>,
 }
@@ -83,15 +98,48 @@ impl Reaction {
         [u * (1.0 + SWING * f * t.cos()), v * (1.0 - SWING * f * t.cos())]
     }
 
+    /// Of a manufactured solution, which models alone have.
     fn base(&self) -> [f64; 2] {
-        self.model.rest().map(|rest| if rest > 0.0 { rest } else { 1.0 })
+        let Terms::Model(model) = &self.terms else { return [1.0; 2] };
+        model.rest().map(|rest| if rest > 0.0 { rest } else { 1.0 })
+    }
+
+    /// Number of substances.
+    #[must_use]
+    pub fn species(&self) -> usize {
+        match &self.terms {
+            Terms::Model(_) => 2,
+            Terms::Formulas(terms) => terms.species(),
+        }
+    }
+
+    /// out ← d out + terms, where `out` has Δ_S u and `u` the substances, one after another.
+    pub fn add(&self, u: &[f64], time: f64, out: &mut [f64]) {
+        let model = match &self.terms {
+            Terms::Formulas(terms) => return terms.add(u, &self.diffusivity, time, out),
+            Terms::Model(model) => *model,
+        };
+        let rows = u.len() / 2;
+        let (u, v) = u.split_at(rows);
+        let (u_out, v_out) = out.split_at_mut(rows);
+        let both = u_out.par_iter_mut().zip(v_out.par_iter_mut()).with_min_len(POINTS).enumerate();
+        both.for_each(|(i, (u_out, v_out))| {
+            let rates = model.rates(u[i], v[i]);
+            let forcing = match &self.manufactured {
+                Some((field, laplacian)) => self.forcing(field[i], laplacian[i], time),
+                None => [0.0; 2],
+            };
+            *u_out = self.diffusivity[0] * *u_out + rates[0] + forcing[0];
+            *v_out = self.diffusivity[1] * *v_out + rates[1] + forcing[1];
+        });
     }
 
     /// What must be added to the terms at a point for that solution.
     #[must_use]
     pub fn forcing(&self, f: f64, laplacian: f64, t: f64) -> [f64; 2] {
         let [u, v] = self.exact(f, t);
-        let (base, rates) = (self.base(), self.model.rates(u, v));
+        let Terms::Model(model) = &self.terms else { return [f64::NAN; 2] };
+        let (base, rates) = (self.base(), model.rates(u, v));
         let (turn, bend) = (SWING * f * t.sin(), SWING * laplacian * t.cos());
         [
             -base[0] * turn - self.diffusivity[0] * base[0] * bend - rates[0],
@@ -102,7 +150,7 @@ impl Reaction {
 
 #[cfg(test)]
 mod tests {
-    use super::{Model, Reaction};
+    use super::{Model, Reaction, Terms};
 
     #[test]
     fn rest_does_not_react() {
@@ -123,7 +171,7 @@ mod tests {
     }
 
     fn check_forcing(model: Model) {
-        let reaction = Reaction { model, diffusivity: [0.01, 0.1], manufactured: None };
+        let reaction = Reaction { terms: Terms::Model(model), diffusivity: vec![0.01, 0.1], manufactured: None };
         let (f, t, step) = (0.4, 0.7, 1e-5);
         let laplacian = -6.0 * f;
         let [u, v] = reaction.exact(f, t);

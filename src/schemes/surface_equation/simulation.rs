@@ -15,7 +15,7 @@ use crate::schemes::measured_errors::{SUPPORTS, support_diagnostics};
 use crate::simulation::course::check_finite;
 use crate::simulation::{
     Check, Course, CpuClock, Diagnostic, Fields, Finding, Health, LoadError, Mark, NamedOperator, Observables, Phases,
-    Report, Section, Selection, Simulation, StepError,
+    Region, Report, Section, Selection, Simulation, StepError,
 };
 use crate::time::{Clock, FixedStep};
 use std::collections::BTreeMap;
@@ -346,6 +346,10 @@ impl<const D: usize, const M: usize> Simulation for SurfaceEquation<D, M> {
         }
         checks.extend(self.problem.checks(self.course.step));
         Health { finite, max_cfl: 0.0, volume_drift: None, checks }
+    }
+
+    fn weights(&self, region: Region) -> Option<Vec<f64>> {
+        matches!(region, Region::All | Region::Surface).then(|| self.cloud.weights())
     }
 
     fn particle_count(&self) -> usize {

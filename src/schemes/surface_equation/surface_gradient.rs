@@ -2,7 +2,7 @@
 
 use super::cloud::SurfaceCloud;
 use super::method::Wanted;
-use super::problem::{Problem, Tools, Watched};
+use super::problem::{Problem, Tools, Watched, watch};
 use super::quantities::FIELD;
 use crate::geometry::Vector;
 use crate::operators::{derivative_tensor, divergence};
@@ -87,7 +87,7 @@ impl<const D: usize> Problem<D> for SurfaceGradient<D> {
     }
 
     fn watched(&self) -> Watched<'_> {
-        [("divergence", &self.divergence), ("", &[])]
+        watch([("divergence", &self.divergence)])
     }
 
     fn errors(&self, _cloud: &SurfaceCloud<D>, clock: Clock) -> Vec<ErrorEntry> {

@@ -2,11 +2,13 @@
 
 use super::interface::Interface;
 use super::smoothed_delta::smoothed_delta;
+use super::species::Species;
 use super::system::SphSystem;
 use super::varying_tension::VaryingTension;
 use crate::geometry::Vector;
 use crate::simulation::section::known;
-use crate::simulation::{Component, LoadError, Section};
+use crate::simulation::{Component, LoadError, Region, Section, StepError};
+use crate::time::Clock;
 
 /// Energies and momentum of one state.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +63,28 @@ impl<const D: usize> SphSystem<D> {
         contents
     }
 
+    /// The volume, or of the interface the length or area, that each particle stands for in a region.
+    pub(super) fn weights(&self, region: Region) -> Option<Vec<f64>> {
+        let (species, volume) = (&self.flow.species, &self.flow.volume);
+        let of =
+            |wanted: Species| species.iter().zip(volume).map(|(s, v)| if *s == wanted { *v } else { 0.0 }).collect();
+        match region {
+            Region::All => Some(volume.clone()),
+            Region::Inside => Some(of(Species::Inside)),
+            Region::Outside => Some(of(Species::Outside)),
+            Region::Interface => {
+                let Interface::LevelSet(level_set) = &self.interface else { return None };
+                let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
+                let mut weights = vec![0.0; volume.len()];
+                for i in level_set.candidates().iter().filter(|i| band[**i] == 1) {
+                    weights[*i] = volume[*i] * smoothed_delta(phi[*i], self.config.smoothing_length);
+                }
+                Some(weights)
+            }
+            Region::Surface => None,
+        }
+    }
+
     fn interface_measure(&self) -> f64 {
         let Interface::LevelSet(level_set) = &self.interface else { return f64::NAN };
         let (phi, band) = (self.particles.scalar(self.columns.phi), self.particles.flag(self.columns.in_band));
@@ -83,6 +107,18 @@ impl<const D: usize> SphSystem<D> {
             sums.0 += varying.supplied_power(&self.flow.velocity);
         }
         sums
+    }
+
+    /// The error of a step after which a velocity is not finite: that the body force has no value, where that is so.
+    pub(super) fn explained(&self, error: StepError, Clock { step, time }: Clock) -> StepError {
+        let (StepError::NonFinite { particle, .. }, Some(force)) = (&error, &self.config.body_force) else {
+            return error;
+        };
+        let place = self.particles.positions()[*particle];
+        match force.fault(&place, time, self.flow.species[*particle]) {
+            Some(reason) => StepError::Undefined { reason: format!("{reason}, particle {particle}"), step, time },
+            None => error,
+        }
     }
 
     /// Power Σ m a·u of surface tension.

@@ -133,6 +133,8 @@ pub struct SphConfig<const D: usize> {
     pub integrator: Integrator,
     /// Velocity of both fluids at the start.
     pub start_velocity: Vector<D>,
+    /// Whether the fluids do not move about that velocity at the start.
+    pub is_at_rest: bool,
     /// The standing wave that a layer starts with.
     pub wave: Option<StandingWave>,
     /// The speed that the longest step is chosen for; faster particles cut steps into parts.

@@ -40,13 +40,13 @@ pub(super) struct Rates<const D: usize> {
 
 impl<const D: usize> FlowState<D> {
     /// Fluids with one velocity and no pressure, with the species of the signed distances in `level`.
-    pub fn in_motion(fluids: Fluids, cell: f64, level: &[f64], velocity: Vector<D>) -> Self {
+    pub fn in_motion(fluids: Fluids, cell: f64, level: &[f64], velocity: Vec<Vector<D>>) -> Self {
         let species: Vec<Species> = level.iter().map(|level| Species::from_level(*level)).collect();
         let count = species.len();
         Self {
             density: species.iter().map(|species| fluids[*species].density).collect(),
-            velocity: vec![velocity; count],
-            predicted: vec![velocity; count],
+            predicted: velocity.clone(),
+            velocity,
             volume: vec![cell; count],
             pressure: vec![0.0; count],
             calibration: 1.0,
@@ -157,7 +157,7 @@ mod tests {
             Fluids { inside: fluid(3.0), outside: fluid(1.0) },
             0.25,
             &[-1.0, 1.0],
-            Vector::<2>::zeros(),
+            vec![Vector::<2>::zeros(); 2],
         );
         assert_eq!(flow.species, [Species::Inside, Species::Outside]);
         assert_eq!((flow.mass(0), flow.mass(1)), (0.75, 0.25));

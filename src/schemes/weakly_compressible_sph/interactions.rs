@@ -24,7 +24,7 @@ pub mod surface_tension;
 pub mod viscosity;
 pub mod volume_pair;
 
-pub use body_force::BodyForce;
+pub use body_force::{BodyForce, FormulaForce};
 pub use surface_tension::TensionForce;
 
 use super::droplets::Droplets;

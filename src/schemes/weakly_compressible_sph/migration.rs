@@ -69,7 +69,7 @@ impl<const D: usize> Migration<D> {
         let config = &system.config;
         let Some(TensionLaw::Slope { slope, is_ball: true, .. }) = config.tension_law else { return None };
         let is_alone = system.droplets.number() == 1 && !system.droplets.has_layer();
-        let is_free = config.body_force.is_none() && config.start_velocity == Vector::<D>::zeros();
+        let is_free = config.body_force.is_none() && config.start_velocity == Vector::<D>::zeros() && config.is_at_rest;
         let [before, last] = self.parts.map(|Part { since, until, way }| way / (until - since));
         let is_steady = (last - before).norm() <= STEADY * last.norm();
         let drift = drift_by_slope(config, ball_curvature::<D>(measure));

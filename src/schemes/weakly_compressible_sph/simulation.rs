@@ -21,8 +21,8 @@ use crate::geometry::Vector;
 use crate::schemes::measured_errors::entry;
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
 use crate::simulation::{
-    Check, Course, CpuClock, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Report,
-    Section, Selection, Simulation, StepError,
+    Check, Course, CpuClock, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Region,
+    Report, Section, Selection, Simulation, StepError,
 };
 use crate::time::clock::TIME_SLACK;
 use crate::time::{Clock, FixedStep, Pace};
@@ -238,7 +238,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
 
     fn check(&mut self, next: Clock) -> Result<(), StepError> {
         let system = &self.system;
-        check_finite_vectors("velocity", &system.flow.velocity, next)?;
+        check_finite_vectors("velocity", &system.flow.velocity, next).map_err(|error| system.explained(error, next))?;
         check_finite("density", &system.flow.density, next)?;
         first_broken(system.columns.find_broken(&system.particles), next)?;
         if let (Some(record), Some(varying)) = (&mut self.tension, &system.varying) {
@@ -455,6 +455,10 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         }
         let finite = self.system.flow.velocity.iter().all(is_finite);
         Health { finite, max_cfl: self.max_cfl, volume_drift, checks }
+    }
+
+    fn weights(&self, region: Region) -> Option<Vec<f64>> {
+        self.system.weights(region)
     }
 
     fn particle_count(&self) -> usize {

@@ -166,7 +166,12 @@ mod tests {
                 let body_force = Some(BodyForce::Constant(gravity));
                 let config = SphConfig { tension: 0.0, integrator, density, body_force, ..this.config.clone() };
                 let mut stepper = Stepper::new(&config, this.positions.len());
-                let drop = Drop { positions: this.positions.clone(), level: this.level.clone(), measure: 1.0 };
+                let drop = Drop {
+                    positions: this.positions.clone(),
+                    level: this.level.clone(),
+                    velocities: None,
+                    measure: 1.0,
+                };
                 let mut system =
                     SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
                 let mut phases = Phases::new(CpuClock::still());

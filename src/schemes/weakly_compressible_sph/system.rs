@@ -30,6 +30,8 @@ pub struct Drop<const D: usize> {
     pub positions: Vec<Vector<D>>,
     /// Signed distances from the interface; their sign decides the species.
     pub level: Vec<f64>,
+    /// Velocities about that of the start; None where the fluids are at rest.
+    pub velocities: Option<Vec<Vector<D>>>,
     /// The enclosed area or volume; NaN where it is not known.
     pub measure: f64,
 }
@@ -86,7 +88,7 @@ impl<const D: usize> SphSystem<D> {
     ) -> Result<Self, BoxTooSmall> {
         let count = drop.positions.len();
         let lists = NeighborLists::new(&domain, config.cutoff(), config.skin(), count)?;
-        config.body_force = config.body_force.map(|force| balance(force, &config.fluids, &drop.level));
+        config.body_force = config.body_force.take().map(|force| balance(force, &config.fluids, &drop.level));
         let kernel = ScaledKernel::new(config.kernel, config.smoothing_length, D);
         let mut particles = Particles::new(drop.positions);
         let columns = SurfaceColumns::add(&mut particles);
@@ -104,11 +106,16 @@ impl<const D: usize> SphSystem<D> {
         if let Some(tension) = tension {
             forces.push(Box::new(tension));
         }
-        if let Some(force) = config.body_force {
-            forces.push(Box::new(force));
+        if let Some(force) = &config.body_force {
+            forces.push(Box::new(force.clone()));
         }
         Ok(Self {
-            flow: FlowState::in_motion(config.fluids, cell, &drop.level, config.start_velocity),
+            flow: FlowState::in_motion(
+                config.fluids,
+                cell,
+                &drop.level,
+                start_velocities(&config, &drop.velocities, count),
+            ),
             pairs: PairWorkspace::new(lists, kernel, cell, interrupt.clone()),
             interface,
             droplets: Droplets::new(domain.clone(), count, drop.measure),
@@ -333,6 +340,18 @@ impl<const D: usize> SphSystem<D> {
     }
 }
 
+/// The velocities of the particles at the start.
+fn start_velocities<const D: usize>(
+    config: &SphConfig<D>,
+    own: &Option<Vec<Vector<D>>>,
+    count: usize,
+) -> Vec<Vector<D>> {
+    match own {
+        Some(own) => own.iter().map(|velocity| velocity + config.start_velocity).collect(),
+        None => vec![config.start_velocity; count],
+    }
+}
+
 /// The most particles that drops may lose to strays: half of what ends a run. The forces of version 0.1 and of the paper set none.
 fn stray_allowance<const D: usize>(config: &SphConfig<D>, level: &[f64]) -> i64 {
     let inside = level.iter().filter(|level| Species::from_level(**level) == Species::Inside).count();
@@ -385,7 +404,7 @@ mod tests {
     use crate::simulation::{CpuClock, Phases};
 
     fn evaluated(this: &Setting<2>, config: SphConfig<2>, level: Vec<f64>) -> SphSystem<2> {
-        let drop = Drop { positions: this.positions.clone(), level, measure: 2.0 };
+        let drop = Drop { positions: this.positions.clone(), level, velocities: None, measure: 2.0 };
         let mut system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
         system.flow.predicted.clone_from(&this.velocity);
         system.evaluate(Instant::default(), &mut Phases::new(CpuClock::still())).unwrap();

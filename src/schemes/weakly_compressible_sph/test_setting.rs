@@ -42,6 +42,7 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
         pressure: PressureConfig::PAPER,
         is_shifted: false,
         body_force: None,
+        is_at_rest: true,
         integrator: Integrator::KickDriftKick,
         start_velocity: Vector::<D>::zeros(),
         wave: None,
@@ -82,7 +83,12 @@ impl<const D: usize> Setting<D> {
     }
 
     pub fn flow(&self) -> FlowState<D> {
-        let mut flow = FlowState::in_motion(self.config.fluids, self.cell, &self.level, Vector::<D>::zeros());
+        let mut flow = FlowState::in_motion(
+            self.config.fluids,
+            self.cell,
+            &self.level,
+            vec![Vector::<D>::zeros(); self.level.len()],
+        );
         flow.velocity.clone_from(&self.velocity);
         flow.predicted.clone_from(&self.velocity);
         flow

@@ -22,47 +22,108 @@ pub(in crate::time) const E: [f64; 7] =
 /// Largest number of inner steps. After it the position is NaN, so that a wild field cannot hang a run.
 const MAX_STEPS: u32 = 100_000;
 
-/// The position at `t + dt` of the point at `x` at time `t`; NaN after [`MAX_STEPS`] inner steps.
-pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64, dt: f64, tolerance: f64) -> Vector<D> {
+/// Inner steps of up to `N` paths. Each path has its own step size and ends by itself.
+struct Paths<const D: usize, const N: usize> {
+    /// Velocities of the stages, by path.
+    k: [[Vector<D>; N]; 7],
+    /// Time since the start, and the size of the next inner step.
+    done: [f64; N],
+    size: [f64; N],
+    /// Where the paths are that go on.
+    active: [usize; N],
+    /// Storage of an evaluation: one entry for each path that goes on.
+    at: [Vector<D>; N],
+    times: [f64; N],
+    found: [Vector<D>; N],
+}
+
+/// Moves up to `N` points from `t` to `t + dt`; a point is NaN after [`MAX_STEPS`] inner steps.
+pub(super) fn advance<const D: usize, const N: usize>(
+    flow: &dyn Flow<D>,
+    points: &mut [Vector<D>],
+    t: f64,
+    dt: f64,
+    tolerance: f64,
+) {
     if dt == 0.0 {
-        return *x;
+        return;
     }
-    let direction = dt.signum();
-    let whole = dt.abs();
-    let mut x = *x;
-    let mut done = 0.0;
-    let mut h = whole.min(0.05);
-    let mut k = [Vector::<D>::zeros(); 7];
-    k[0] = flow.velocity(&x, t);
+    let zero = [Vector::<D>::zeros(); N];
+    let mut paths = Paths::<D, N> {
+        k: [zero; 7],
+        done: [0.0; N],
+        size: [dt.abs().min(0.05); N],
+        active: std::array::from_fn(|i| i),
+        at: zero,
+        times: [t; N],
+        found: zero,
+    };
+    let mut count = points.len();
+    flow.velocities(points, &paths.times[..count], &mut paths.k[0][..count]);
     for _ in 0..MAX_STEPS {
-        let remaining = whole - done;
-        let last = h >= remaining * (1.0 - 1e-12);
-        let step = direction * if last { remaining } else { h };
-        let now = t + direction * done;
-        let mut next = x;
-        for s in 0..6 {
-            let mut slope = Vector::<D>::zeros();
-            for (j, a) in A[s][..=s].iter().enumerate() {
-                slope += k[j] * *a;
-            }
-            next = x + slope * step;
-            k[s + 1] = flow.velocity(&next, now + C[s] * step);
+        count = paths.inner_step(flow, points, [t, dt, tolerance], count);
+        if count == 0 {
+            return;
         }
-        let mut error = Vector::<D>::zeros();
-        for (j, e) in E.iter().enumerate() {
-            error += k[j] * *e;
-        }
-        let error = (error * step).norm();
-        // No tolerance below round-off can be met.
-        if error <= tolerance.max(4.0 * f64::EPSILON * x.amax()) {
-            x = next;
-            if last {
-                return x;
-            }
-            done += step.abs();
-            k[0] = k[6];
-        }
-        h = step.abs() * (0.9 * (tolerance / error.max(1e-300)).powf(0.2)).clamp(0.2, 5.0);
     }
-    Vector::<D>::repeat(f64::NAN)
+    for i in &paths.active[..count] {
+        points[*i] = Vector::<D>::repeat(f64::NAN);
+    }
+}
+
+impl<const D: usize, const N: usize> Paths<D, N> {
+    /// One inner step of the first `count` active paths; returns how many go on.
+    fn inner_step(
+        &mut self,
+        flow: &dyn Flow<D>,
+        points: &mut [Vector<D>],
+        [t, dt, tolerance]: [f64; 3],
+        count: usize,
+    ) -> usize {
+        let (direction, whole) = (dt.signum(), dt.abs());
+        let is_last = |remaining: f64, size: f64| size >= remaining * (1.0 - 1e-12);
+        let mut steps = [0.0; N];
+        for (step, &i) in steps.iter_mut().zip(&self.active[..count]) {
+            let remaining = whole - self.done[i];
+            *step = direction * if is_last(remaining, self.size[i]) { remaining } else { self.size[i] };
+        }
+        for s in 0..6 {
+            for (slot, &i) in self.active[..count].iter().enumerate() {
+                let mut slope = Vector::<D>::zeros();
+                for (j, a) in A[s][..=s].iter().enumerate() {
+                    slope += self.k[j][i] * *a;
+                }
+                self.at[slot] = points[i] + slope * steps[slot];
+                self.times[slot] = t + direction * self.done[i] + C[s] * steps[slot];
+            }
+            flow.velocities(&self.at[..count], &self.times[..count], &mut self.found[..count]);
+            for (found, &i) in self.found[..count].iter().zip(&self.active[..count]) {
+                self.k[s + 1][i] = *found;
+            }
+        }
+        let mut next = 0;
+        for slot in 0..count {
+            let (i, step) = (self.active[slot], steps[slot]);
+            let mut error = Vector::<D>::zeros();
+            for (j, e) in E.iter().enumerate() {
+                error += self.k[j][i] * *e;
+            }
+            let error = (error * step).norm();
+            // No tolerance below round-off can be met.
+            let is_accepted = error <= tolerance.max(4.0 * f64::EPSILON * points[i].amax());
+            if is_accepted {
+                let was_last = is_last(whole - self.done[i], self.size[i]);
+                points[i] = self.at[slot];
+                if was_last {
+                    continue;
+                }
+                self.done[i] += step.abs();
+                self.k[0][i] = self.k[6][i];
+            }
+            self.size[i] = step.abs() * (0.9 * (tolerance / error.max(1e-300)).powf(0.2)).clamp(0.2, 5.0);
+            self.active[next] = i;
+            next += 1;
+        }
+        next
+    }
 }

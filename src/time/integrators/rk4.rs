@@ -2,11 +2,25 @@
 
 use crate::geometry::{Flow, Vector};
 
-/// The position at `t + dt` of the point at `x` at time `t`.
-pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64, dt: f64) -> Vector<D> {
-    let k1 = flow.velocity(x, t);
-    let k2 = flow.velocity(&(x + k1 * (0.5 * dt)), t + 0.5 * dt);
-    let k3 = flow.velocity(&(x + k2 * (0.5 * dt)), t + 0.5 * dt);
-    let k4 = flow.velocity(&(x + k3 * dt), t + dt);
-    x + (k1 + (k2 + k3) * 2.0 + k4) * (dt / 6.0)
+/// Moves up to `N` points from `t` to `t + dt`.
+pub(super) fn advance<const D: usize, const N: usize>(flow: &dyn Flow<D>, points: &mut [Vector<D>], t: f64, dt: f64) {
+    let count = points.len();
+    let zero = [Vector::<D>::zeros(); N];
+    let (mut at, mut k1, mut k2, mut k3, mut k4) = (zero, zero, zero, zero, zero);
+    flow.velocities(points, &[t; N][..count], &mut k1[..count]);
+    for i in 0..count {
+        at[i] = points[i] + k1[i] * (0.5 * dt);
+    }
+    flow.velocities(&at[..count], &[t + 0.5 * dt; N][..count], &mut k2[..count]);
+    for i in 0..count {
+        at[i] = points[i] + k2[i] * (0.5 * dt);
+    }
+    flow.velocities(&at[..count], &[t + 0.5 * dt; N][..count], &mut k3[..count]);
+    for i in 0..count {
+        at[i] = points[i] + k3[i] * dt;
+    }
+    flow.velocities(&at[..count], &[t + dt; N][..count], &mut k4[..count]);
+    for i in 0..count {
+        points[i] += (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0);
+    }
 }

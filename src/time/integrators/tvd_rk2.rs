@@ -2,9 +2,17 @@
 
 use crate::geometry::{Flow, Vector};
 
-/// The position at `t + dt` of the point at `x` at time `t`.
-pub(super) fn advance<const D: usize>(flow: &dyn Flow<D>, x: &Vector<D>, t: f64, dt: f64) -> Vector<D> {
-    let once = x + flow.velocity(x, t) * dt;
-    let twice = once + flow.velocity(&once, t + dt) * dt;
-    (x + twice) * 0.5
+/// Moves up to `N` points from `t` to `t + dt`.
+pub(super) fn advance<const D: usize, const N: usize>(flow: &dyn Flow<D>, points: &mut [Vector<D>], t: f64, dt: f64) {
+    let count = points.len();
+    let zero = [Vector::<D>::zeros(); N];
+    let (mut once, mut u) = (zero, zero);
+    flow.velocities(points, &[t; N][..count], &mut u[..count]);
+    for i in 0..count {
+        once[i] = points[i] + u[i] * dt;
+    }
+    flow.velocities(&once[..count], &[t + dt; N][..count], &mut u[..count]);
+    for i in 0..count {
+        points[i] = (points[i] + (once[i] + u[i] * dt)) * 0.5;
+    }
 }

@@ -5,8 +5,8 @@ use crate::formats::csv;
 use crate::spec::attempt_files;
 use crate::system::artifacts;
 use meniscus::simulation::run::ObserverError;
-use meniscus::simulation::{OutputPlan, Simulation};
-use std::fs::{File, OpenOptions};
+use meniscus::simulation::{Measures, OutputPlan, Simulation};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,10 @@ pub struct Series {
     epoch: u64,
     bytes: u64,
     plan: OutputPlan,
+    measures: Measures,
+    directory: PathBuf,
+    /// Whether the rows before have the columns of this attempt.
+    has_columns: bool,
 }
 
 impl Series {
@@ -23,7 +27,13 @@ impl Series {
     ///
     /// # Errors
     /// When a file cannot be read or written.
-    pub fn open(directory: &Path, epoch: u64, plan: OutputPlan, earlier: Option<(PathBuf, u64)>) -> io::Result<Self> {
+    pub fn open(
+        directory: &Path,
+        epoch: u64,
+        plan: OutputPlan,
+        measures: Measures,
+        earlier: Option<(PathBuf, u64)>,
+    ) -> io::Result<Self> {
         let path = directory.join(attempt_files::SERIES);
         let mut held = Vec::new();
         if let Some((earlier, bytes)) = earlier
@@ -39,7 +49,8 @@ impl Series {
         }
         artifacts::write(&path, &held)?;
         let file = OpenOptions::new().append(true).open(path)?;
-        Ok(Self { file, epoch, bytes: held.len() as u64, plan })
+        let directory = directory.to_owned();
+        Ok(Self { file, epoch, bytes: held.len() as u64, plan, measures, directory, has_columns: false })
     }
 
     /// The attempt that this file belongs to.
@@ -62,6 +73,30 @@ impl Series {
         self.file.sync_data()
     }
 
+    /// Gives the earlier rows the columns of this attempt, where an amendment changed what is measured: columns that are new have
+    /// no number there.
+    fn keep_columns(&mut self, header: &str) -> io::Result<()> {
+        if self.has_columns {
+            return Ok(());
+        }
+        self.has_columns = true;
+        let path = self.directory.join(attempt_files::SERIES);
+        let held = fs::read_to_string(&path)?;
+        if held.starts_with(header) {
+            return Ok(());
+        }
+        let table = csv::Table::from_text(&held);
+        let columns: Vec<Vec<f64>> = header.trim_end().split(',').map(|name| table.column(name).collect()).collect();
+        let mut text = header.to_owned();
+        for row in 0..table.rows.len() {
+            text += &csv::row(&columns.iter().map(|column| column[row]).collect::<Vec<_>>());
+        }
+        artifacts::write(&path, text.as_bytes())?;
+        self.file = OpenOptions::new().append(true).open(path)?;
+        self.bytes = text.len() as u64;
+        Ok(())
+    }
+
     /// Writes the row of this step, if it is due.
     ///
     /// # Errors
@@ -71,9 +106,15 @@ impl Series {
         if !is_first && !self.plan.is_series_due(&fixed_step(simulation), simulation.clock().step) {
             return Ok(());
         }
-        let (names, values): (Vec<&str>, Vec<f64>) =
+        let (mut names, mut values): (Vec<&str>, Vec<f64>) =
             simulation.observables().into_iter().map(|(quantity, value)| (quantity.name, value)).unzip();
-        let mut text = if is_first { csv::header(&names) } else { String::new() };
+        names.extend(self.measures.columns());
+        values.extend(self.measures.take(simulation));
+        let header = csv::header(&names);
+        if !is_first {
+            self.keep_columns(&header)?;
+        }
+        let mut text = if is_first { header } else { String::new() };
         text += &csv::row(&values);
         // One write, so that a reader sees whole rows.
         self.file.write_all(text.as_bytes())?;

@@ -5,7 +5,6 @@ use crate::geometry::surfaces::Ball;
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupted;
 use crate::schemes::exact_motion::{ExactFront, ExactMotion};
-use rayon::prelude::{IntoParallelRefMutIterator, ParallelIterator};
 
 /// Spacing of samples that a flow is going to carry along, relative to that of other samples: the flow draws them apart.
 const CARRIED_SPACING: f64 = 0.5;
@@ -23,8 +22,8 @@ impl<const D: usize> ExactFrontMotion<D> for ExactMotion<D> {
     fn compare(&self, moment: &Moment<'_, D>) -> Result<Option<Comparison<D>>, Interrupted> {
         let Some(surface) = self.surface() else { return Ok(None) };
         Ok(Some(match self.front(moment.time, moment.spacing(), moment.interrupt)? {
-            Some(front) => compare_with_front(&front, surface, moment),
-            None => compare_by_backward_map(self, surface, moment),
+            Some(front) => compare_with_front(&front, surface, moment)?,
+            None => compare_by_backward_map(self, surface, moment)?,
         }))
     }
 }
@@ -34,15 +33,15 @@ fn compare_with_front<const D: usize>(
     front: &ExactFront<'_, D>,
     surface: &dyn Surface<D>,
     moment: &Moment<'_, D>,
-) -> Comparison<D> {
+) -> Result<Comparison<D>, Interrupted> {
     let spacing = moment.spacing();
     let chains = front.chains(spacing / POINTS_PER_SPACING);
     let mut samples = Vec::new();
     if chains.is_empty() {
         for_each_sample(surface, spacing, |x| samples.extend(front.place_by_formula(&x)));
     }
-    let distances = moment.for_each(&moment.feet.positions, f64::NAN, |x| front.signed_distance(x));
-    Comparison { distances, chains, samples }
+    let distances = front.signed_distances(&moment.feet.positions, moment.interrupt)?;
+    Ok(Comparison { distances, chains, samples })
 }
 
 /// Foot points compared with the surface at the start by the backward map, and samples of the surface carried along.
@@ -50,19 +49,15 @@ fn compare_by_backward_map<const D: usize>(
     motion: &ExactMotion<D>,
     surface: &dyn Surface<D>,
     moment: &Moment<'_, D>,
-) -> Comparison<D> {
+) -> Result<Comparison<D>, Interrupted> {
     let (time, interrupt) = (moment.time, moment.interrupt);
     let fine = (CARRIED_SPACING * moment.spacing()).max(least_spacing(moment));
     let mut samples: Vec<Vector<D>> = Vec::new();
     for_each_sample(surface, fine, |x| samples.push(x));
-    samples.par_iter_mut().for_each(|x| {
-        if !interrupt.is_raised() {
-            *x = motion.place_about(x, time);
-        }
-    });
-    let distance = |x: &Vector<D>| motion.distance_nearby(x, time).unwrap_or(f64::NAN);
-    let distances = moment.for_each(&moment.feet.positions, f64::NAN, distance);
-    Comparison { distances, chains: Vec::new(), samples }
+    motion.carry_about(&mut samples, time, interrupt);
+    let nearby = motion.distances_nearby(&moment.feet.positions, time, interrupt)?;
+    let distances = nearby.unwrap_or_else(|| vec![f64::NAN; moment.feet.len()]);
+    Ok(Comparison { distances, chains: Vec::new(), samples })
 }
 
 /// Least spacing of samples.

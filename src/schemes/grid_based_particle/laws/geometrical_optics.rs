@@ -4,8 +4,8 @@ use super::prescribed_flow::{WIDEST_BRIDGE, carry};
 use super::{FrontLaw, MotionStep, MovingFront};
 use crate::geometry::flows::Rays;
 use crate::geometry::{Flow, Vector};
-use crate::parallel::Interrupted;
 use crate::schemes::grid_based_particle::foot_points::FootPoints;
+use crate::time::integrators::PathError;
 
 /// Rays of geometrical optics in a medium of constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +33,7 @@ impl FrontLaw<3, 1> for GeometricalOptics {
         self.rays.velocity(&feet.positions[i], time)
     }
 
-    fn advance(&self, front: &mut MovingFront<'_, 3>, step: &MotionStep<'_>) -> Result<f64, Interrupted> {
+    fn advance(&self, front: &mut MovingFront<'_, 3>, step: &MotionStep<'_>) -> Result<f64, PathError> {
         carry::<3, 1>(front.feet, &self.rays, step)
     }
 

@@ -1,12 +1,11 @@
 //! Motion by mean curvature.
 
-use super::{FrontAtStart, FrontLaw, MotionStep, MovingFront, StepPlan};
+use super::{FrontAtStart, FrontLaw, MotionStep, MovingFront, StepPlan, staged_motion};
 use crate::geometry::Vector;
-use crate::parallel::Interrupted;
 use crate::schemes::grid_based_particle::curvature_stability::{StabilityPlan, longest_step};
 use crate::schemes::grid_based_particle::exact_front::{ExactFrontMotion, ShrinkingBall, UnknownMotion};
 use crate::schemes::grid_based_particle::foot_points::FootPoints;
-use crate::time::PathIntegrator;
+use crate::time::integrators::PathError;
 
 /// The law of mean curvature: the velocity is −κ n with κ = ∇·n.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,10 +21,10 @@ const PARTICLES_IN_BENDS: [usize; 2] = [6, 16];
 /// the remains of one that has collapsed must not be joined to other sheets.
 const FARTHEST_SEARCH_IN_SPACE: f64 = 4.0;
 
-/// Stages of the classical Runge–Kutta scheme: offset of the stage from the start and its weight, both in steps.
-const FOUR_STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
-/// The same of the TVD scheme of order 2.
-const TWO_STAGES: [(f64, f64); 2] = [(0.0, 0.5), (1.0, 0.5)];
+/// Number of particles of the quadratic in bends of a front that its curvature smooths.
+pub(super) fn particles_in_bends<const D: usize>() -> Option<usize> {
+    Some(PARTICLES_IN_BENDS[D - 2])
+}
 
 /// The velocity −κ n of particle i.
 fn velocity<const D: usize>(feet: &FootPoints<D>, i: usize) -> Vector<D> {
@@ -43,42 +42,21 @@ impl<const D: usize, const M: usize> FrontLaw<D, M> for MeanCurvature {
 
     /// Runge–Kutta stages of dy/dt = −κ n, each with curvatures and normals of reconstructions through the particles of the
     /// stage.
-    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, Interrupted> {
-        let stages: &[(f64, f64)] = match step.integrator {
-            PathIntegrator::TvdRk2 => &TWO_STAGES,
-            PathIntegrator::Rk4 | PathIntegrator::Dopri5 { .. } => &FOUR_STAGES,
-        };
-        let MovingFront { feet, stages: storage, renew_geometry } = front;
-        let (starts, slopes) = (&mut storage.starts, &mut storage.slopes);
-        starts.clear();
-        starts.extend_from_slice(&feet.positions);
-        slopes.clear();
-        slopes.resize(feet.len(), Vector::<D>::zeros());
-        for (k, (offset, weight)) in stages.iter().enumerate() {
-            if k > 0 {
-                for (i, start) in starts.iter().enumerate() {
-                    feet.positions[i] = start + velocity(feet, i) * (offset * step.step);
-                }
-                renew_geometry(feet)?;
+    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, PathError> {
+        staged_motion::advance(front, step, |feet, _, velocities| {
+            for (i, slot) in velocities.iter_mut().enumerate() {
+                *slot = velocity(feet, i);
             }
-            for (i, slope) in slopes.iter_mut().enumerate() {
-                *slope += velocity(feet, i) * *weight;
-            }
-        }
-        let mut longest = 0.0_f64;
-        for ((x, start), slope) in feet.positions.iter_mut().zip(&*starts).zip(&*slopes) {
-            *x = start + slope * step.step;
-            longest = longest.max(slope.norm());
-        }
-        Ok(longest * step.step / step.spacing)
+            Ok(())
+        })
     }
 
-    fn normal_displacement(&self, curvature: f64, step: f64) -> f64 {
-        -curvature * step
+    fn normal_displacement(&self, feet: &FootPoints<D>, i: usize, _time: f64, step: f64) -> f64 {
+        -feet.curvatures[i] * step
     }
 
-    fn facing(&self, curvature: f64) -> f64 {
-        -curvature.signum()
+    fn facing(&self, feet: &FootPoints<D>, i: usize) -> f64 {
+        -feet.curvatures[i].signum()
     }
 
     fn farthest_search(&self) -> f64 {
@@ -87,7 +65,7 @@ impl<const D: usize, const M: usize> FrontLaw<D, M> for MeanCurvature {
 
     /// Bends flatten by themselves, the sharper the sooner; a wide polynomial would flatten them too slowly.
     fn particles_in_bends(&self) -> Option<usize> {
-        Some(PARTICLES_IN_BENDS[D - 2])
+        particles_in_bends::<D>()
     }
 
     fn opens_corners(&self, _signed_distance: f64) -> bool {

@@ -3,9 +3,9 @@
 use super::{FrontAtStart, FrontLaw, MotionStep, MovingFront};
 use crate::geometry::Vector;
 use crate::geometry::flows::Stretch;
-use crate::parallel::Interrupted;
 use crate::schemes::grid_based_particle::exact_front::{ExactFrontMotion, OffsetFront};
 use crate::schemes::grid_based_particle::foot_points::FootPoints;
+use crate::time::integrators::PathError;
 
 /// The law of a constant speed: the velocity is c n. Paths are straight lines, along which normals stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ impl<const D: usize, const M: usize> FrontLaw<D, M> for NormalSpeed {
         feet.normals[i] * self.speed
     }
 
-    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, Interrupted> {
+    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, PathError> {
         let displacement = self.speed * step.step;
         for (x, n) in front.feet.positions.iter_mut().zip(&front.feet.normals) {
             *x += n * displacement;
@@ -34,11 +34,11 @@ impl<const D: usize, const M: usize> FrontLaw<D, M> for NormalSpeed {
         Ok(if front.feet.is_empty() { 0.0 } else { displacement.abs() / step.spacing })
     }
 
-    fn normal_displacement(&self, _curvature: f64, step: f64) -> f64 {
+    fn normal_displacement(&self, _feet: &FootPoints<D>, _i: usize, _time: f64, step: f64) -> f64 {
         self.speed * step
     }
 
-    fn facing(&self, _curvature: f64) -> f64 {
+    fn facing(&self, _feet: &FootPoints<D>, _i: usize) -> f64 {
         self.speed.signum()
     }
 

@@ -4,11 +4,12 @@ use super::{FrontAtStart, FrontLaw, MotionStep, MovingFront};
 use crate::geometry::flows::Stretch;
 use crate::geometry::frame::{normal_to, tangents};
 use crate::geometry::{Flow, Vector};
-use crate::parallel::{BLOCK, Interrupted, one_by_one};
+use crate::parallel::one_by_one;
 use crate::schemes::exact_motion::ExactMotion;
 use crate::schemes::front_stretch::front_stretch;
 use crate::schemes::grid_based_particle::exact_front::ExactFrontMotion;
 use crate::schemes::grid_based_particle::foot_points::FootPoints;
+use crate::time::integrators::{PATHS, PathError, longer};
 use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSliceMut};
 use std::sync::Arc;
 
@@ -42,7 +43,7 @@ impl<const D: usize, const M: usize> FrontLaw<D, M> for PrescribedFlow<D> {
         self.flow.velocity(&feet.positions[i], time)
     }
 
-    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, Interrupted> {
+    fn advance(&self, front: &mut MovingFront<'_, D>, step: &MotionStep<'_>) -> Result<f64, PathError> {
         carry::<D, M>(front.feet, self.flow.as_ref(), step)
     }
 
@@ -90,33 +91,59 @@ pub(super) fn carry<const D: usize, const M: usize>(
     feet: &mut FootPoints<D>,
     flow: &dyn Flow<D>,
     motion: &MotionStep<'_>,
-) -> Result<f64, Interrupted> {
+) -> Result<f64, PathError> {
     let &MotionStep { time, step, integrator, spacing, interrupt } = motion;
     let offset = TANGENT_OFFSET * spacing;
-    let blocks = feet.positions.par_chunks_mut(BLOCK).zip(feet.normals.par_chunks_mut(BLOCK));
+    let blocks = feet.positions.par_chunks_mut(PATHS).zip(feet.normals.par_chunks_mut(PATHS));
     let longest = one_by_one(blocks)
         .map(|(positions, normals)| {
-            if interrupt.is_raised() {
-                return 0.0;
+            let count = positions.len();
+            let starts = tangents_of::<D, M>(normals);
+            // The other ends of the tangents, one lot for each of them.
+            let mut ends = [[Vector::<D>::zeros(); PATHS]; 2];
+            for (k, ends) in ends.iter_mut().enumerate().take(lots::<D, M>()) {
+                for (i, end) in ends[..count].iter_mut().enumerate() {
+                    *end = positions[i] + starts[k][i] * offset;
+                }
+                integrator.advance_all(flow, &mut ends[..count], time, step);
             }
-            let mut longest = 0.0_f64;
-            for (x, n) in positions.iter_mut().zip(normals) {
-                let next = integrator.advance(flow, x, time, step);
-                let carried = |t: Vector<D>| integrator.advance(flow, &(*x + t * offset), time, step) - next;
+            let longest = integrator.carry(flow, positions, time, step, interrupt)?;
+            for (i, n) in normals.iter_mut().enumerate() {
                 *n = if D - M == 1 {
                     let frame = tangents::<D, M>(n);
                     let side = normal_to(&frame).dot(n).signum();
-                    normal_to(&frame.map(carried)) * side
+                    let mut k = 0;
+                    let carried = frame.map(|_| {
+                        k += 1;
+                        ends[k - 1][i] - positions[i]
+                    });
+                    normal_to(&carried) * side
                 } else {
-                    carried(*n).normalize()
+                    (ends[0][i] - positions[i]).normalize()
                 };
-                longest = longest.max((next - *x).norm_squared());
-                *x = next;
             }
-            longest
+            Ok(longest)
         })
-        // A maximum does not depend on the order of its terms.
-        .reduce(|| 0.0, f64::max);
-    interrupt.check()?;
-    Ok(longest.sqrt() / spacing)
+        .reduce(|| Ok(0.0), longer)?;
+    Ok(longest / spacing)
+}
+
+/// Number of directions that are carried along: tangents of a surface, or the tangent that a curve in space has as its normal.
+const fn lots<const D: usize, const M: usize>() -> usize {
+    if D - M == 1 { M } else { 1 }
+}
+
+/// The directions that are carried along, by direction and particle.
+fn tangents_of<const D: usize, const M: usize>(normals: &[Vector<D>]) -> [[Vector<D>; PATHS]; 2] {
+    let mut directions = [[Vector::<D>::zeros(); PATHS]; 2];
+    for (i, n) in normals.iter().enumerate() {
+        if D - M == 1 {
+            for (k, tangent) in tangents::<D, M>(n).into_iter().enumerate() {
+                directions[k][i] = tangent;
+            }
+        } else {
+            directions[0][i] = *n;
+        }
+    }
+    directions
 }

@@ -114,7 +114,7 @@ impl<const D: usize, const M: usize> Reconstruction<'_, D, M> {
         let cosine = self.config.method.cosine;
         near.iter().map(|near| near.index).filter(|j| may_pass(self.feet, base, *j, cosine)).any(|j| {
             let spacing = self.config.grid.spacing_of(self.feet.nodes[j]);
-            let facing = self.config.law.facing(self.feet.curvatures[j]);
+            let facing = self.config.law.facing(self.feet, j);
             let ahead = |x| height_over(self.feet, j, x, spacing).map(|height| height * facing);
             let (Some(from), Some(to)) = (ahead(start), ahead(place)) else { return false };
             let tolerance = TUNING.on_segment * spacing;

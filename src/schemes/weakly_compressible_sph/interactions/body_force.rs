@@ -1,13 +1,16 @@
 //! Body forces: accelerations from outside.
 
 use super::{LimitContext, LimitsStep, Moment, ParticleForce, StepLimit};
+use crate::formulas::{BLOCK, Bound, Input};
 use crate::geometry::Vector;
 use crate::schemes::weakly_compressible_sph::fluids::Fluid;
 use crate::schemes::weakly_compressible_sph::species::{Fluids, Species};
+use rayon::prelude::{IndexedParallelIterator, ParallelIterator, ParallelSlice, ParallelSliceMut};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A force from outside.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum BodyForce<const D: usize> {
     /// The same acceleration of every particle.
     Constant(Vector<D>),
@@ -33,6 +36,59 @@ pub enum BodyForce<const D: usize> {
         /// The lengths A, B and, in space, C.
         lengths: Vector<D>,
     },
+    /// An acceleration by formulas of a user.
+    Formula(Arc<FormulaForce>),
+}
+
+/// Accelerations by formulas of the place, of the species and of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FormulaForce {
+    acceleration: Bound,
+    strength: f64,
+}
+
+impl FormulaForce {
+    /// Formulas of x, y, (z,) inside and t, and the largest acceleration that is expected.
+    #[must_use]
+    pub fn new(acceleration: Bound, strength: f64) -> Self {
+        Self { acceleration, strength }
+    }
+
+    fn at<const D: usize>(&self, x: &Vector<D>, time: f64, species: Species) -> Vector<D> {
+        Vector::<D>::from_column_slice(&self.acceleration.at(&Self::place(x, time, species)))
+    }
+
+    fn place<const D: usize>(x: &Vector<D>, time: f64, species: Species) -> Vec<f64> {
+        x.iter().copied().chain([f64::from(u8::from(species == Species::Inside)), time]).collect()
+    }
+
+    /// Adds the accelerations of all particles.
+    fn add<const D: usize>(
+        &self,
+        acceleration: &mut [Vector<D>],
+        positions: &[Vector<D>],
+        species: &[Species],
+        time: f64,
+    ) {
+        let blocks = acceleration.par_chunks_mut(BLOCK).zip(positions.par_chunks(BLOCK)).zip(species.par_chunks(BLOCK));
+        blocks.for_each(|((acceleration, positions), species)| {
+            let mut columns = [[0.0; BLOCK]; 4];
+            for (i, (x, species)) in positions.iter().zip(species).enumerate() {
+                for d in 0..D {
+                    columns[d][i] = x[d];
+                }
+                columns[D][i] = f64::from(u8::from(*species == Species::Inside));
+            }
+            let count = positions.len();
+            let inputs: [Input<'_>; 5] =
+                std::array::from_fn(
+                    |k| {
+                        if k <= D { Input::Column(&columns[k][..count]) } else { Input::Uniform(time) }
+                    },
+                );
+            self.acceleration.block(&inputs[..D + 2], count, |d, i, value| acceleration[i][d] += value);
+        });
+    }
 }
 
 impl<const D: usize> BodyForce<D> {
@@ -54,7 +110,18 @@ impl<const D: usize> BodyForce<D> {
                 }
                 acceleration
             }
+            Self::Formula(force) => force.at(x, time, species),
         }
+    }
+
+    /// Why the force has no value for a particle, where a formula has none.
+    #[must_use]
+    pub fn fault(&self, x: &Vector<D>, time: f64, species: Species) -> Option<String> {
+        let Self::Formula(force) = self else { return None };
+        force
+            .acceleration
+            .fault(&FormulaForce::place(x, time, species))
+            .map(|fault| format!("{fault} (the body force)"))
     }
 
     /// The same force in a box of a mean density, where its mean is to be taken out.
@@ -70,7 +137,7 @@ impl<const D: usize> BodyForce<D> {
     pub fn constant_strength(&self) -> f64 {
         match self {
             Self::Constant(whole) | Self::WithoutMean(whole) | Self::BySpecies { whole, .. } => whole.norm(),
-            Self::Pulse { .. } => 0.0,
+            Self::Pulse { .. } | Self::Formula(_) => 0.0,
         }
     }
 
@@ -81,12 +148,17 @@ impl<const D: usize> BodyForce<D> {
             Self::Constant(acceleration) | Self::WithoutMean(acceleration) => acceleration.norm(),
             Self::BySpecies { inside, outside, .. } => inside.norm().max(outside.norm()),
             Self::Pulse { coefficient, .. } => coefficient.abs(),
+            Self::Formula(force) => force.strength,
         }
     }
 }
 
 impl<const D: usize> ParticleForce<D> for BodyForce<D> {
     fn add_to(&self, acceleration: &mut [Vector<D>], moment: &Moment<'_, D>) {
+        if let Self::Formula(force) = self {
+            force.add(acceleration, moment.particles.positions(), &moment.flow.species, moment.time);
+            return;
+        }
         let particles = moment.particles.positions().iter().zip(&moment.flow.species);
         for (acceleration, (x, species)) in acceleration.iter_mut().zip(particles) {
             *acceleration += self.acceleration(x, moment.time, *species);
