@@ -3,12 +3,15 @@
 //! Surfaces give the distance, closest point, normal and curvature of any query point, exact to round-off. Scenes start
 //! from them, and errors are measured against them.
 
+mod box_tree;
 pub mod dimension;
 pub mod domain;
 pub mod fibonacci;
+pub mod formula_level;
 pub mod flows;
 pub mod frame;
 pub mod lattice;
+pub mod level;
 pub mod random;
 pub mod surfaces;
 

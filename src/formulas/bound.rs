@@ -143,6 +143,22 @@ impl Bound {
         Self { graph, terms, texts, variables: self.variables.clone(), program }
     }
 
+    /// The first formula f with its first and second derivatives by some variables: f, then ∂f/∂v, then ∂²f/∂v∂w row by row.
+    #[must_use]
+    pub fn jet(&self, by: &[usize]) -> Self {
+        let mut graph = self.graph.clone();
+        let Some(value) = self.terms.first().copied() else { return self.clone() };
+        let first: Vec<NodeId> = by.iter().map(|variable| derivative(&mut graph, value, *variable)).collect();
+        let mut terms = vec![value];
+        terms.extend(&first);
+        for slope in first {
+            terms.extend(by.iter().map(|variable| derivative(&mut graph, slope, *variable)).collect::<Vec<_>>());
+        }
+        let program = Program::new(&graph, &terms);
+        let texts = vec![self.texts.first().cloned().unwrap_or_default(); terms.len()];
+        Self { graph, terms, texts, variables: self.variables.clone(), program }
+    }
+
     /// The values at one point, where the variables have the values `at`.
     #[must_use]
     pub fn at(&self, at: &[f64]) -> Vec<f64> {

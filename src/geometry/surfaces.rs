@@ -4,27 +4,43 @@
 //! normals point outward. The curvature is ∇·n: 1/R on a circle, 2/R on a sphere.
 
 pub mod ball;
+pub mod complement;
+pub mod composed;
 pub mod cuboid;
+mod distance_level;
 pub mod dumbbell;
 pub mod ellipsoid;
+pub mod implicit;
+pub mod placed;
+pub mod polygon;
 mod profile;
 pub mod rounded_cuboid;
+mod sampled;
+pub mod solid;
 pub mod torus;
 pub mod union;
 pub mod wavy_layer;
 pub mod zalesak_disk;
 
 pub use ball::Ball;
+pub use complement::Complement;
+pub use composed::{Composed, EmptySolid};
 pub use cuboid::Cuboid;
 pub use dumbbell::Dumbbell;
 pub use ellipsoid::Ellipsoid;
+pub use implicit::{ImplicitError, ImplicitSurface};
+pub use placed::{Placed, Placement};
+pub use polygon::{Polygon, PolygonError};
 pub use rounded_cuboid::RoundedCuboid;
+pub use solid::Solid;
 pub use torus::Torus;
 pub use union::Union;
 pub use wavy_layer::WavyLayer;
 pub use zalesak_disk::ZalesakDisk;
 
 use super::Vector;
+use super::level::LevelFunction;
+use std::sync::Arc;
 
 /// Closest point of a surface to a query point, with the geometry there.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,6 +87,43 @@ pub trait Surface<const D: usize>: Send + Sync {
     /// Signed distance of `x`, positive outside.
     fn signed_distance(&self, x: &Vector<D>) -> f64 {
         self.nearest(x).distance
+    }
+
+    /// Smooth level functions, negative inside, whose zeros together contain the surface. None where the surface is smooth
+    /// itself, so that its distance is one.
+    fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<D>>>> {
+        None
+    }
+}
+
+/// A surface that several owners share.
+impl<const D: usize> Surface<D> for Arc<dyn Surface<D>> {
+    fn nearest(&self, x: &Vector<D>) -> SurfacePoint<D> {
+        self.as_ref().nearest(x)
+    }
+
+    fn bounding_box(&self) -> (Vector<D>, Vector<D>) {
+        self.as_ref().bounding_box()
+    }
+
+    fn area_or_volume(&self) -> f64 {
+        self.as_ref().area_or_volume()
+    }
+
+    fn near_medial_axis(&self, x: &Vector<D>, tolerance: f64) -> bool {
+        self.as_ref().near_medial_axis(x, tolerance)
+    }
+
+    fn outline(&self, spacing: f64) -> Vec<Vec<Vector<D>>> {
+        self.as_ref().outline(spacing)
+    }
+
+    fn signed_distance(&self, x: &Vector<D>) -> f64 {
+        self.as_ref().signed_distance(x)
+    }
+
+    fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<D>>>> {
+        self.as_ref().faces()
     }
 }
 

@@ -148,7 +148,7 @@ fn the_brusselator_by_formulas_is_the_built_in_one() {
 fn a_field_by_formula_has_its_exact_operator() {
     let error = |field: Value| {
         let body = json!({"kind": "surface_pde", "surface": "torus", "count": 2000, "problem": {"type": "laplace_beltrami", "field": field}});
-        finished(&body).report().errors.iter().find(|e| e.norm == "linf").map(|e| e.value).unwrap()
+        finished(&body).report().errors.iter().find(|e| e.norm == "relative").map(|e| e.value).unwrap()
     };
     let built = error(json!({"type": "plane_wave", "k": [1, -0.5, 1.5]}));
     let written = error(json!({"type": "formula", "value": "sin(x - y/2 + 1.5*z)"}));

@@ -14,6 +14,7 @@ mod connections;
 mod contract;
 mod data_directory;
 mod estimates;
+mod examples;
 mod http;
 mod readers;
 mod requests;

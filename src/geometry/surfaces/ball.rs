@@ -1,7 +1,9 @@
 //! Circle and sphere.
 
 use super::{Surface, SurfacePoint, Vector, arc_points};
+use crate::geometry::level::{BallLevel, LevelFunction};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// All points at distance `radius` from `center`.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,5 +48,9 @@ impl<const D: usize> Surface<D> for Ball<D> {
             return Vec::new();
         }
         vec![arc_points(&self.center, [self.radius; 2], 0.0, 2.0 * PI, spacing)]
+    }
+
+    fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<D>>>> {
+        Some(vec![Arc::new(BallLevel { center: self.center, radius: self.radius })])
     }
 }

@@ -1,6 +1,8 @@
 //! Box (rectangle in 2D) with faces perpendicular to the coordinate axes.
 
 use super::{Surface, SurfacePoint, Vector, join, line_points};
+use crate::geometry::level::{LevelFunction, PlaneLevel};
+use std::sync::Arc;
 
 /// The box |x_i − c_i| ≤ size_i / 2.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,5 +82,14 @@ impl<const D: usize> Surface<D> for Cuboid<D> {
         };
         let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
         vec![join((0..4).map(|k| line_points(&corners[k], &corners[(k + 1) % 4], spacing)).collect())]
+    }
+
+    fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<D>>>> {
+        let face = |k: usize| -> Arc<dyn LevelFunction<D>> {
+            let mut normal = Vector::<D>::zeros();
+            normal[k / 2] = if k % 2 == 0 { 1.0 } else { -1.0 };
+            Arc::new(PlaneLevel::through(&(self.center + normal * (0.5 * self.size[k / 2])), normal))
+        };
+        Some((0..2 * D).map(face).collect())
     }
 }

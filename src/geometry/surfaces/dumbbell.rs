@@ -5,7 +5,9 @@
 
 use super::profile::{Piece, nearest_of};
 use super::{Surface, SurfacePoint, Vector, arc_points, join, line_points};
+use crate::geometry::level::{BallLevel, LevelFunction, TubeLevel};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Two balls of equal radius whose centers are `separation` apart, and a cylinder (strip in 2D) between them.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,5 +119,15 @@ impl<const D: usize> Surface<D> for Dumbbell<D> {
         let above = line_points(&right[right.len() - 1], &left[0], spacing);
         let below = line_points(&left[left.len() - 1], &right[0], spacing);
         vec![join(vec![right, above, left, below])]
+    }
+
+    fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<D>>>> {
+        let ball = |side: f64| {
+            let mut center = self.center;
+            center[0] += side * self.half_separation;
+            BallLevel { center, radius: self.radius }
+        };
+        let neck = TubeLevel { center: self.center, radius: self.neck_radius };
+        Some(vec![Arc::new(ball(-1.0)), Arc::new(ball(1.0)), Arc::new(neck)])
     }
 }

@@ -5,7 +5,9 @@
 //! the left end of the bracket to the root.
 
 use super::{Surface, SurfacePoint, Vector, arc_points};
+use crate::geometry::level::{Hessian, LevelFunction, LevelJet};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// The surface Σ ((x_i − c_i) / e_i)² = 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,5 +134,25 @@ impl<const D: usize> Surface<D> for Ellipsoid<D> {
             return Vec::new();
         }
         vec![arc_points(&self.center, [self.semi_axes[0], self.semi_axes[1]], 0.0, 2.0 * PI, spacing)]
+    }
+
+    fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<D>>>> {
+        Some(vec![Arc::new(self.clone())])
+    }
+}
+
+/// The level Σ ((x_i − c_i)/e_i)² − 1, which is not a distance.
+impl<const D: usize> LevelFunction<D> for Ellipsoid<D> {
+    fn value(&self, x: &Vector<D>) -> f64 {
+        (x - self.center).component_div(&self.semi_axes).norm_squared() - 1.0
+    }
+
+    fn jet(&self, x: &Vector<D>) -> LevelJet<D> {
+        let slopes = self.semi_axes.map(|e| 2.0 / (e * e));
+        LevelJet {
+            value: self.value(x),
+            gradient: (x - self.center).component_mul(&slopes),
+            hessian: Hessian::<D>::from_diagonal(&slopes),
+        }
     }
 }

@@ -2,7 +2,9 @@
 
 use super::profile::{Piece, nearest_of};
 use super::{Surface, SurfacePoint, Vector, arc_points, join, line_points};
+use crate::geometry::level::{BallLevel, LevelFunction, PlaneLevel};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A disk without a vertical slot that extends by `slot_depth` up from the lowest point of the circle.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,5 +82,15 @@ impl Surface<2> for ZalesakDisk {
             line_points(&right, &arc[0], spacing),
         ];
         vec![join(std::iter::once(arc).chain(sides).collect())]
+    }
+
+    fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<2>>>> {
+        let level = |piece: &Piece| -> Arc<dyn LevelFunction<2>> {
+            match *piece {
+                Piece::Arc { center, radius, .. } => Arc::new(BallLevel { center, radius }),
+                Piece::Line { from, normal, .. } => Arc::new(PlaneLevel::through(&from, normal)),
+            }
+        };
+        Some(self.pieces.iter().map(level).collect())
     }
 }

@@ -93,12 +93,14 @@ fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
         (Some(mut shape), _) => {
             let corners = given_box.unwrap_or(case.domain);
             name_wavelength(&mut shape, &corners);
-            let radius = smallest_radius::<D>(&shape);
+            let surface = shape.surface::<D>("/shape").ok();
+            let radius = smallest_radius(&shape, surface.as_ref());
             (shape, corners, radius)
         }
         // The case at the size R = 1. The pulse and the steps of a dividing drop are made for its own size.
         (None, Some(own)) if name != CaseName::Dividing => {
-            let factor = smallest_radius::<D>(&own).map_or(1.0, |radius| 1.0 / radius);
+            let surface = own.surface::<D>("/shape").ok();
+            let factor = smallest_radius(&own, surface.as_ref()).map_or(1.0, |radius| 1.0 / radius);
             (scaled::<D>(own, factor), given_box.unwrap_or_else(|| scaled_corners(case.domain, factor)), Some(1.0))
         }
         // A custom drop needs a shape.

@@ -2,7 +2,7 @@
 
 use super::spec::{Droplet, FluidSpec};
 use crate::geometry::Vector;
-use crate::scenes::shapes::Shape;
+use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::schemes::weakly_compressible_sph::ball_curvature;
 use crate::simulation::Finding;
 use crate::spec::Violation;
@@ -41,12 +41,11 @@ pub(super) struct SceneNumbers {
 
 impl SceneNumbers {
     pub fn new<const D: usize>(
-        shape: Option<&Shape>,
+        radius: Option<f64>,
         [tension, largest_tension]: [f64; 2],
         [gravity, start_speed, own_speed]: [f64; 3],
         lengths: &Vector<D>,
     ) -> Self {
-        let radius = shape.and_then(smallest_radius::<D>);
         let curvature = (D - 1) as f64 / radius.unwrap_or(0.5 * lengths.min());
         Self { radius, curvature, tension, largest_tension, gravity, start_speed, own_speed, length: lengths.max() }
     }
@@ -111,17 +110,14 @@ pub(super) fn least_sound_speed(fluid: &FluidSpec, radius: Option<f64>, tension:
     (TUNING.stiffness * capillary.max(fall)).sqrt()
 }
 
-/// Radius of the smallest ball that has the area or volume of a part of a shape; half the length of the waves of a layer.
-pub(super) fn smallest_radius<const D: usize>(shape: &Shape) -> Option<f64> {
-    match shape {
-        Shape::Points { .. } => return None,
-        // Half of a wave, or of the layer where it is flat, stands for the radius.
-        Shape::Layer { thickness, amplitude, wavelength, .. } => {
-            return Some(0.5 * wavelength.filter(|_| *amplitude > 0.0).unwrap_or(*thickness));
-        }
-        Shape::Plain(_) | Shape::Union { .. } => {}
+/// Radius of the smallest ball that has the area or volume of a part of a shape; half the length of the waves of a layer; none
+/// where the surface of the shape is not known.
+pub(super) fn smallest_radius<const D: usize>(shape: &Shape, surface: Option<&ShapeSurface<D>>) -> Option<f64> {
+    // Half of a wave, or of the layer where it is flat, stands for the radius.
+    if let Shape::Layer { thickness, amplitude, wavelength, .. } = shape {
+        return Some(0.5 * wavelength.filter(|_| *amplitude > 0.0).unwrap_or(*thickness));
     }
-    let parts = shape.parts::<D>("/shape").ok()?;
+    let parts = &surface?.parts;
     let radius = |measure: f64| (D - 1) as f64 / ball_curvature::<D>(measure);
     parts.iter().map(|part| radius(part.area_or_volume())).filter(|radius| *radius > 0.0).reduce(f64::min)
 }

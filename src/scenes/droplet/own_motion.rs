@@ -3,7 +3,6 @@
 use super::spec::{Droplet, InitialVelocitySpec};
 use crate::formulas::{Bound, Context, FormulaList, Input, NamedNumbers};
 use crate::geometry::Vector;
-use crate::scenes::shapes::Shape;
 use crate::schemes::weakly_compressible_sph::{BodyForce, FormulaForce};
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
@@ -29,7 +28,7 @@ const fn places<const D: usize>() -> &'static [&'static str] {
 /// The velocities of a spec; None where it gives none, or where something is wrong with them.
 pub(super) fn start_motion<const D: usize>(
     spec: &Droplet,
-    shape: Option<&Shape>,
+    parts_of_shape: Option<usize>,
     errors: &mut Vec<Violation>,
 ) -> Option<StartMotion> {
     let InitialVelocitySpec { inside, parts, outside, parameters } = spec.initial_velocity.as_ref()?;
@@ -55,12 +54,11 @@ pub(super) fn start_motion<const D: usize>(
         let detail = "the fluid inside has one velocity, or each part of a union has its own; give one of them";
         errors.push(Violation::new(format!("{POINTER}/parts"), "conflict", detail, parts.to_json(), Value::Null));
     }
-    if let (Some(parts), Some(shape)) = (parts, shape) {
-        let found = if let Shape::Union { of } = shape { of.len() } else { 1 };
-        if found != parts.0.len() {
-            let detail = format!("the shape has {found} parts, and there are velocities of {}", parts.0.len());
-            errors.push(Violation::new(format!("{POINTER}/parts"), "conflict", detail, parts.0.len(), json!(found)));
-        }
+    if let (Some(parts), Some(found)) = (parts, parts_of_shape)
+        && found != parts.0.len()
+    {
+        let detail = format!("the shape has {found} parts, and there are velocities of {}", parts.0.len());
+        errors.push(Violation::new(format!("{POINTER}/parts"), "conflict", detail, parts.0.len(), json!(found)));
     }
     let inside: Option<Vec<Bound>> = given.into_iter().collect();
     let inside = inside?;

@@ -22,7 +22,7 @@ use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext};
-use crate::scenes::shapes::Shape;
+use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
@@ -34,12 +34,15 @@ use crate::simulation::{Finding, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 pub(super) struct DropletScene<const D: usize> {
     pub(super) spec: Droplet,
     pub(super) shape: Shape,
     /// Motion of the fluids at the start, where it is given.
     motion: Option<StartMotion>,
+    /// The surface of the shape; none of a layer, and where points from outside tell it.
+    surface: Option<ShapeSurface<D>>,
     pub(super) low: Vector<D>,
     pub(super) high: Vector<D>,
     lattice: StartLattice<D>,
@@ -128,13 +131,16 @@ fn start_lattice<const D: usize>(
     lattice
 }
 
-/// The shape of the drop and the points that it names; the spec gets the shape.
+/// The shape of a drop, its surface where that is known before the run, and the points that it names.
+type DropShape<const D: usize> = (Shape, Option<ShapeSurface<D>>, Option<CloudReference>);
+
+/// The shape of the drop; the spec gets it.
 fn drop_shape<const D: usize>(
     spec: &mut Droplet,
     case: &Case,
     lengths: &Vector<D>,
     errors: &mut Vec<Violation>,
-) -> Option<(Shape, Option<CloudReference>)> {
+) -> Option<DropShape<D>> {
     let Some(shape) = spec.shape.take().or_else(|| case.shape.clone()) else {
         let allowed = json!({"type": "circle"});
         errors.push(Violation::new("/shape", "required", "a custom drop needs a shape", Value::Null, allowed));
@@ -142,16 +148,15 @@ fn drop_shape<const D: usize>(
     };
     let points = shape.points_reference("/shape", errors);
     let mut shape = shape;
-    match &mut shape {
-        Shape::Points { .. } => {}
-        layer @ Shape::Layer { .. } => check_layer(layer, lengths, errors),
-        known => match known.surface::<D>("/shape") {
-            Ok(surface) => errors.extend(check_size(surface.as_ref(), lengths, &shape)),
-            Err(found) => errors.extend(found),
-        },
+    let mut surface = None;
+    if let Shape::Layer { .. } = shape {
+        check_layer(&mut shape, lengths, errors);
+    } else if !shape.is_from_outside() {
+        surface = shape.surface::<D>("/shape").map_err(|found| errors.extend(found)).ok();
+        errors.extend(surface.as_ref().and_then(|surface| check_size(surface.whole.as_ref(), lengths, &shape)));
     }
     spec.shape = Some(shape.clone());
-    Some((shape, points))
+    Some((shape, surface, points))
 }
 
 /// 1. Box. 2. Shape. 3. Flow, geometry and forces. 4. Time step. 5. What they mean together.
@@ -178,12 +183,14 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         Some(ForceChoice::Pulse { .. } | ForceChoice::Formula { .. } | ForceChoice::None) | None => 0.0,
     };
     let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, &mut errors));
-    let motion = start_motion::<D>(&spec, shape.as_ref().map(|(shape, _)| shape), &mut errors);
+    let parts = shape.as_ref().and_then(|(_, surface, _)| Some(surface.as_ref()?.parts.len()));
+    let motion = start_motion::<D>(&spec, parts, &mut errors);
     let own_speed = motion.as_ref().map_or(0.0, |motion| motion.top_speed(&low, &lengths));
     let speeds = [gravity, velocity.norm(), own_speed];
-    let start = StartBox { shape: shape.as_ref().map(|(shape, _)| shape), low, lengths };
+    let surface = shape.as_ref().and_then(|(_, surface, _)| surface.as_ref());
+    let start = StartBox { shape: shape.as_ref().map(|(shape, ..)| shape), surface, low, lengths };
     let tensions = [tension, tension * largest_tension(&spec, &start)];
-    let numbers = SceneNumbers::new(start.shape, tensions, speeds, &lengths);
+    let numbers = SceneNumbers::new(start.radius(), tensions, speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
     let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
     let extent = (&low, &lengths, spec.end_time);
@@ -194,7 +201,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     config.is_at_rest = motion.is_none();
     config.start_velocity = velocity;
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
-    config.wave = shape.as_ref().and_then(|(shape, _)| standing_wave(shape, &spec, tension, &lengths));
+    config.wave = shape.as_ref().and_then(|(shape, ..)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     if is_box
         && lattice.count() >= 1.0
@@ -205,7 +212,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     }
     numbers.check_sound_speeds(&spec, &mut errors);
     dimensionless::complete(&mut spec, &numbers, &mut errors);
-    let Some((shape, points)) = shape.filter(|_| errors.is_empty()) else {
+    let Some((shape, surface, points)) = shape.filter(|_| errors.is_empty()) else {
         return Err(errors);
     };
     let mut chosen = BTreeMap::new();
@@ -222,6 +229,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         spec,
         shape,
         motion,
+        surface,
         low,
         high,
         lattice,
@@ -469,9 +477,8 @@ impl<const D: usize> Scene for DropletScene<D> {
         let (level, measure) = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
             let area = lengths.product() / lengths[1];
             (positions.iter().map(|x| distance_from_layer(&layer, lengths[1], x)).collect(), layer.thickness * area)
-        } else if self.clouds.is_empty() {
-            let surface = self.shape.surface::<D>("/shape")?;
-            (self.levels(surface.as_ref(), &positions), surface.area_or_volume())
+        } else if let Some(ShapeSurface { whole, .. }) = &self.surface {
+            (self.levels(whole.as_ref(), &positions), whole.area_or_volume())
         } else {
             (self.levels_of_points(&context, &positions).map_err(|found| vec![found])?, f64::NAN)
         };
@@ -502,7 +509,7 @@ impl<const D: usize> DropletScene<D> {
         level: &[f64],
     ) -> Result<Vec<Vector<D>>, Vec<Violation>> {
         // Points from outside have no parts.
-        let parts = self.shape.parts::<D>("/shape").unwrap_or_default();
+        let parts: &[Arc<dyn Surface<D>>] = self.surface.as_ref().map_or(&[], |surface| &surface.parts);
         let of_parts: Vec<Vec<f64>> = parts.iter().map(|part| self.levels(part.as_ref(), positions)).collect();
         let nearest =
             |i: usize| (0..of_parts.len()).min_by(|a, b| of_parts[*a][i].total_cmp(&of_parts[*b][i])).unwrap_or(0);
@@ -535,8 +542,8 @@ impl<const D: usize> DropletScene<D> {
     /// box where it is not known.
     fn near(&self, width: f64) -> f64 {
         let lengths = self.lengths();
-        let surface = self.shape.surface::<D>("/shape");
-        let measure = surface.map_or_else(|_| lengths.product() / 5.0, |surface| surface.area_or_volume());
+        let surface = self.surface.as_ref();
+        let measure = surface.map_or(lengths.product() / 5.0, |surface| surface.whole.area_or_volume());
         let area = match self.shape {
             Shape::Layer { .. } => 2.0 * lengths.product() / lengths[1],
             _ if D == 2 => 2.0 * (std::f64::consts::PI * measure).sqrt(),

@@ -1,9 +1,10 @@
 //! Surface tensions that vary: by a slope in space, or by a surfactant.
 
+use super::numbers::smallest_radius;
 use super::spec::{Droplet, EquationWord, IntegratorWord, MOST_COVERAGE, Shifting, SurfactantSpec, TensionWord};
 use super::vectors::vector;
 use crate::geometry::Vector;
-use crate::scenes::shapes::{PlainShape, Shape};
+use crate::scenes::shapes::{PlainShape, Shape, ShapeSurface};
 use crate::schemes::weakly_compressible_sph::{EquationOfState, Geometry, SphConfig, SurfactantConfig, TensionLaw};
 use crate::spec::choice::Choice;
 use crate::spec::{Coordinates, Parameter, Violation};
@@ -17,28 +18,28 @@ const SLACK: f64 = 1e-9;
 /// The drop in its box at the start.
 pub(super) struct StartBox<'a, const D: usize> {
     pub shape: Option<&'a Shape>,
+    pub surface: Option<&'a ShapeSurface<D>>,
     pub low: Vector<D>,
     pub lengths: Vector<D>,
 }
 
 impl<const D: usize> StartBox<'_, D> {
+    /// Radius of the smallest drop, as [`smallest_radius`] has it.
+    pub fn radius(&self) -> Option<f64> {
+        smallest_radius(self.shape?, self.surface)
+    }
+
     /// Lower and upper corner of the drop, from the middle of the box; those of the box where the shape is known by points alone. A
     /// layer reaches across the box but for y.
     fn corners(&self) -> (Vector<D>, Vector<D>) {
         let (mut low, mut high) = (self.lengths * -0.5, self.lengths * 0.5);
         let middle = self.low + self.lengths * 0.5;
-        match self.shape {
-            Some(Shape::Layer { height, thickness, amplitude, .. }) => {
-                let half = 0.5 * thickness + amplitude;
-                (low[1], high[1]) = (height - half - middle[1], height + half - middle[1]);
-            }
-            None | Some(Shape::Points { .. }) => {}
-            Some(shape) => {
-                if let Ok(surface) = shape.surface::<D>("/shape") {
-                    let corners = surface.bounding_box();
-                    (low, high) = (corners.0 - middle, corners.1 - middle);
-                }
-            }
+        if let Some(Shape::Layer { height, thickness, amplitude, .. }) = self.shape {
+            let half = 0.5 * thickness + amplitude;
+            (low[1], high[1]) = (height - half - middle[1], height + half - middle[1]);
+        } else if let Some(surface) = self.surface {
+            let corners = surface.whole.bounding_box();
+            (low, high) = (corners.0 - middle, corners.1 - middle);
         }
         (low, high)
     }
@@ -121,7 +122,8 @@ fn of_slope<const D: usize>(
         errors.push(Violation::new("/tension_slope", "range", detail, slope.to_json(), allowed));
     }
     refuse_jump("/tension_slope", slope, (&vector, start, half_band), errors);
-    let is_ball = matches!(start.shape, Some(Shape::Plain(PlainShape::Circle { .. } | PlainShape::Sphere { .. })));
+    let is_ball =
+        matches!(start.shape.and_then(Shape::as_plain), Some(PlainShape::Circle { .. } | PlainShape::Sphere { .. }));
     (vector != Vector::<D>::zeros()).then_some(TensionLaw::Slope { slope: vector, largest: 1.0 + most, is_ball })
 }
 

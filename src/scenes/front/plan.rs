@@ -13,7 +13,7 @@ use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View
 use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::{error_units, path_units};
 use crate::scenes::particle_estimate::{band_particles, check_extent};
-use crate::scenes::shapes::Shape;
+use crate::scenes::shapes::ShapeSurface;
 use crate::scenes::work_estimate;
 use crate::schemes::grid_based_particle;
 use crate::schemes::grid_based_particle::laws::FrontAtStart;
@@ -30,6 +30,7 @@ const COUNTED: u64 = 20_000;
 
 struct FrontScene<const D: usize, const M: usize> {
     choice: FrontChoice,
+    surface: ShapeSurface<D>,
     law: Arc<dyn FrontLaw<D, M>>,
     plan: FrontPlan,
 }
@@ -66,7 +67,7 @@ pub(in crate::scenes) fn plan_front(
     dimension: Option<usize>,
     complete: impl FnOnce(Completed) -> Resolved,
 ) -> Planned {
-    if let Shape::Points { .. } = choice.shape {
+    if choice.shape.is_from_outside() {
         let detail = "a front starts from a shape that is known exactly";
         let allowed = json!(["circle", "sphere", "ellipse", "box", "union", "…"]);
         return Err(vec![Violation::new("/shape/type", "conflict", detail, "points", allowed)]);
@@ -85,17 +86,17 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
     let mut errors = Vec::new();
     let surface = choice.shape.surface::<D>("/shape");
     match &surface {
-        Ok(surface) => errors.extend(check_extent(surface.as_ref(), 4.0 * choice.spacing, choice.spacing)),
+        Ok(surface) => errors.extend(check_extent(surface.whole.as_ref(), 4.0 * choice.spacing, choice.spacing)),
         Err(found) => errors.extend(found.iter().cloned()),
     }
     // Where the motion of another scene is done as a front, its flow stands at the top.
     let flow_pointer = if choice.pointer.is_empty() { "/law/flow" } else { "/flow" };
-    let extent = surface.as_ref().ok().map(|surface| surface.bounding_box());
+    let extent = surface.as_ref().ok().map(|surface| surface.whole.bounding_box());
     let about = extent.unwrap_or((Vector::<D>::zeros(), Vector::<D>::repeat(1.0)));
     let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about);
     errors.extend(law.as_ref().err().into_iter().flatten().cloned());
     if let (Ok(law), Ok(surface)) = (&law, &surface) {
-        errors.extend(law.flow().and_then(|flow| check_return(flow, surface.as_ref(), flow_pointer)));
+        errors.extend(law.flow().and_then(|flow| check_return(flow, surface.whole.as_ref(), flow_pointer)));
     }
     let question = FrontQuestion {
         law: law.as_deref().ok(),
@@ -105,12 +106,12 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
     };
     let plan = plan_method(&choice, &question, complete, errors)?;
     let law = law?;
-    Ok(Box::new(FrontScene { choice, law, plan }))
+    Ok(Box::new(FrontScene { choice, surface: surface?, law, plan }))
 }
 
 impl<const D: usize, const M: usize> FrontScene<D, M> {
     /// The front at the start.
-    fn system(&self, interrupt: Interrupt) -> Result<FrontSystem<D, M>, Vec<Violation>> {
+    fn system(&self, interrupt: Interrupt) -> FrontSystem<D, M> {
         let chosen = &self.plan.chosen;
         let config = FrontConfig {
             grid: Grid { spacing: self.choice.spacing },
@@ -121,24 +122,22 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             segments: chosen.segments,
             interrupt,
         };
-        let surfaces = self.choice.shape.parts::<D>("/shape")?;
-        Ok(FrontSystem::from_surfaces(&surfaces, config))
+        FrontSystem::from_surfaces(&self.surface.boxed_parts(), config)
     }
 
     /// The shape of the front at the start.
-    fn start(&self) -> Result<FrontAtStart<D>, Vec<Violation>> {
-        let shape = &self.choice.shape;
-        Ok(FrontAtStart {
-            surface: shape.surface::<D>("/shape")?,
-            parts: shape.parts::<D>("/shape")?,
-            ball: shape.as_ball::<D>(),
+    fn start(&self) -> FrontAtStart<D> {
+        FrontAtStart {
+            surface: self.surface.boxed(),
+            parts: self.surface.boxed_parts(),
+            ball: self.choice.shape.as_ball::<D>(),
             topology: self.plan.chosen.topology,
-        })
+        }
     }
 
     /// How many times larger the front becomes.
     fn stretch(&self) -> Stretch {
-        self.start().map_or(Stretch::NONE, |start| self.law.stretch(&start, self.choice.end_time))
+        self.law.stretch(&self.start(), self.choice.end_time)
     }
 }
 
@@ -170,13 +169,9 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
         // On the coarsest level; where there are not many, as the grid is refined.
         let reach = self.plan.chosen.method.tube_radius * self.choice.spacing;
-        let about = self
-            .choice
-            .shape
-            .surface::<D>("/shape")
-            .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.choice.spacing));
+        let about = band_particles(self.surface.whole.as_ref(), reach, self.choice.spacing);
         // Corners without foot points matter where there are few.
-        let counted = if about < COUNTED { self.system(Interrupt::default()).ok() } else { None };
+        let counted = (about < COUNTED).then(|| self.system(Interrupt::default()));
         let at_start = counted.map_or(about, |system| system.particle_count() as u64);
         let most = (at_start as f64 * self.stretch().most) as u64;
         Estimate {
@@ -196,14 +191,14 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
         let number = particles as f64 * self.stretch().mean * steps as f64;
-        let exact = match (self.law.flow(), self.choice.shape.surface::<D>("/shape")) {
-            (Some(flow), Ok(surface)) => {
+        let exact = match self.law.flow() {
+            Some(flow) => {
                 let finest = Grid { spacing: self.choice.spacing }.spacing_at(self.plan.chosen.method.levels() - 1);
                 let beside = if D == 3 { PATHS_IN_SPACE * particles as f64 } else { 0.0 };
-                error_units(Some(surface.as_ref()), flow, finest, particles as f64, end_time)
+                error_units(Some(self.surface.whole.as_ref()), flow, finest, particles as f64, end_time)
                     + path_units(flow, beside, end_time)
             }
-            _ => particles as f64,
+            None => particles as f64,
         };
         // Rows of a fit for each of its particles.
         let rows = if self.plan.chosen.method.normal_weight > 0.0 { 1 + M } else { 1 };
@@ -218,14 +213,14 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let system = self.system(context.interrupt)?;
+        let system = self.system(context.interrupt);
         if system.particle_count() == 0 {
             let detail = "no grid point of this spacing has a foot-point on the shape";
             return Err(vec![Violation::new("/spacing", "range", detail, self.choice.spacing, Value::Null)]);
         }
         let FrontPlan { chosen, fixed, .. } = &self.plan;
         let labels = labels(chosen, *fixed, self.law.particles_in_bends());
-        let start = self.start()?;
+        let start = self.start();
         let ball = start.ball.clone();
         let exact = self.law.exact_motion(start);
         let simulation = GridBasedParticles::new(system, exact, ball, *fixed, context.cpu_clock, labels);

@@ -46,7 +46,7 @@ crate::group! {
         /// what moves the front
         law: Law = with_defaults("normal");
         /// the front at the start
-        shape: Shape = Shape::Plain(PlainShape::Circle { center: Some([0.5, 0.5].into()), radius: 0.25 });
+        shape: Shape = Shape::plain(PlainShape::Circle { center: Some([0.5, 0.5].into()), radius: 0.25 });
         /// spacing h of the underlying grid
         spacing: f64 = 0.007_812_5, in POSITIVE;
         /// scene time at the end

@@ -37,7 +37,7 @@ pub(super) fn plan<const D: usize>(
 ) -> Planned {
     let mut errors = Vec::new();
     match choice.shape.surface::<D>("/shape") {
-        Ok(surface) => errors.extend(check_extent(surface.as_ref(), 4.0 * choice.spacing, choice.spacing)),
+        Ok(surface) => errors.extend(check_extent(surface.whole.as_ref(), 4.0 * choice.spacing, choice.spacing)),
         Err(found) => errors.extend(found),
     }
     let front = from_shape(&choice.shape, speed);
@@ -58,9 +58,9 @@ pub(super) fn plan<const D: usize>(
 /// The wave front that starts on a circle or an ellipse.
 fn from_shape(shape: &Shape, speed: f64) -> Result<EllipticalWavefront, Violation> {
     let pair = |numbers: &Coordinates| numbers.first().zip(numbers.get(1)).map(|(x, y)| [*x, *y]);
-    let found = match shape {
-        Shape::Plain(PlainShape::Circle { center, radius }) => Some((center, [*radius; 2])),
-        Shape::Plain(PlainShape::Ellipse { center, semi_axes }) => pair(semi_axes).map(|axes| (center, axes)),
+    let found = match shape.as_plain() {
+        Some(PlainShape::Circle { center, radius }) => Some((center, [*radius; 2])),
+        Some(PlainShape::Ellipse { center, semi_axes }) => pair(semi_axes).map(|axes| (center, axes)),
         _ => None,
     };
     let Some((center, semi_axes)) = found else {

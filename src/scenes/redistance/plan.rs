@@ -10,7 +10,7 @@ use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::pcp_spec::PcpContext;
-use crate::scenes::shapes::Shape;
+use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
 use crate::schemes::static_redistancing;
 use crate::schemes::static_redistancing::{
@@ -26,7 +26,8 @@ const DEFAULT_BAND_H: f64 = 12.0;
 
 struct RedistanceScene<const D: usize> {
     spec: Redistance,
-    shape: Shape,
+    /// The surface of the shape; none where points from outside tell it.
+    surface: Option<ShapeSurface<D>>,
     lattice: Lattice,
     method: PcpMethod,
     remeshing: Option<RemeshingKernel>,
@@ -50,9 +51,10 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     let mut errors = Vec::new();
     let shape = spec.shape.get_or_insert_with(|| Shape::ellipsoid(D, [0.75, 0.5, 0.5])).clone();
     let points = shape.points_reference("/shape", &mut errors);
-    let surface = match &shape {
-        Shape::Points { .. } => None,
-        shape => shape.surface::<D>("/shape").map_err(|found| errors.extend(found)).ok(),
+    let surface = if shape.is_from_outside() {
+        None
+    } else {
+        shape.surface::<D>("/shape").map_err(|found| errors.extend(found)).ok()
     };
     let asked = match &spec.queries {
         Queries::Particles => None,
@@ -68,8 +70,8 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     let band = band(&mut spec, &mut errors);
     if let (Some(surface), Some((method, _))) = (&surface, &method) {
         let reach = (0.5 * band).max(method.fit_band_h::<D>() * spec.spacing);
-        errors.extend(check_extent(surface.as_ref(), reach, spec.spacing));
-        if initial == InitialLevel::Scaled && !is_scaling_positive(surface.as_ref(), reach) {
+        errors.extend(check_extent(surface.whole.as_ref(), reach, spec.spacing));
+        if initial == InitialLevel::Scaled && !is_scaling_positive(surface.whole.as_ref(), reach) {
             let detail = "the factor 1 + 0.5 x + 0.3 y must be positive over the whole band";
             errors.push(Violation::new("/initial", "conflict", detail, "scaled", json!(["quadric", "distance"])));
         }
@@ -82,7 +84,7 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     let clouds = points.into_iter().chain(asked).collect();
     Ok(Box::new(RedistanceScene::<D> {
         spec,
-        shape,
+        surface,
         lattice,
         method,
         remeshing,
@@ -219,9 +221,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
         let reach = self.half_band.max(self.method.fit_band_h::<D>() * self.lattice.spacing) + beyond;
         let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
-            self.shape
-                .surface::<D>("/shape")
-                .map_or(0, |surface| band_particles(surface.as_ref(), reach, self.lattice.spacing))
+            let surface = self.surface.as_ref();
+            surface.map_or(0, |surface| band_particles(surface.whole.as_ref(), reach, self.lattice.spacing))
         });
         Estimate {
             particles,
@@ -263,13 +264,12 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         };
         let clouds = &context.clouds;
         let is_needed = |pointer: &str| self.clouds.iter().any(|cloud| cloud.pointer == pointer);
-        let mut system = if is_needed("/shape") {
+        let mut system = if let Some(surface) = &self.surface {
+            StaticSystem::about(surface.boxed(), &self.lattice, self.initial, parts, context.interrupt)
+        } else {
             let (points, levels) = cloud::points_with_levels::<D>(clouds, "/shape").map_err(|found| vec![found])?;
             let metric = cloud_spacing::metric(&points, &levels, parts.spacing, &context.interrupt)?;
             StaticSystem::of_points(points, &levels, metric, parts, context.interrupt)
-        } else {
-            let surface = self.shape.surface::<D>("/shape")?;
-            StaticSystem::about(surface, &self.lattice, self.initial, parts, context.interrupt)
         };
         if is_needed("/queries") {
             system = system.asked_about(cloud::points::<D>(clouds, "/queries").map_err(|found| vec![found])?);

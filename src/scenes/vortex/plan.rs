@@ -12,7 +12,7 @@ use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
 use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
-use crate::scenes::shapes::Shape;
+use crate::scenes::shapes::ShapeSurface;
 use crate::scenes::work_estimate;
 use crate::schemes::advected_level_set;
 use crate::schemes::advected_level_set::{
@@ -28,6 +28,8 @@ use std::collections::BTreeMap;
 
 struct VortexScene<const D: usize> {
     spec: Vortex,
+    /// The surface of the shape; none where points from outside tell it.
+    surface: Option<ShapeSurface<D>>,
     lattice: Lattice,
     method: PcpMethod,
     chosen: BTreeMap<&'static str, String>,
@@ -110,7 +112,11 @@ fn plan_as_front(spec: Vortex) -> Planned {
 fn plan<const D: usize>(mut spec: Vortex) -> Planned {
     let mut errors = Vec::new();
     let points = spec.shape.points_reference("/shape", &mut errors);
-    check_shape_and_flow::<D>(&spec, &mut errors);
+    let surface = surface_of::<D>(&spec, &mut errors);
+    let flow = flow::<D>(&spec).map_err(|found| errors.extend(found)).ok();
+    if let (Some(flow), Some(surface)) = (&flow, &surface) {
+        errors.extend(check_return(flow.as_ref(), surface.whole.as_ref(), "/flow"));
+    }
     let method = method(&mut spec, D, &mut errors);
     if let (Redistancing::ForOutput { .. }, Field::Overwrite) = (&spec.redistance, spec.field) {
         let detail = "overwriting when output asks would make output part of the physics; give a schedule";
@@ -140,6 +146,7 @@ fn plan<const D: usize>(mut spec: Vortex) -> Planned {
         },
         when,
         clouds: points.into_iter().collect(),
+        surface,
         spec,
     }))
 }
@@ -149,19 +156,15 @@ fn flow<const D: usize>(spec: &Vortex) -> Result<Box<dyn Flow<D>>, Vec<Violation
     spec.flow.flow::<D>(spec.end_time, "/flow")
 }
 
-fn check_shape_and_flow<const D: usize>(spec: &Vortex, errors: &mut Vec<Violation>) {
-    let flow = flow::<D>(spec).map_err(|found| errors.extend(found)).ok();
-    match &spec.shape {
-        Shape::Points { .. } => {}
-        shape => match shape.surface::<D>("/shape") {
-            Ok(surface) => {
-                let half_band = 0.5 * spec.band_h * spec.spacing;
-                errors.extend(check_extent(surface.as_ref(), half_band, spec.spacing));
-                errors.extend(flow.and_then(|flow| check_return(flow.as_ref(), surface.as_ref(), "/flow")));
-            }
-            Err(found) => errors.extend(found),
-        },
+/// The surface of the shape, where that is known before the run.
+fn surface_of<const D: usize>(spec: &Vortex, errors: &mut Vec<Violation>) -> Option<ShapeSurface<D>> {
+    if spec.shape.is_from_outside() {
+        return None;
     }
+    let surface = spec.shape.surface::<D>("/shape").map_err(|found| errors.extend(found)).ok()?;
+    let half_band = 0.5 * spec.band_h * spec.spacing;
+    errors.extend(check_extent(surface.whole.as_ref(), half_band, spec.spacing));
+    Some(surface)
 }
 
 /// The parameters that `auto` stands for: what was measured best for the choice of field.
@@ -292,10 +295,8 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
-            self.spec
-                .shape
-                .surface::<D>("/shape")
-                .map_or(0, |surface| band_particles(surface.as_ref(), self.reach(), self.lattice.spacing))
+            let surface = self.surface.as_ref();
+            surface.map_or(0, |surface| band_particles(surface.whole.as_ref(), self.reach(), self.lattice.spacing))
         });
         Estimate {
             particles,
@@ -333,18 +334,17 @@ impl<const D: usize> Scene for VortexScene<D> {
         };
         let reach_h = self.reach() / self.lattice.spacing;
         // At a few moments of output the surface is as often short as long.
-        let surface = self.spec.shape.surface::<D>("/shape").ok();
-        let stretch = match (&surface, &flow) {
+        let surface = self.surface.as_ref().map(|surface| surface.whole.as_ref());
+        let stretch = match (surface, &flow) {
             (Some(surface), Some(flow)) if course == Course::EveryStep => {
-                front_stretch(surface.as_ref(), flow.as_ref(), end_time).mean
+                front_stretch(surface, flow.as_ref(), end_time).mean
             }
             _ => 1.0,
         };
         let mut work = work_estimate::redistancing::<D>(&self.method, particles, reach_h, stretch, times, course);
         work.push(PhaseWork::every_step("advection", particles * steps as f64 * stages * cost));
         work.push(PhaseWork { phase: "measure", units: particles * times, course });
-        let errors =
-            |flow: &dyn Flow<D>| error_units(surface.as_deref(), flow, self.lattice.spacing, particles, end_time);
+        let errors = |flow: &dyn Flow<D>| error_units(surface, flow, self.lattice.spacing, particles, end_time);
         work.push(PhaseWork::at_milestones("errors", flow.as_deref().map_or(particles, errors)));
         work.extend(work_estimate::around(particles, steps, end_time, plan));
         work
@@ -360,10 +360,9 @@ impl<const D: usize> Scene for VortexScene<D> {
             when: self.when,
             method: self.method.clone(),
         };
-        let (start, surface) = if self.clouds.is_empty() {
-            let surface = self.spec.shape.surface::<D>("/shape")?;
-            let start = Start::about(surface.as_ref(), &self.lattice, self.reach(), &context.interrupt);
-            (start, Some(surface))
+        let (start, surface) = if let Some(surface) = &self.surface {
+            let start = Start::about(surface.whole.as_ref(), &self.lattice, self.reach(), &context.interrupt);
+            (start, Some(surface.boxed()))
         } else {
             let (positions, level) =
                 cloud::points_with_levels::<D>(&context.clouds, "/shape").map_err(|found| vec![found])?;

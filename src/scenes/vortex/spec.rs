@@ -66,7 +66,7 @@ crate::group! {
         /// the velocity field
         flow: FlowChoice = with_defaults("single_vortex");
         /// the surface at the start
-        shape: Shape = Shape::Plain(PlainShape::Circle { center: Some([0.5, 0.75].into()), radius: 0.15 });
+        shape: Shape = Shape::plain(PlainShape::Circle { center: Some([0.5, 0.75].into()), radius: 0.15 });
         /// distance h of neighboring particles
         spacing: f64 = 0.015_625, in POSITIVE;
         /// particles are centers of cells moved by up to this many h along every axis
@@ -110,7 +110,7 @@ pub(super) fn paper(given: Given) -> Preset {
     let neighborhood = (!has_neighborhood).then_some(Neighborhood::Radius { cutoff_h: 15.0 });
     Preset::default()
         .set(Vortex::flow(), FlowChoice::SingleVortex { period: Some(8.0) })
-        .set(Vortex::shape(), Shape::Plain(PlainShape::Circle { center: Some([0.5, 0.75].into()), radius: 0.15 }))
+        .set(Vortex::shape(), Shape::plain(PlainShape::Circle { center: Some([0.5, 0.75].into()), radius: 0.15 }))
         .set(Vortex::end_time(), 8.0)
         .set(Vortex::integrator(), IntegratorChoice::Rk4)
         .set(Vortex::band_h(), 40.0)
