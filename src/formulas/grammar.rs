@@ -166,6 +166,11 @@ impl<'a> Reader<'a> {
     }
 
     fn binary(&mut self, op: BinaryOp, a: NodeId, b: NodeId, column: usize) -> NodeId {
+        if op == BinaryOp::Div && self.graph.constant_at(b) == Some(0.0) && self.names.is_some() {
+            let error = FormulaError::new(column, "this divides by 0, whatever the point");
+            self.errors.push(error.allowing("a divisor that is not 0"));
+            return a;
+        }
         let node = self.graph.binary(op, a, b);
         // Without names every name stands for the same number: values mean nothing then.
         if self.names.is_some() { self.checked(node, column) } else { node }
@@ -315,7 +320,8 @@ impl<'a> Reader<'a> {
             None => format!("there is no \"{name}\" here"),
         };
         let mut error = FormulaError::new(column, detail).allowing(known.join(", "));
-        error.did_you_mean = suggest(name, &known).filter(|_| function.is_none());
+        // Of one or two letters every name is a neighbor.
+        error.did_you_mean = suggest(name, &known).filter(|_| function.is_none() && name.len() > 2);
         self.errors.push(error);
         Ok(self.graph.constant(1.0))
     }
@@ -469,7 +475,9 @@ mod tests {
             ("x y", 3, "*"),
             ("0 < x < 1", 7, "two sides"),
             ("sin x", 1, "sin(a)"),
-            ("1/0", 2, "inf"),
+            ("1/0", 2, "by 0"),
+            ("x/(2 - 2)", 2, "by 0"),
+            ("10^400", 3, "inf"),
             ("sqrt(-1)", 1, "NaN"),
             ("atan2(x)", 1, "1 arguments"),
             ("x)", 2, "\")\""),

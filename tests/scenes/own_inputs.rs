@@ -20,7 +20,7 @@ fn single_vortex() -> Value {
 fn colliding_drops() -> Value {
     json!({
         "kind": "droplet", "case": "static", "spacing": 0.0625, "surface_tension": 0.1, "end_time": 0.02, "steps": 6,
-        "domain": [[-1, -0.5], [1, 0.5]],
+        "domain": {"low": [-1, -0.5], "high": [1, 0.5]},
         "shape": {"type": "union", "of": [
             {"type": "circle", "center": [-0.4, 0], "radius": 0.25}, {"type": "circle", "center": [0.4, 0], "radius": 0.25}
         ]},
@@ -207,7 +207,7 @@ fn everything_that_is_wrong_with_formulas_is_told_at_once_at_its_place() {
         told,
         [
             ("/flow/parameters/x", None),
-            ("/flow/velocity/0", Some("sin")),
+            ("/flow/velocity/0", Some("sign")),
             ("/flow/velocity/0", None),
             ("/flow/velocity/1", None)
         ],

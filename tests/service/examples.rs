@@ -68,7 +68,7 @@ fn measures_and_probes_are_columns_of_the_series() {
     let body = json!({
         "scene": {
             "kind": "droplet", "case": "static", "spacing": 0.04, "surface_tension": 0, "end_time": 0.2,
-            "domain": [[0, 0], [1, 1]], "shape": {"type": "circle", "center": [0.5, 0.5], "radius": 0.25},
+            "domain": {"low": [0, 0], "high": [1, 1]}, "shape": {"type": "circle", "center": [0.5, 0.5], "radius": 0.25},
             "fluids": {"inside": fluid, "outside": fluid}, "initial_velocity": {"inside": velocity, "outside": velocity}
         },
         "output": {
