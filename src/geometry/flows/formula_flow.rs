@@ -3,6 +3,7 @@
 use super::{Flow, Vector};
 use crate::formulas::{BLOCK, Bound, Context, FormulaList, Input, NamedNumbers};
 use crate::spec::Violation;
+use std::sync::OnceLock;
 
 /// The flow u(x, t) whose components are formulas of x, y (z in space) and t.
 #[derive(Debug, Clone)]
@@ -12,6 +13,8 @@ pub struct FormulaFlow<const D: usize> {
     stretchings: Bound,
     period: Option<f64>,
     end_time: f64,
+    /// Found when it is first asked for.
+    keeps_volume: OnceLock<bool>,
 }
 
 /// Tuning constants of the bound of the speed.
@@ -49,7 +52,13 @@ impl<const D: usize> FormulaFlow<D> {
         let formulas = velocity.components::<D>(pointer, "velocity").map_err(|error| vec![error])?;
         let velocity = Bound::new(&formulas, Context { pointer, variables: variables::<D>(), parameters })?;
         let own_axis: Vec<Vec<usize>> = (0..D).map(|d| vec![d]).collect();
-        Ok(Self { stretchings: velocity.derivatives(&own_axis), velocity, period, end_time })
+        Ok(Self {
+            stretchings: velocity.derivatives(&own_axis),
+            velocity,
+            period,
+            end_time,
+            keeps_volume: OnceLock::new(),
+        })
     }
 
     fn inputs<'a>(columns: &'a [[f64; BLOCK]; 3], times: &'a [f64], count: usize) -> [Input<'a>; 4] {
@@ -71,6 +80,22 @@ impl<const D: usize> FormulaFlow<D> {
             let inputs = Self::inputs(&columns, times, points.len());
             formulas.block(&inputs[..=D], points.len(), |k, i, value| write(k, block * BLOCK + i, value));
         }
+    }
+
+    /// Whether all ∂u_d/∂x_d on a lattice of paths cancel to round-off.
+    fn has_no_divergence(&self) -> bool {
+        let (low, high) = (Vector::<D>::repeat(-0.937), Vector::<D>::repeat(1.219));
+        self.sampled_paths(&low, &high).iter().step_by(9).all(|(points, time)| {
+            let mut sums = vec![0.0_f64; points.len()];
+            let mut strain = 0.0_f64;
+            Self::evaluate(&self.stretchings, points, &vec![*time; points.len()], |_, i, value| {
+                sums[i] += value;
+                // Where points are carried off, nothing is finite any more.
+                strain = if value.is_finite() { strain.max(value.abs()) } else { strain };
+            });
+            let finite = sums.iter().filter(|sum| sum.is_finite());
+            finite.fold(0.0_f64, |most, sum| most.max(sum.abs())) <= ROUND_OFF * strain
+        })
     }
 
     /// Places and times that paths from a box meet until the end of the run.
@@ -123,20 +148,8 @@ impl<const D: usize> Flow<D> for FormulaFlow<D> {
         Some(divergences)
     }
 
-    /// Where all |∂u_d/∂x_d| on a lattice at some instants cancel to round-off.
     fn keeps_volume(&self) -> bool {
-        let (low, high) = (Vector::<D>::repeat(-0.937), Vector::<D>::repeat(1.219));
-        let (mut divergence, mut strain) = (0.0_f64, 0.0_f64);
-        for (points, time) in self.sampled_paths(&low, &high).iter().step_by(9) {
-            let mut sums = vec![0.0; points.len()];
-            Self::evaluate(&self.stretchings, points, &vec![*time; points.len()], |_, i, value| {
-                sums[i] += value;
-                strain = strain.max(value.abs());
-            });
-            divergence =
-                sums.iter().fold(divergence, |most, sum| if sum.is_nan() { most } else { most.max(sum.abs()) });
-        }
-        divergence <= ROUND_OFF * strain
+        *self.keeps_volume.get_or_init(|| self.has_no_divergence())
     }
 
     fn fault(&self, x: &Vector<D>, time: f64) -> Option<String> {
