@@ -332,6 +332,17 @@ impl<const D: usize> DropletScene<D> {
         particles * nodes * (40.0 + 0.25 * terms * terms)
     }
 
+    /// The surface of the drop, if it has one; that of a mesh must fit into the box.
+    fn surface_at_build(&self, context: &BuildContext) -> Result<Option<ShapeSurface<D>>, Vec<Violation>> {
+        let room = (0.0, self.spec.spacing);
+        let surface = self.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
+        let whole = surface.as_ref().map(|surface| surface.whole.as_ref());
+        match whole.and_then(|whole| check_size(whole, &self.lengths(), &self.shape)) {
+            Some(violation) => Err(vec![violation]),
+            None => Ok(surface),
+        }
+    }
+
     pub(super) fn lengths(&self) -> Vector<D> {
         self.high - self.low
     }
@@ -477,7 +488,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let (level, measure) = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
             let area = lengths.product() / lengths[1];
             (positions.iter().map(|x| distance_from_layer(&layer, lengths[1], x)).collect(), layer.thickness * area)
-        } else if let Some(ShapeSurface { whole, .. }) = &self.surface {
+        } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(&context)? {
             (self.levels(whole.as_ref(), &positions), whole.area_or_volume())
         } else {
             (self.levels_of_points(&context, &positions).map_err(|found| vec![found])?, f64::NAN)
