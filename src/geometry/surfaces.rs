@@ -1,4 +1,5 @@
-//! Analytic surfaces with exact distance, closest point, normal and curvature, one file per shape.
+//! Surfaces with exact distance, closest point, normal and curvature, one file per shape: plain shapes, zeros of level functions
+//! ([`implicit`]), what solids are composed of ([`solid`]), polygons and meshes.
 //!
 //! Scenes start from these surfaces, and errors are measured against them. Signed distances are positive outside, and
 //! normals point outward. The curvature is ∇·n: 1/R on a circle, 2/R on a sphere.

@@ -42,7 +42,7 @@ pub(super) struct DropletScene<const D: usize> {
     /// Motion of the fluids at the start, where it is given.
     motion: Option<StartMotion>,
     /// The surface of the shape; none of a layer, and where points from outside tell it.
-    surface: Option<ShapeSurface<D>>,
+    pub(super) surface: Option<ShapeSurface<D>>,
     pub(super) low: Vector<D>,
     pub(super) high: Vector<D>,
     lattice: StartLattice<D>,
@@ -311,7 +311,11 @@ fn time_step<const D: usize>(
 }
 
 /// An error where the drop does not fit into the box.
-fn check_size<const D: usize>(surface: &dyn Surface<D>, lengths: &Vector<D>, shape: &Shape) -> Option<Violation> {
+pub(super) fn check_size<const D: usize>(
+    surface: &dyn Surface<D>,
+    lengths: &Vector<D>,
+    shape: &Shape,
+) -> Option<Violation> {
     let (low, high) = surface.bounding_box();
     let fits = (high - low).iter().zip(lengths.iter()).all(|(size, length)| size < length);
     let detail = "the drop is as large as the box";
@@ -330,17 +334,6 @@ impl<const D: usize> DropletScene<D> {
         let nodes = if D == 2 { 3.1 } else { 4.2 } * cutoff.powi(D as i32);
         let terms = term_count::<D>(support.degree) as f64;
         particles * nodes * (40.0 + 0.25 * terms * terms)
-    }
-
-    /// The surface of the drop, if it has one; that of a mesh must fit into the box.
-    fn surface_at_build(&self, context: &BuildContext) -> Result<Option<ShapeSurface<D>>, Vec<Violation>> {
-        let room = (0.0, self.spec.spacing);
-        let surface = self.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
-        let whole = surface.as_ref().map(|surface| surface.whole.as_ref());
-        match whole.and_then(|whole| check_size(whole, &self.lengths(), &self.shape)) {
-            Some(violation) => Err(vec![violation]),
-            None => Ok(surface),
-        }
     }
 
     pub(super) fn lengths(&self) -> Vector<D> {
