@@ -4,10 +4,12 @@
 //! spec to a [`Scene`], which returns everything that is wrong.
 
 pub mod cloud;
+pub mod mesh;
 pub mod view;
 pub mod work;
 
-pub use cloud::{Cloud, CloudReference, CloudSizes, CloudSource, Clouds};
+pub use cloud::{Cloud, CloudReference, CloudRole, CloudSize, CloudSizes, CloudSource, Clouds};
+pub use mesh::{MeshSize, mesh_size};
 pub use view::View;
 pub use work::PhaseWork;
 

@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use flate2::read::GzDecoder;
+use meniscus::scene::CloudSize;
 use meniscus_jobs::spec::body::{self, Allowance, BodyError, JobSource, NoSources, Origin, RestartSource, Sources};
 use meniscus_jobs::spec::calibration::Calibration;
 use meniscus_jobs::spec::study;
@@ -50,11 +51,11 @@ impl Sources for Known {
         Ok(None)
     }
 
-    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, Infallible> {
+    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, CloudSize)>, Infallible> {
         Ok(match id {
-            "upl_points" => Some((Purpose::Points, 5000)),
-            "upl_surface" => Some((Purpose::Surface, 5000)),
-            "upl_places" => Some((Purpose::Queries, 5000)),
+            "upl_points" => Some((Purpose::Points, 5000.into())),
+            "upl_surface" => Some((Purpose::Surface, 5000.into())),
+            "upl_places" => Some((Purpose::Queries, 5000.into())),
             _ => None,
         })
     }

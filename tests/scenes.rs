@@ -11,6 +11,8 @@ mod droplets;
 mod fronts;
 #[path = "scenes/own_inputs.rs"]
 mod own_inputs;
+#[path = "scenes/shapes.rs"]
+mod shapes;
 #[path = "scenes/surfaces.rs"]
 mod surfaces;
 
@@ -57,6 +59,7 @@ fn bodies() -> Vec<Value> {
     bodies.extend(surfaces::bodies());
     bodies.extend(fronts::bodies());
     bodies.extend(own_inputs::bodies());
+    bodies.extend(shapes::bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
         "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,

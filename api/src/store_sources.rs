@@ -1,6 +1,7 @@
 //! Checkpoints, uploads and jobs that bodies name, looked up in the store.
 
 use crate::error::ApiError;
+use meniscus::scene::CloudSize;
 use meniscus_jobs::service::store::{Store, StoreError};
 use meniscus_jobs::spec::body::{self, Allowance, JobBody, JobSource, RestartSource, Sources};
 use meniscus_jobs::spec::calibration::Calibration;
@@ -45,8 +46,8 @@ impl Sources for StoreSources<'_> {
         self.store.uploaded_restart(id)
     }
 
-    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, StoreError> {
+    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, CloudSize)>, StoreError> {
         let ready = self.store.upload(id)?.filter(|row| row.state == "ready");
-        Ok(ready.and_then(|row| Some((row.purpose, row.found?.points()?))))
+        Ok(ready.and_then(|row| Some((row.purpose, row.found?.size()?))))
     }
 }

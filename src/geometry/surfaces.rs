@@ -1,4 +1,5 @@
-//! Analytic surfaces with exact distance, closest point, normal and curvature, one file per shape.
+//! Surfaces with exact distance, closest point, normal and curvature, one file per shape: plain shapes, zeros of level functions
+//! ([`implicit`]), what solids are composed of ([`solid`]), polygons and meshes.
 //!
 //! Scenes start from these surfaces, and errors are measured against them. Signed distances are positive outside, and
 //! normals point outward. The curvature is ∇·n: 1/R on a circle, 2/R on a sphere.
@@ -18,6 +19,7 @@ pub mod rounded_cuboid;
 mod sampled;
 pub mod solid;
 pub mod torus;
+pub mod triangle_mesh;
 pub mod union;
 pub mod wavy_layer;
 pub mod zalesak_disk;
@@ -34,6 +36,7 @@ pub use polygon::{Polygon, PolygonError};
 pub use rounded_cuboid::RoundedCuboid;
 pub use solid::Solid;
 pub use torus::Torus;
+pub use triangle_mesh::{MeshFault, TriangleMesh};
 pub use union::Union;
 pub use wavy_layer::WavyLayer;
 pub use zalesak_disk::ZalesakDisk;

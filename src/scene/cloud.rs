@@ -1,5 +1,5 @@
-//! Points that a scene takes from outside: a shape made of particles with their level, a surface with its normals, or
-//! places to ask about.
+//! Points that a scene takes from outside: a shape made of particles with their level, a closed mesh, a surface with its
+//! normals, or places to ask about.
 //!
 //! The engine opens no file. A scene says by pointer what it needs; the caller that builds it hands over the arrays.
 
@@ -29,8 +29,23 @@ pub struct Cloud {
 pub struct CloudReference {
     /// Where in the scene.
     pub pointer: &'static str,
+    /// What the points are used as.
+    pub role: CloudRole,
     /// What is named there.
     pub source: CloudSource,
+}
+
+/// What points from outside are used as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CloudRole {
+    /// Particles with their level.
+    Points,
+    /// A surface with normals and faces, where there are some.
+    Surface,
+    /// Places to ask about.
+    Queries,
+    /// A closed mesh of triangles, or in the plane the corners of a polygon in order.
+    Mesh,
 }
 
 /// Where points come from.
@@ -45,8 +60,23 @@ pub enum CloudSource {
 /// Clouds by the pointers that name them.
 pub type Clouds = BTreeMap<&'static str, Cloud>;
 
-/// How many points there are, by the pointers that name them, as far as it is known.
-pub type CloudSizes = BTreeMap<&'static str, u64>;
+/// The size of points from outside, before they are read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudSize {
+    /// Number of points.
+    pub points: u64,
+    /// Surface area of a mesh, or length of a polygon.
+    pub area: Option<f64>,
+}
+
+impl From<u64> for CloudSize {
+    fn from(points: u64) -> Self {
+        Self { points, area: None }
+    }
+}
+
+/// Sizes by the pointers that name points, as far as they are known.
+pub type CloudSizes = BTreeMap<&'static str, CloudSize>;
 
 crate::group! {
     /// Where points come from, as a scene names it.
@@ -60,19 +90,26 @@ crate::group! {
 
 impl PointsSource {
     /// The points that stand at a pointer of the scene. None, with an error, where none or two are named.
-    pub fn reference(&self, pointer: &'static str, errors: &mut Vec<Violation>) -> Option<CloudReference> {
+    pub fn reference(
+        &self,
+        pointer: &'static str,
+        role: CloudRole,
+        errors: &mut Vec<Violation>,
+    ) -> Option<CloudReference> {
+        let name = if role == CloudRole::Mesh { "mesh" } else { "points" };
         let source = match (&self.file, &self.upload) {
             (Some(file), None) => CloudSource::File(file.clone()),
             (None, Some(upload)) => CloudSource::Upload(upload.clone()),
             (given, upload) => {
                 let code = if given.is_some() { "conflict" } else { "required" };
-                let detail = "points come from an upload, or in `meniscus run` from a file; name one of them";
-                let got = json!({"type": "points", "upload": upload, "file": given});
-                errors.push(Violation::new(pointer, code, detail, got, json!({"type": "points", "upload": "upl_…"})));
+                let come = if role == CloudRole::Mesh { "a mesh comes" } else { "points come" };
+                let detail = format!("{come} from an upload, or in `meniscus run` from a file; name one of them");
+                let got = json!({"type": name, "upload": upload, "file": given});
+                errors.push(Violation::new(pointer, code, detail, got, json!({"type": name, "upload": "upl_…"})));
                 return None;
             }
         };
-        Some(CloudReference { pointer, source })
+        Some(CloudReference { pointer, role, source })
     }
 }
 

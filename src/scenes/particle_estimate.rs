@@ -4,6 +4,7 @@ use crate::closest_point::PcpMethod;
 use crate::closest_point::method::NeighborhoodChoice;
 use crate::geometry::{Surface, Vector};
 use crate::polynomials::multi_index::term_count;
+use crate::scene::CloudSize;
 use crate::spec::Violation;
 use serde_json::json;
 
@@ -58,6 +59,25 @@ pub fn band_particles<const D: usize>(surface: &dyn Surface<D>, reach: f64, spac
     let particles = measure * (reach / wide) / spacing.powi(D as i32);
     // What is no number is no number that would fit into any memory.
     if particles.is_nan() { u64::MAX } else { particles.round() as u64 }
+}
+
+/// Particles of spacing h within `reach` of the surface of a shape: counted where the surface is known, else by the size of
+/// the points from outside that tell it. Points with a level are the particles themselves; of a mesh, 2·reach times its area.
+#[must_use]
+pub fn shape_particles<const D: usize>(
+    surface: Option<&dyn Surface<D>>,
+    size: Option<&CloudSize>,
+    reach: f64,
+    spacing: f64,
+) -> u64 {
+    match (surface, size) {
+        (Some(surface), _) => band_particles(surface, reach, spacing),
+        (None, Some(CloudSize { area: Some(area), .. })) => {
+            (2.0 * reach * area / spacing.powi(D as i32)).round() as u64
+        }
+        (None, Some(size)) => size.points,
+        (None, None) => 0,
+    }
 }
 
 /// Resident memory of a closest-point level set of so many particles: columns, search structures, answers, a frame

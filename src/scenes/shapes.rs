@@ -10,8 +10,10 @@ pub use plain::PlainShape;
 
 use crate::geometry::Vector;
 use crate::geometry::surfaces::Ball;
-use crate::scene::cloud::{CloudReference, PointsSource};
-use crate::spec::{Coordinates, NOT_NEGATIVE, POSITIVE, Violation};
+use crate::scene::cloud::{CloudReference, CloudRole, Clouds, PointsSource};
+use crate::scene::mesh;
+use crate::scenes::particle_estimate::check_extent;
+use crate::spec::{Choice, Coordinates, NOT_NEGATIVE, POSITIVE, Violation};
 use serde_json::Value;
 
 crate::choice! {
@@ -34,6 +36,11 @@ crate::choice! {
         /// points of a VTKHDF file with PointData/phi, which is their level
         Points = "points" {
             /// where the points come from
+            source: PointsSource => flatten;
+        }
+        /// a closed mesh of triangles from outside (STL, PLY, OBJ); in the plane points in order, which are the corners of a polygon
+        Mesh = "mesh" {
+            /// where the mesh comes from
             source: PointsSource => flatten;
         }
     }
@@ -79,6 +86,8 @@ impl Shape {
     pub fn dimension(&self) -> Option<usize> {
         match self {
             Self::Known(shape) => shape.dimension(),
+            // Polygons from outside need the dimension of their scene.
+            Self::Mesh { .. } => Some(3),
             Self::Points { .. } | Self::Layer { .. } => None,
         }
     }
@@ -113,7 +122,8 @@ impl Shape {
     /// The points from outside that the shape names, if it does. Errors are added to `errors`.
     pub fn points_reference(&self, pointer: &'static str, errors: &mut Vec<Violation>) -> Option<CloudReference> {
         match self {
-            Self::Points { source } => source.reference(pointer, errors),
+            Self::Points { source } => source.reference(pointer, CloudRole::Points, errors),
+            Self::Mesh { source } => source.reference(pointer, CloudRole::Mesh, errors),
             Self::Known(_) | Self::Layer { .. } => None,
         }
     }
@@ -121,7 +131,26 @@ impl Shape {
     /// Whether points from outside tell where the shape is, which are not known before a run.
     #[must_use]
     pub fn is_from_outside(&self) -> bool {
-        matches!(self, Self::Points { .. })
+        matches!(self, Self::Points { .. } | Self::Mesh { .. })
+    }
+
+    /// The surface of the shape when a simulation is built: that which is known, or that of a mesh from outside; none of
+    /// points with a level.
+    ///
+    /// # Errors
+    /// Everything that keeps a mesh from being a closed surface, or from lying on a lattice of this spacing.
+    pub fn surface_at_build<const D: usize>(
+        &self,
+        known: Option<&ShapeSurface<D>>,
+        clouds: &Clouds,
+        (reach, spacing): (f64, f64),
+    ) -> Result<Option<ShapeSurface<D>>, Vec<Violation>> {
+        let Self::Mesh { .. } = self else { return Ok(known.cloned()) };
+        let surface = mesh::surface::<D>(clouds, "/shape")?;
+        match check_extent(surface.as_ref(), reach, spacing) {
+            Some(violation) => Err(vec![violation]),
+            None => Ok(Some(ShapeSurface::single(surface))),
+        }
     }
 
     /// The surface of the shape in `D` dimensions. Pointers of errors begin with `pointer`. A surface may take long to make:
@@ -136,9 +165,9 @@ impl Shape {
                 let detail = "a layer reaches across a periodic box: it belongs to droplet scenes";
                 Err(vec![Violation::new(pointer, "conflict", detail, "layer", Value::Null)])
             }
-            Self::Points { .. } => {
-                let detail = "points from outside are not a shape that is known exactly";
-                Err(vec![Violation::new(pointer, "conflict", detail, "points", Value::Null)])
+            Self::Points { .. } | Self::Mesh { .. } => {
+                let detail = "points from outside are not a shape that is known before they are read";
+                Err(vec![Violation::new(pointer, "conflict", detail, self.name(), Value::Null)])
             }
         }
     }

@@ -458,6 +458,6 @@ fn what_points_cannot_do_is_refused_at_its_place() {
         let found = meniscus::scene::parse(&body(&more), SCENES).err().unwrap();
         assert!(found.iter().any(|v| v.pointer == place), "{more}: {found:?}");
     }
-    let sizes = CloudSizes::from([("/surface", 123_456)]);
+    let sizes = CloudSizes::from([("/surface", 123_456.into())]);
     assert_eq!(scene(&body(&json!({}))).estimate(&sizes).particles, 123_456);
 }

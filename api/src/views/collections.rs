@@ -66,7 +66,7 @@ pub struct DryRunView {
 pub struct UploadView {
     /// `upl_` and a ULID.
     pub id: String,
-    /// What the file is used as: `checkpoint`, `points`, `surface` or `queries`.
+    /// What the file is used as: `checkpoint`, `points`, `surface`, `queries` or `mesh`.
     pub r#as: &'static str,
     /// `quarantined`, `ready` or `rejected`.
     pub state: String,

@@ -4,7 +4,7 @@
 use super::mesh::{self, Mesh};
 use super::{cloud_file, structure, vtkhdf_points};
 use crate::spec::uploads::{FaceContents, PointContents, Purpose};
-use meniscus::scene::Cloud;
+use meniscus::scene::{Cloud, mesh_size};
 use std::fs::File;
 use std::io::{Read, Seek};
 
@@ -44,7 +44,11 @@ fn finish(
     is_hdf5: bool,
 ) -> Result<(PointContents, Cloud), String> {
     let is_surface = purpose == Purpose::Surface;
-    if !is_surface {
+    let is_closed_mesh = purpose == Purpose::Mesh;
+    if is_closed_mesh {
+        // Its faces tell its normals.
+        mesh.normals.clear();
+    } else if !is_surface {
         // Places have neither normals nor faces.
         mesh = Mesh { points: mesh.points, ..Mesh::default() };
     }
@@ -58,10 +62,13 @@ fn finish(
     }
     let normals = (!mesh.normals.is_empty()).then_some(mesh.normals);
     let cloud = Cloud { positions: mesh.points, level, normals, triangles, left_out };
+    let size = if is_closed_mesh { Some(mesh_size(&cloud).map_err(|faults| faults.join("; "))?) } else { None };
     let contents = PointContents {
+        area: size.map(|size| size.area),
+        volume: size.map(|size| size.volume),
         normals: is_surface.then_some(cloud.normals.is_some()),
         // Frames of particles have no faces to speak of.
-        faces: (is_surface && (!is_hdf5 || faces.faces > 0)).then_some(faces),
+        faces: (is_surface && !is_hdf5 || (is_surface || is_closed_mesh) && faces.faces > 0).then_some(faces),
         ..contents_of(&cloud)
     };
     Ok((contents, cloud))
@@ -82,6 +89,8 @@ fn contents_of(cloud: &Cloud) -> PointContents {
         normals: None,
         faces: None,
         points_left_out: (cloud.left_out > 0).then_some(cloud.left_out),
+        area: None,
+        volume: None,
     }
 }
 

@@ -44,7 +44,7 @@ pub fn read(file: &File, purpose: Purpose) -> Result<VtkPoints, String> {
     if let Some(normals) = normals {
         mesh.normals = found.triples(&normals)?;
     }
-    if purpose == Purpose::Surface {
+    if matches!(purpose, Purpose::Surface | Purpose::Mesh) {
         (mesh.faces, mesh.has_loose_points) = found.faces(count)?;
     }
     let level = level.map(|place| found.reals(place)).transpose()?;

@@ -3,6 +3,7 @@
 //! ([`crate::formats::structure`]), of which libhdf5 sees no byte, meshes by our own parsers ([`crate::formats::mesh`]).
 //! Points leave that process in a plain format ([`crate::formats::cloud_file`]), so that no other process opens the file.
 
+use meniscus::scene::CloudSize;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -18,11 +19,13 @@ pub enum Purpose {
     Surface,
     /// Places to ask about.
     Queries,
+    /// A closed mesh of triangles, or the corners of a polygon in order.
+    Mesh,
 }
 
 impl Purpose {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Checkpoint, Self::Points, Self::Surface, Self::Queries];
+    pub const ALL: [Self; 5] = [Self::Checkpoint, Self::Points, Self::Surface, Self::Queries, Self::Mesh];
 
     /// The word that stands for it.
     #[must_use]
@@ -32,6 +35,7 @@ impl Purpose {
             Self::Points => "points",
             Self::Surface => "surface",
             Self::Queries => "queries",
+            Self::Mesh => "mesh",
         }
     }
 
@@ -110,6 +114,12 @@ pub struct PointContents {
     /// Points of a mesh that were left out because no face has them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points_left_out: Option<u64>,
+    /// Surface area of a closed mesh, or the length of a polygon.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<f64>,
+    /// Volume that a closed mesh encloses, or the area of a polygon.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume: Option<f64>,
 }
 
 /// Faces of a mesh.
@@ -125,9 +135,15 @@ impl Contents {
     /// Number of points; None for a checkpoint.
     #[must_use]
     pub fn points(&self) -> Option<u64> {
+        self.size().map(|size| size.points)
+    }
+
+    /// Number of points, and the area of a mesh; None for a checkpoint.
+    #[must_use]
+    pub fn size(&self) -> Option<CloudSize> {
         match self {
             Self::Checkpoint(_) => None,
-            Self::Points(found) => Some(found.points),
+            Self::Points(found) => Some(CloudSize { points: found.points, area: found.area }),
         }
     }
 }
@@ -151,7 +167,11 @@ mod tests {
             "body": {"scene": {}}, "step": 7, "time": 0.5, "isa": "x86_64", "build": "0.1.0", "job": "job_1",
             "arrays": [{"name": "phi", "components": 1}],
         });
-        for json in [points, mesh, checkpoint] {
+        let closed = json!({
+            "points": 4, "fields": [], "low": [0.0, 0.0, 0.0], "high": [1.0, 1.0, 1.0], "faces": 4, "is_closed": true,
+            "area": 2.5, "volume": 0.125,
+        });
+        for json in [points, mesh, closed, checkpoint] {
             let contents: Contents = serde_json::from_value(json.clone()).unwrap();
             assert_eq!(matches!(contents, Contents::Checkpoint(_)), contents.points().is_none());
             assert_eq!(serde_json::to_value(&contents).unwrap(), json);

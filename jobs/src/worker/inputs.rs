@@ -4,7 +4,7 @@
 use crate::formats::{cloud_file, points_file};
 use crate::spec::attempt_spec::AttemptSpec;
 use crate::spec::uploads::Purpose;
-use meniscus::scene::{Cloud, CloudReference, CloudSource, Clouds, Scene};
+use meniscus::scene::{Cloud, CloudReference, CloudRole, CloudSource, Clouds, Scene};
 use std::fs::File;
 use std::path::Path;
 
@@ -13,9 +13,9 @@ use std::path::Path;
 /// # Errors
 /// A sentence with the pointer, the name and the cause.
 pub fn read(scene: &dyn Scene, spec: &AttemptSpec) -> Result<Clouds, String> {
-    let read = |CloudReference { pointer, source }: CloudReference| {
+    let read = |CloudReference { pointer, role, source }: CloudReference| {
         let (name, found) = match &source {
-            CloudSource::File(file) => (file, read_local(Path::new(file), pointer)),
+            CloudSource::File(file) => (file, read_local(Path::new(file), role)),
             CloudSource::Upload(id) => (id, read_upload(id, spec)),
         };
         found.map(|points| (pointer, points)).map_err(|cause| format!("{pointer} ({name}): {cause}"))
@@ -28,12 +28,13 @@ fn read_upload(id: &str, spec: &AttemptSpec) -> Result<Cloud, String> {
     File::open(path).and_then(|mut file| cloud_file::read(&mut file)).map_err(|error| error.to_string())
 }
 
-/// A local file, as the inspection of uploads reads it. Only a surface has normals and faces.
-fn read_local(path: &Path, pointer: &str) -> Result<Cloud, String> {
-    let purpose = match pointer {
-        "/surface" => Purpose::Surface,
-        "/queries" => Purpose::Queries,
-        _ => Purpose::Points,
+/// A local file, as the inspection of uploads reads it.
+fn read_local(path: &Path, role: CloudRole) -> Result<Cloud, String> {
+    let purpose = match role {
+        CloudRole::Surface => Purpose::Surface,
+        CloudRole::Queries => Purpose::Queries,
+        CloudRole::Points => Purpose::Points,
+        CloudRole::Mesh => Purpose::Mesh,
     };
     let mut file = File::open(path).map_err(|error| error.to_string())?;
     points_file::read(&mut file, purpose).map(|(_, cloud)| cloud)

@@ -183,8 +183,15 @@ fn faults(points: &[Vector<2>]) -> Vec<PolygonError> {
     if !errors.is_empty() {
         return errors;
     }
+    let boxes: Vec<_> =
+        (0..count).map(|k| (points[k].inf(&points[after(k)]), points[k].sup(&points[after(k)]))).collect();
+    let tree = BoxTree::new(&boxes);
     for first in 0..count {
-        for second in first + 1..count {
+        let (low, high) = (boxes[first].0.add_scalar(-touch), boxes[first].1.add_scalar(touch));
+        let mut others = Vec::new();
+        tree.for_each_overlapping(&low, &high, |second| others.push(second));
+        others.sort_unstable();
+        for second in others.into_iter().filter(|second| *second > first) {
             let ends = [points[first], points[after(first)], points[second], points[after(second)]];
             let at = if after(first) == second {
                 folds_back(&ends[0], &ends[1], &ends[3])

@@ -42,7 +42,7 @@ pub(super) struct DropletScene<const D: usize> {
     /// Motion of the fluids at the start, where it is given.
     motion: Option<StartMotion>,
     /// The surface of the shape; none of a layer, and where points from outside tell it.
-    surface: Option<ShapeSurface<D>>,
+    pub(super) surface: Option<ShapeSurface<D>>,
     pub(super) low: Vector<D>,
     pub(super) high: Vector<D>,
     lattice: StartLattice<D>,
@@ -311,7 +311,11 @@ fn time_step<const D: usize>(
 }
 
 /// An error where the drop does not fit into the box.
-fn check_size<const D: usize>(surface: &dyn Surface<D>, lengths: &Vector<D>, shape: &Shape) -> Option<Violation> {
+pub(super) fn check_size<const D: usize>(
+    surface: &dyn Surface<D>,
+    lengths: &Vector<D>,
+    shape: &Shape,
+) -> Option<Violation> {
     let (low, high) = surface.bounding_box();
     let fits = (high - low).iter().zip(lengths.iter()).all(|(size, length)| size < length);
     let detail = "the drop is as large as the box";
@@ -477,7 +481,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let (level, measure) = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
             let area = lengths.product() / lengths[1];
             (positions.iter().map(|x| distance_from_layer(&layer, lengths[1], x)).collect(), layer.thickness * area)
-        } else if let Some(ShapeSurface { whole, .. }) = &self.surface {
+        } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(&context)? {
             (self.levels(whole.as_ref(), &positions), whole.area_or_volume())
         } else {
             (self.levels_of_points(&context, &positions).map_err(|found| vec![found])?, f64::NAN)

@@ -1,18 +1,30 @@
 //! Signed distances of the particles at the start from the drop.
 
-use super::plan::{DropletScene, RATIO, domain_of};
+use super::plan::{DropletScene, RATIO, check_size, domain_of};
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
 use crate::scene::BuildContext;
 use crate::scene::cloud;
 use crate::scenes::pcp_spec::{PcpContext, PcpSpec};
+use crate::scenes::shapes::ShapeSurface;
 use crate::schemes::weakly_compressible_sph::Geometry;
 use crate::spec::Violation;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
 
 impl<const D: usize> DropletScene<D> {
+    /// The surface of the drop, if it has one; that of a mesh must fit into the box.
+    pub(super) fn surface_at_build(&self, context: &BuildContext) -> Result<Option<ShapeSurface<D>>, Vec<Violation>> {
+        let room = (0.0, self.spec.spacing);
+        let surface = self.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
+        let whole = surface.as_ref().map(|surface| surface.whole.as_ref());
+        match whole.and_then(|whole| check_size(whole, &self.lengths(), &self.shape)) {
+            Some(violation) => Err(vec![violation]),
+            None => Ok(surface),
+        }
+    }
+
     /// Signed distances from the nearest image of a shape.
     pub(super) fn levels(&self, surface: &dyn Surface<D>, positions: &[Vector<D>]) -> Vec<f64> {
         let lengths = self.lengths();

@@ -185,7 +185,7 @@ fn refuse_jump<const D: usize>(
             Some(Shape::Layer { .. }) => {
                 "the slope jumps at a side of the box that the layer touches; along y it may have one"
             }
-            Some(Shape::Points { .. }) => {
+            Some(Shape::Points { .. } | Shape::Mesh { .. }) => {
                 "the slope jumps at the sides of the box, and where points lie is not known yet"
             }
             _ => {

@@ -7,13 +7,13 @@ use super::wavefront;
 use crate::geometry::Vector;
 use crate::geometry::flows::Stretch;
 use crate::parallel::Interrupt;
-use crate::scene::cloud::CloudSizes;
+use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::PhaseWork;
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
 use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::{error_units, path_units};
-use crate::scenes::particle_estimate::{band_particles, check_extent};
-use crate::scenes::shapes::ShapeSurface;
+use crate::scenes::particle_estimate::{check_extent, shape_particles};
+use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
 use crate::schemes::grid_based_particle;
 use crate::schemes::grid_based_particle::laws::FrontAtStart;
@@ -25,12 +25,16 @@ use std::sync::Arc;
 
 /// Cost of an error in space, in tight paths for each particle beyond one: three paths, and those of samples.
 const PATHS_IN_SPACE: f64 = 8.0;
+/// Reach of the grid beyond the front at the start, in h.
+const BAND_H: f64 = 4.0;
 /// Largest number of foot points that an estimate counts one by one.
 const COUNTED: u64 = 20_000;
 
 struct FrontScene<const D: usize, const M: usize> {
     choice: FrontChoice,
-    surface: ShapeSurface<D>,
+    /// The surface of the shape; none where a mesh from outside tells it.
+    surface: Option<ShapeSurface<D>>,
+    clouds: Vec<CloudReference>,
     law: Arc<dyn FrontLaw<D, M>>,
     plan: FrontPlan,
 }
@@ -67,7 +71,7 @@ pub(in crate::scenes) fn plan_front(
     dimension: Option<usize>,
     complete: impl FnOnce(Completed) -> Resolved,
 ) -> Planned {
-    if choice.shape.is_from_outside() {
+    if let Shape::Points { .. } = choice.shape {
         let detail = "a front starts from a shape that is known exactly";
         let allowed = json!(["circle", "sphere", "ellipse", "box", "union", "…"]);
         return Err(vec![Violation::new("/shape/type", "conflict", detail, "points", allowed)]);
@@ -84,19 +88,21 @@ pub(in crate::scenes) fn plan_front(
 /// 1. Shape. 2. Law. 3. Method, grid and time step.
 fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOnce(Completed) -> Resolved) -> Planned {
     let mut errors = Vec::new();
-    let surface = choice.shape.surface::<D>("/shape");
-    match &surface {
-        Ok(surface) => errors.extend(check_extent(surface.whole.as_ref(), 4.0 * choice.spacing, choice.spacing)),
-        Err(found) => errors.extend(found.iter().cloned()),
+    let clouds: Vec<CloudReference> = choice.shape.points_reference("/shape", &mut errors).into_iter().collect();
+    let mut surface = None;
+    if !choice.shape.is_from_outside() {
+        surface = choice.shape.surface::<D>("/shape").map_err(|found| errors.extend(found)).ok();
     }
+    let whole = surface.as_ref().map(|surface| surface.whole.as_ref());
+    errors.extend(whole.and_then(|whole| check_extent(whole, BAND_H * choice.spacing, choice.spacing)));
     // Where the motion of another scene is done as a front, its flow stands at the top.
     let flow_pointer = if choice.pointer.is_empty() { "/law/flow" } else { "/flow" };
-    let extent = surface.as_ref().ok().map(|surface| surface.whole.bounding_box());
+    let extent = whole.map(|whole| whole.bounding_box());
     let about = extent.unwrap_or((Vector::<D>::zeros(), Vector::<D>::repeat(1.0)));
     let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about);
     errors.extend(law.as_ref().err().into_iter().flatten().cloned());
-    if let (Ok(law), Ok(surface)) = (&law, &surface) {
-        errors.extend(law.flow().and_then(|flow| check_return(flow, surface.whole.as_ref(), flow_pointer)));
+    if let (Ok(law), Some(whole)) = (&law, whole) {
+        errors.extend(law.flow().and_then(|flow| check_return(flow, whole, flow_pointer)));
     }
     let question = FrontQuestion {
         law: law.as_deref().ok(),
@@ -106,12 +112,12 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
     };
     let plan = plan_method(&choice, &question, complete, errors)?;
     let law = law?;
-    Ok(Box::new(FrontScene { choice, surface: surface?, law, plan }))
+    Ok(Box::new(FrontScene { choice, surface, clouds, law, plan }))
 }
 
 impl<const D: usize, const M: usize> FrontScene<D, M> {
     /// The front at the start.
-    fn system(&self, interrupt: Interrupt) -> FrontSystem<D, M> {
+    fn system(&self, surface: &ShapeSurface<D>, interrupt: Interrupt) -> FrontSystem<D, M> {
         let chosen = &self.plan.chosen;
         let config = FrontConfig {
             grid: Grid { spacing: self.choice.spacing },
@@ -122,22 +128,22 @@ impl<const D: usize, const M: usize> FrontScene<D, M> {
             segments: chosen.segments,
             interrupt,
         };
-        FrontSystem::from_surfaces(&self.surface.boxed_parts(), config)
+        FrontSystem::from_surfaces(&surface.boxed_parts(), config)
     }
 
     /// The shape of the front at the start.
-    fn start(&self) -> FrontAtStart<D> {
+    fn start(&self, surface: &ShapeSurface<D>) -> FrontAtStart<D> {
         FrontAtStart {
-            surface: self.surface.boxed(),
-            parts: self.surface.boxed_parts(),
+            surface: surface.boxed(),
+            parts: surface.boxed_parts(),
             ball: self.choice.shape.as_ball::<D>(),
             topology: self.plan.chosen.topology,
         }
     }
 
-    /// How many times larger the front becomes.
-    fn stretch(&self) -> Stretch {
-        self.law.stretch(&self.start(), self.choice.end_time)
+    /// How many times larger the front becomes; no larger where its shape is not known.
+    fn stretch(&self, surface: Option<&ShapeSurface<D>>) -> Stretch {
+        surface.map_or(Stretch::NONE, |surface| self.law.stretch(&self.start(surface), self.choice.end_time))
     }
 }
 
@@ -166,14 +172,20 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         grid_based_particle::frame_fields::shown(D, false, &self.plan.chosen.segments)
     }
 
-    fn estimate(&self, _sizes: &CloudSizes) -> Estimate {
+    fn clouds(&self) -> Vec<CloudReference> {
+        self.clouds.clone()
+    }
+
+    fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         // On the coarsest level; where there are not many, as the grid is refined.
         let reach = self.plan.chosen.method.tube_radius * self.choice.spacing;
-        let about = band_particles(self.surface.whole.as_ref(), reach, self.choice.spacing);
+        let known = self.surface.as_ref();
+        let whole = known.map(|surface| surface.whole.as_ref());
+        let about = shape_particles(whole, sizes.get("/shape"), reach, self.choice.spacing);
         // Corners without foot points matter where there are few.
-        let counted = (about < COUNTED).then(|| self.system(Interrupt::default()));
+        let counted = known.filter(|_| about < COUNTED).map(|surface| self.system(surface, Interrupt::default()));
         let at_start = counted.map_or(about, |system| system.particle_count() as u64);
-        let most = (at_start as f64 * self.stretch().most) as u64;
+        let most = (at_start as f64 * self.stretch(known).most) as u64;
         Estimate {
             particles: at_start,
             steps: self.plan.fixed.steps,
@@ -190,13 +202,18 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
 
     fn work(&self, estimate: &Estimate, plan: &OutputPlan) -> Vec<PhaseWork> {
         let Estimate { particles, steps, end_time, .. } = *estimate;
-        let number = particles as f64 * self.stretch().mean * steps as f64;
+        let number = particles as f64 * self.stretch(self.surface.as_ref()).mean * steps as f64;
         let exact = match self.law.flow() {
             Some(flow) => {
                 let finest = Grid { spacing: self.choice.spacing }.spacing_at(self.plan.chosen.method.levels() - 1);
                 let beside = if D == 3 { PATHS_IN_SPACE * particles as f64 } else { 0.0 };
-                error_units(Some(self.surface.whole.as_ref()), flow, finest, particles as f64, end_time)
-                    + path_units(flow, beside, end_time)
+                error_units(
+                    self.surface.as_ref().map(|surface| surface.whole.as_ref()),
+                    flow,
+                    finest,
+                    particles as f64,
+                    end_time,
+                ) + path_units(flow, beside, end_time)
             }
             None => particles as f64,
         };
@@ -213,18 +230,24 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let system = self.system(context.interrupt);
+        let room = (BAND_H * self.choice.spacing, self.choice.spacing);
+        let surface = self.choice.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
+        let Some(surface) = surface else {
+            let detail = "a front starts from a shape with a surface";
+            return Err(vec![Violation::new("/shape", "conflict", detail, Value::Null, Value::Null)]);
+        };
+        let system = self.system(&surface, context.interrupt);
         if system.particle_count() == 0 {
             let detail = "no grid point of this spacing has a foot-point on the shape";
             return Err(vec![Violation::new("/spacing", "range", detail, self.choice.spacing, Value::Null)]);
         }
         let FrontPlan { chosen, fixed, .. } = &self.plan;
         let labels = labels(chosen, *fixed, self.law.particles_in_bends());
-        let start = self.start();
+        let start = self.start(&surface);
         let ball = start.ball.clone();
         let exact = self.law.exact_motion(start);
         let simulation = GridBasedParticles::new(system, exact, ball, *fixed, context.cpu_clock, labels);
-        Ok(Box::new(simulation.with_stretch(self.stretch().most)))
+        Ok(Box::new(simulation.with_stretch(self.stretch(Some(&surface)).most)))
     }
 }
 

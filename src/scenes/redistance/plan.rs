@@ -5,10 +5,10 @@ use super::spec::{Initial, Kernel, Method, Queries, Redistance};
 use crate::closest_point::PcpMethod;
 use crate::geometry::Surface;
 use crate::geometry::lattice::Lattice;
-use crate::scene::cloud::{self, CloudReference, CloudSizes};
+use crate::scene::cloud::{self, CloudReference, CloudRole, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
-use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
+use crate::scenes::particle_estimate::{check_extent, memory_bytes, shape_particles};
 use crate::scenes::pcp_spec::PcpContext;
 use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
@@ -26,6 +26,7 @@ const DEFAULT_BAND_H: f64 = 12.0;
 
 struct RedistanceScene<const D: usize> {
     spec: Redistance,
+    shape: Shape,
     /// The surface of the shape; none where points from outside tell it.
     surface: Option<ShapeSurface<D>>,
     lattice: Lattice,
@@ -58,15 +59,17 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     };
     let asked = match &spec.queries {
         Queries::Particles => None,
-        Queries::Points { source } => source.reference("/queries", &mut errors),
+        Queries::Points { source } => source.reference("/queries", CloudRole::Queries, &mut errors),
     };
-    check_sources(&spec, points.is_some(), asked.is_some(), &mut errors);
+    // A mesh is a surface, without a level of its own.
+    let has_points = points.as_ref().is_some_and(|points| points.role == CloudRole::Points);
+    check_sources(&spec, has_points, asked.is_some(), &mut errors);
     let method = method(&mut spec, D).map_err(|error| errors.push(error)).ok();
     if let Method::Pcp { method } = &spec.method {
         errors
             .extend(method.refuse_material("/method", "particles at rest have no initial positions beside their own"));
     }
-    let initial = initial::<D>(&mut spec, &shape, points.is_some(), &mut errors);
+    let initial = initial::<D>(&mut spec, &shape, has_points, &mut errors);
     let band = band(&mut spec, &mut errors);
     if let (Some(surface), Some((method, _))) = (&surface, &method) {
         let reach = (0.5 * band).max(method.fit_band_h::<D>() * spec.spacing);
@@ -76,6 +79,10 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
             errors.push(Violation::new("/initial", "conflict", detail, "scaled", json!(["quadric", "distance"])));
         }
     }
+    if let (Shape::Mesh { .. }, InitialLevel::Scaled) = (&shape, &initial) {
+        let detail = "where a mesh lies, and so the sign of 1 + 0.5 x + 0.3 y, is not known before it is read";
+        errors.push(Violation::new("/initial", "conflict", detail, "scaled", json!(["distance"])));
+    }
     let Some((method, remeshing)) = method.filter(|_| errors.is_empty()) else {
         return Err(errors);
     };
@@ -84,6 +91,7 @@ fn plan<const D: usize>(mut spec: Redistance) -> Planned {
     let clouds = points.into_iter().chain(asked).collect();
     Ok(Box::new(RedistanceScene::<D> {
         spec,
+        shape,
         surface,
         lattice,
         method,
@@ -220,10 +228,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let beyond = self.remeshing.map_or(0.0, RemeshingKernel::reach_h::<D>) * self.lattice.spacing;
         let reach = self.half_band.max(self.method.fit_band_h::<D>() * self.lattice.spacing) + beyond;
-        let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
-            let surface = self.surface.as_ref();
-            surface.map_or(0, |surface| band_particles(surface.whole.as_ref(), reach, self.lattice.spacing))
-        });
+        let surface = self.surface.as_ref().map(|surface| surface.whole.as_ref());
+        let particles = shape_particles(surface, sizes.get("/shape"), reach, self.lattice.spacing);
         Estimate {
             particles,
             steps: self.spec.repeat,
@@ -264,7 +270,8 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         };
         let clouds = &context.clouds;
         let is_needed = |pointer: &str| self.clouds.iter().any(|cloud| cloud.pointer == pointer);
-        let mut system = if let Some(surface) = &self.surface {
+        let surface = self.shape.surface_at_build(self.surface.as_ref(), clouds, (self.half_band, parts.spacing))?;
+        let mut system = if let Some(surface) = &surface {
             StaticSystem::about(surface.boxed(), &self.lattice, self.initial, parts, context.interrupt)
         } else {
             let (points, levels) = cloud::points_with_levels::<D>(clouds, "/shape").map_err(|found| vec![found])?;

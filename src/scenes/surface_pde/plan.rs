@@ -15,7 +15,7 @@ use crate::geometry::Vector;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
 use crate::operators::charts::tangent::Metric;
 use crate::point_clouds::Bump;
-use crate::scene::cloud::CloudReference;
+use crate::scene::cloud::{CloudReference, CloudRole};
 use crate::scene::{Planned, SceneSpec};
 use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method};
 use crate::spec::{Choice, Given, Parameter, Preset, Violation};
@@ -64,7 +64,7 @@ impl SceneSpec for SurfacePde {
 fn plan(mut spec: SurfacePde) -> Planned {
     let mut errors = Vec::new();
     let points = match &spec.surface {
-        SurfaceChoice::Points { source, .. } => source.reference("/surface", &mut errors),
+        SurfaceChoice::Points { source, .. } => source.reference("/surface", CloudRole::Surface, &mut errors),
         _ => None,
     };
     let shape = shape(&spec, &mut errors);

@@ -154,7 +154,7 @@ impl Scene for SurfaceScene {
     }
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
-        let particles = sizes.get("/surface").copied().unwrap_or_else(|| self.shape.points(self.count));
+        let particles = sizes.get("/surface").map_or_else(|| self.shape.points(self.count), |size| size.points);
         let points = particles as f64;
         let memory = match &self.scheme {
             // Points, normals, columns; entries once in the rows of the tasks and once in those of the operator.

@@ -10,7 +10,7 @@ use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View
 use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
-use crate::scenes::particle_estimate::{band_particles, check_extent, memory_bytes};
+use crate::scenes::particle_estimate::{check_extent, memory_bytes, shape_particles};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
 use crate::scenes::shapes::ShapeSurface;
 use crate::scenes::work_estimate;
@@ -294,10 +294,8 @@ impl<const D: usize> Scene for VortexScene<D> {
     }
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
-        let particles = sizes.get("/shape").copied().unwrap_or_else(|| {
-            let surface = self.surface.as_ref();
-            surface.map_or(0, |surface| band_particles(surface.whole.as_ref(), self.reach(), self.lattice.spacing))
-        });
+        let surface = self.surface.as_ref().map(|surface| surface.whole.as_ref());
+        let particles = shape_particles(surface, sizes.get("/shape"), self.reach(), self.lattice.spacing);
         Estimate {
             particles,
             steps: self.fixed.steps,
@@ -360,7 +358,9 @@ impl<const D: usize> Scene for VortexScene<D> {
             when: self.when,
             method: self.method.clone(),
         };
-        let (start, surface) = if let Some(surface) = &self.surface {
+        let room = (self.reach(), parts.spacing);
+        let surface = self.spec.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
+        let (start, surface) = if let Some(surface) = &surface {
             let start = Start::about(surface.whole.as_ref(), &self.lattice, self.reach(), &context.interrupt);
             (start, Some(surface.boxed()))
         } else {

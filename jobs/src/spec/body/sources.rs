@@ -2,7 +2,7 @@
 
 use crate::spec::states::State;
 use crate::spec::uploads::Purpose;
-use meniscus::scene::{CloudReference, CloudSource};
+use meniscus::scene::{CloudReference, CloudRole, CloudSize, CloudSource};
 use meniscus::spec::Violation;
 use serde_json::{Value, json};
 use std::convert::Infallible;
@@ -75,11 +75,11 @@ pub trait Sources {
     /// When the look-up fails.
     fn uploaded_checkpoint(&self, id: &str) -> Result<Option<RestartSource>, Self::Error>;
 
-    /// Purpose of an upload that has passed its inspection, and the number of points in it.
+    /// Purpose of an upload that has passed its inspection, and the size of the points in it.
     ///
     /// # Errors
     /// When the look-up fails.
-    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, Self::Error>;
+    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, CloudSize)>, Self::Error>;
 }
 
 /// No checkpoints, no uploads and no jobs.
@@ -101,7 +101,7 @@ impl Sources for NoSources {
         Ok(None)
     }
 
-    fn uploaded_points(&self, _: &str) -> Result<Option<(Purpose, u64)>, Infallible> {
+    fn uploaded_points(&self, _: &str) -> Result<Option<(Purpose, CloudSize)>, Infallible> {
         Ok(None)
     }
 }
@@ -140,7 +140,7 @@ pub(super) fn size_of<S: Sources>(
     cloud: &CloudReference,
     sources: &S,
     local_files: bool,
-) -> Result<Result<Option<u64>, Violation>, S::Error> {
+) -> Result<Result<Option<CloudSize>, Violation>, S::Error> {
     Ok(match &cloud.source {
         CloudSource::File(_) if local_files => Ok(None),
         CloudSource::File(file) => {
@@ -149,16 +149,17 @@ pub(super) fn size_of<S: Sources>(
         }
         CloudSource::Upload(upload) => {
             // Points with a level are good as places to ask about, too; places have no level.
-            let wanted: &[Purpose] = match cloud.pointer {
-                "/queries" => &[Purpose::Queries, Purpose::Points, Purpose::Surface],
-                "/surface" => &[Purpose::Surface],
-                _ => &[Purpose::Points],
+            let wanted: &[Purpose] = match cloud.role {
+                CloudRole::Queries => &[Purpose::Queries, Purpose::Points, Purpose::Surface],
+                CloudRole::Surface => &[Purpose::Surface],
+                CloudRole::Points => &[Purpose::Points],
+                CloudRole::Mesh => &[Purpose::Mesh],
             };
             let found = sources.uploaded_points(upload)?.filter(|(purpose, _)| wanted.contains(purpose));
             let names: Vec<&str> = wanted.iter().map(|purpose| purpose.word()).collect();
             let detail = format!("there is no upload of this id that is ready and was made as {}", names.join(" or "));
             let missing = || Violation::new(cloud.pointer, "not_found", detail, upload.as_str(), Value::Null);
-            found.map(|(_, points)| Some(points)).ok_or_else(missing)
+            found.map(|(_, size)| Some(size)).ok_or_else(missing)
         }
     })
 }

@@ -2,6 +2,7 @@ use super::{Allowance, BodyError, JobBody, JobSource, NoSources, Origin, Restart
 use crate::spec::run_options::RunOptions;
 use crate::spec::states::State;
 use crate::spec::uploads::Purpose;
+use meniscus::scene::CloudSize;
 use meniscus::spec::Violation;
 use serde_json::{Value, json};
 use std::convert::Infallible;
@@ -41,13 +42,13 @@ impl Sources for OneCheckpoint {
         Ok(None)
     }
 
-    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, u64)>, Infallible> {
+    fn uploaded_points(&self, id: &str) -> Result<Option<(Purpose, CloudSize)>, Infallible> {
         let purpose = match id {
             "upl_places" => Purpose::Queries,
             "upl_surface" => Purpose::Surface,
             _ => Purpose::Points,
         };
-        Ok(Some((purpose, 5000)))
+        Ok(Some((purpose, 5000.into())))
     }
 }
 
@@ -69,7 +70,7 @@ impl Sources for Broken {
         Err("the store failed")
     }
 
-    fn uploaded_points(&self, _: &str) -> Result<Option<(Purpose, u64)>, &'static str> {
+    fn uploaded_points(&self, _: &str) -> Result<Option<(Purpose, CloudSize)>, &'static str> {
         Err("the store failed")
     }
 }
