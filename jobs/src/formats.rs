@@ -11,6 +11,7 @@ pub mod mesh;
 pub mod operator_files;
 pub mod picture;
 pub mod points_file;
+pub mod quantity_reader;
 pub mod speed_error;
 pub mod structure;
 pub mod surface_view;

@@ -3,6 +3,7 @@
 //! The modules stand in order: each uses only those above it.
 //!
 //! - [`system`]: files, digests, the clock, what the operating system says of processes;
+//! - [`convergence`]: what levels of refinement say of their limit, as plain numbers;
 //! - [`spec`]: plain data that the service and its workers exchange: bodies, states, records, the attempt's specification;
 //! - [`formats`]: files that other programs read, and checkpoints;
 //! - [`worker`]: the process of one attempt;
@@ -14,6 +15,8 @@
 //! knows no HTTP and no numerics: a simulation is a `dyn Simulation` to it.
 
 pub mod system;
+
+pub mod convergence;
 
 pub mod spec;
 

@@ -6,6 +6,7 @@ pub mod executor;
 pub mod found_folders;
 pub mod fsck;
 pub mod inspector;
+pub mod refinement;
 pub mod store;
 pub mod study_report;
 pub mod study_table;

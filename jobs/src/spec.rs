@@ -8,6 +8,7 @@ pub mod calibration;
 pub mod forecast;
 pub mod health;
 mod json_numbers;
+pub mod quantity;
 pub mod records;
 pub mod report;
 pub mod requests;

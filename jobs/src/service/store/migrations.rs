@@ -208,6 +208,33 @@ const MIGRATIONS: &[&str] = &[
     ) STRICT, WITHOUT ROWID;
     CREATE INDEX dependencies_by_predecessor ON dependencies (predecessor);
 ",
+    // Studies that refine, and the digest by which equal jobs are found.
+    "
+    CREATE TABLE refinements (
+        study TEXT PRIMARY KEY,
+        state TEXT NOT NULL,
+        outcome TEXT,
+        message TEXT,
+        chosen INTEGER,
+        threads INTEGER NOT NULL,
+        memory_bytes INTEGER NOT NULL,
+        most_levels INTEGER NOT NULL
+    ) STRICT, WITHOUT ROWID;
+    CREATE INDEX refinements_open ON refinements (study) WHERE state = 'open';
+    CREATE TABLE levels (
+        study TEXT NOT NULL,
+        number INTEGER NOT NULL,
+        setup INTEGER NOT NULL,
+        level INTEGER NOT NULL,
+        job TEXT,
+        is_reused INTEGER NOT NULL,
+        is_to_repeat INTEGER NOT NULL,
+        measured TEXT,
+        PRIMARY KEY (study, number)
+    ) STRICT, WITHOUT ROWID;
+    ALTER TABLE jobs ADD COLUMN scene_sha256 TEXT;
+    CREATE INDEX jobs_by_scene ON jobs (scene_sha256, id) WHERE scene_sha256 IS NOT NULL;
+",
 ];
 
 /// Number of schema changes that this program knows.

@@ -8,6 +8,7 @@ use crate::spec::attempt_files::attempt_directory;
 use crate::spec::attempt_spec::{AttemptSpec, Submission};
 use crate::spec::body::{JobBody, Origin, ResolvedBody};
 use crate::spec::states::State;
+use crate::system::digest;
 use rusqlite::{Transaction, params};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -21,6 +22,8 @@ pub struct NewJob {
     pub(super) kind: String,
     pub(super) spec: String,
     pub(super) resolved: String,
+    /// Digest of the resolved scene.
+    pub(super) scene_sha256: String,
     pub(super) estimate: String,
     /// What is doubtful before it runs.
     pub(super) warnings: String,
@@ -50,6 +53,7 @@ impl NewJob {
             kind: body.kind.clone(),
             spec: body.spec.to_string(),
             resolved: body.resolved.to_json().to_string(),
+            scene_sha256: scene_sha256(&body.resolved.scene),
             estimate: json!(body.forecast.record()).to_string(),
             warnings: json!(body.scene.warnings()).to_string(),
             memory_bytes: body.forecast.memory_bytes,
@@ -79,6 +83,7 @@ impl NewJob {
             kind: SceneWord::deserialize(&body.scene)?.kind,
             spec: sent.to_string(),
             resolved: spec.body.to_string(),
+            scene_sha256: scene_sha256(&body.scene),
             estimate: json!(forecast).to_string(),
             warnings: json!(warnings).to_string(),
             memory_bytes: forecast.memory_bytes,
@@ -92,6 +97,12 @@ impl NewJob {
             predecessors: Vec::new(),
         })
     }
+}
+
+/// Digest of a resolved scene, as the provenance of reports has it.
+#[must_use]
+pub fn scene_sha256(scene: &Value) -> String {
+    digest::of_bytes(scene.to_string().as_bytes())
 }
 
 /// The kind of a scene.
@@ -214,9 +225,9 @@ pub(super) fn insert(
         .prepare_cached(
             "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
                  restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings,
-                 owner, predecessors, restart_job)
+                 owner, predecessors, restart_job, scene_sha256)
              VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19,
-                 ?20, ?21)",
+                 ?20, ?21, ?22)",
         )?
         .execute(params![
             id,
@@ -240,6 +251,7 @@ pub(super) fn insert(
             job.owner,
             serde_json::to_string(&job.predecessors)?,
             job.origin.as_ref().filter(|origin| matches!(origin, Origin::Job(_))).map(Origin::id),
+            job.scene_sha256,
         ])?;
     for upload in &job.uploads {
         let known = transaction

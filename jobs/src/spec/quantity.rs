@@ -1,0 +1,162 @@
+//! The one number of a run that a study or an accuracy is about: an error of its report, a number of its series, or any number of
+//! its report.
+
+use meniscus::scene::SceneKind;
+use meniscus::spec::{Json, NOT_NEGATIVE, Violation, Word, suggest};
+use serde_json::{Value, json};
+
+/// Norms of errors that are shares of the exact answer already.
+const NORMS_OF_SHARES: [&str; 3] = ["relative", "max_relative", "of_measure"];
+
+meniscus::group! {
+    /// An error against an exact answer.
+    pub struct ErrorSpec {
+        /// quantity of the error, such as `phi`
+        quantity: String;
+        /// norm of the error, one of those of the kind of scene
+        norm: String;
+    }
+}
+
+meniscus::words! {
+    /// How a number comes out of a series.
+    pub enum SeriesNumber {
+        /// the value at `time`, between rows by a cubic; at the end when `time` is not given
+        At = "at",
+        /// the mean over time from `time` on
+        Mean = "mean",
+        /// the largest value from `time` on, by a parabola through three rows
+        Max = "max",
+        /// the least value from `time` on, by a parabola through three rows
+        Min = "min",
+        /// the first time after `time` at which the value passes zero, by a cubic through four rows
+        Zero = "zero",
+    }
+}
+
+meniscus::group! {
+    /// What is judged: one of `error`, `series` and `report`.
+    pub struct QuantitySpec {
+        /// an error against an exact answer, at its latest time
+        error: Option<ErrorSpec>;
+        /// an observable of the series; `of` says which number of it
+        series: Option<String>;
+        /// which number of the series; `at` when not given
+        of: Option<SeriesNumber>;
+        /// scene time from which on the series counts; of `at` the time of the value
+        time: Option<f64>, in NOT_NEGATIVE;
+        /// JSON pointer to a number of the report
+        report: Option<String>;
+    }
+}
+
+/// The number of a run that is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Quantity {
+    /// An error against an exact answer, at its latest time.
+    Error {
+        /// Quantity of the error.
+        quantity: String,
+        /// Norm of the error.
+        norm: String,
+    },
+    /// A number of the series.
+    Series {
+        /// Observable.
+        name: String,
+        /// Which number.
+        of: SeriesNumber,
+        /// Scene time from which on it counts.
+        time: Option<f64>,
+    },
+    /// A number of the report.
+    Report {
+        /// JSON pointer.
+        pointer: String,
+    },
+}
+
+impl QuantitySpec {
+    /// The quantity, with what is wrong with it; `kind` is that of the scene, where it is known.
+    pub fn resolve(&self, kind: Option<&SceneKind>, place: &str, errors: &mut Vec<Violation>) -> Option<Quantity> {
+        let before = errors.len();
+        let named = [self.error.is_some(), self.series.is_some(), self.report.is_some()];
+        if named.iter().filter(|is_named| **is_named).count() != 1 {
+            let detail = "a quantity is one of an error, a number of the series and a number of the report";
+            let allowed = json!([{"error": {"quantity": "phi", "norm": "rms"}}, {"series": "area", "of": "mean"}, {"report": "/cost/steps"}]);
+            errors.push(Violation::new(place, "conflict", detail, meniscus::spec::group::to_json(self), allowed));
+        }
+        if self.series.is_none() {
+            let beside = [("of", self.of.map(|of| json!(of.word()))), ("time", self.time.map(|time| json!(time)))];
+            for (name, value) in beside.into_iter().filter_map(|(name, value)| Some((name, value?))) {
+                let detail = "this belongs to a number of the series";
+                errors.push(Violation::new(format!("{place}/{name}"), "conflict", detail, value, Value::Null));
+            }
+        }
+        self.check_names(kind, place, errors);
+        if errors.len() > before {
+            return None;
+        }
+        let error = self.error.clone().map(|ErrorSpec { quantity, norm }| Quantity::Error { quantity, norm });
+        let of = self.of.unwrap_or(SeriesNumber::At);
+        let series = self.series.clone().map(|name| Quantity::Series { name, of, time: self.time });
+        error.or(series).or_else(|| self.report.clone().map(|pointer| Quantity::Report { pointer }))
+    }
+
+    /// Names that the kind does not declare.
+    fn check_names(&self, kind: Option<&SceneKind>, place: &str, errors: &mut Vec<Violation>) {
+        if let Some(pointer) = self.report.as_ref().filter(|pointer| !pointer.starts_with('/')) {
+            let detail = "a number of the report is named by a JSON pointer";
+            errors.push(Violation::new(
+                format!("{place}/report"),
+                "type",
+                detail,
+                pointer.as_str(),
+                "/cost/steps, for instance",
+            ));
+        }
+        let Some(kind) = kind else { return };
+        let known = (kind.quantities)();
+        let mut check = |name: &str, known: Vec<&'static str>, at: &str, detail: &str| {
+            if !known.contains(&name) {
+                let at = format!("{place}/{at}");
+                let mut violation = Violation::new(at, "unknown", detail, name, Json::from(known.clone()));
+                violation.did_you_mean = suggest(name, &known);
+                errors.push(violation);
+            }
+        };
+        if let Some(error) = &self.error {
+            let norms = known.norms.iter().map(|norm| norm.name).collect();
+            check(&error.norm, norms, "error/norm", "reports of this kind of scene have no such norm");
+        }
+        if let Some(series) = &self.series {
+            let names = known.observables.iter().map(|observable| observable.name).collect();
+            check(series, names, "series", "series of this kind of scene have no such observable");
+        }
+    }
+}
+
+impl Quantity {
+    /// Whether its limit is known to be zero.
+    #[must_use]
+    pub fn is_error(&self) -> bool {
+        matches!(self, Self::Error { .. })
+    }
+
+    /// Whether it is an error that is a share of the exact answer already.
+    #[must_use]
+    pub fn is_share(&self) -> bool {
+        matches!(self, Self::Error { norm, .. } if NORMS_OF_SHARES.contains(&norm.as_str()))
+    }
+
+    /// The quantity, as charts and messages name it.
+    #[must_use]
+    pub fn label(&self) -> String {
+        match self {
+            Self::Error { quantity, norm } => format!("{quantity}.{norm}"),
+            Self::Series { name, of, time: None } => format!("{name} ({})", of.word()),
+            Self::Series { name, of, time: Some(time) } => format!("{name} ({} {time})", of.word()),
+            Self::Report { pointer } => pointer.clone(),
+        }
+    }
+}
