@@ -157,6 +157,12 @@ pub trait Scene: Send + Sync {
         None
     }
 
+    /// Fields that decide between speed and accuracy, by JSON pointer, with the values that are worth a comparison. Where a body
+    /// leaves one open and asks for an accuracy, the cheapest value is found by runs.
+    fn choices(&self) -> Vec<(&'static str, Vec<Json>)> {
+        Vec::new()
+    }
+
     /// The parameters with every default and every automatic choice that is known before a run.
     fn resolved(&self) -> Json;
 

@@ -7,6 +7,7 @@ pub mod csv;
 pub mod frame_index;
 pub mod frame_view;
 pub mod hdf5_file;
+pub mod measured_level;
 pub mod mesh;
 pub mod operator_files;
 pub mod picture;

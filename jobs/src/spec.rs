@@ -1,5 +1,6 @@
 //! Plain data that the service and its workers exchange. Nothing here opens the store or steps a simulation.
 
+pub mod accuracy;
 pub mod action;
 pub mod attempt_files;
 pub mod attempt_spec;

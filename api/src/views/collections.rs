@@ -6,7 +6,7 @@ use meniscus::spec::Word;
 use meniscus_jobs::service::store::{RefinementRow, StudyRow, UploadRow};
 use meniscus_jobs::spec::body::JobBody;
 use meniscus_jobs::spec::states::State;
-use meniscus_jobs::spec::study::{RefinementOutcome, RefinementState};
+use meniscus_jobs::spec::study::{RefinementOutcome, RefinementState, StudyForecast};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -105,8 +105,10 @@ list! {
 /// What a job would need.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct EstimateView {
-    /// The body with every default filled in.
+    /// The body with every default filled in; null where a study is to find its spacing first.
     pub resolved: Value,
+    /// What the study takes that finds the spacing for an accuracy; null where none is needed.
+    pub study: Option<Value>,
     /// Number of particles.
     pub particles: u64,
     /// Time step, in units of the scene.
@@ -136,6 +138,7 @@ impl From<JobBody> for EstimateView {
         let time = body.forecast.time.as_ref();
         Self {
             resolved: body.resolved.to_json(),
+            study: None,
             particles: estimate.particles,
             time_step: estimate.time_step,
             steps: estimate.steps,
@@ -146,6 +149,33 @@ impl From<JobBody> for EstimateView {
             basis,
             numbers: body.scene.numbers().into_iter().collect(),
             warnings: body.scene.warnings().into_iter().map(FindingView::from).collect(),
+        }
+    }
+}
+
+impl EstimateView {
+    /// The estimate of a body that asks for an accuracy: the study that finds its spacing comes first, and tells what the run takes.
+    #[must_use]
+    pub fn of_accuracy(body: JobBody, study: &StudyForecast) -> Self {
+        let basis = format!(
+            "the spacing is not known before a study has run; its first {} levels are estimated, and it goes on until the spacing can \
+             be told",
+            study.points
+        );
+        let numbers = body.scene.numbers().into_iter().collect();
+        Self {
+            resolved: Value::Null,
+            study: Some(serde_json::json!(study)),
+            particles: 0,
+            time_step: 0.0,
+            steps: 0,
+            memory_bytes: study.memory_bytes,
+            disk_bytes: study.disk_bytes,
+            cpu_s: None,
+            wall_s: None,
+            basis,
+            numbers,
+            warnings: Vec::new(),
         }
     }
 }

@@ -23,7 +23,7 @@ pub struct RunResults<'a> {
 /// A sentence that says what the run lacks, and what it has.
 pub fn read(quantity: &Quantity, results: &RunResults) -> Result<f64, String> {
     let found = match quantity {
-        Quantity::Error { quantity, norm } => error(results.report, quantity, norm)?,
+        Quantity::Error { quantity, norm, time } => error(results.report, quantity, norm, *time)?,
         Quantity::Series { name, of, time } => of_series(results.series, name, *of, *time)?,
         Quantity::Report { pointer } => {
             // The pointer is the client's.
@@ -53,12 +53,13 @@ pub fn scale(quantity: &Quantity, report: &RunReport) -> Result<f64, String> {
     }
 }
 
-fn error(report: &RunReport, quantity: &str, norm: &str) -> Result<f64, String> {
-    report.error(quantity, norm, None).map(|entry| entry.value).ok_or_else(|| {
+fn error(report: &RunReport, quantity: &str, norm: &str, time: Option<f64>) -> Result<f64, String> {
+    report.error(quantity, norm, time).map(|entry| entry.value).ok_or_else(|| {
         let known: BTreeSet<String> =
             report.errors.iter().map(|entry| format!("{}.{}", entry.quantity, entry.norm)).collect();
         let known = known.into_iter().collect::<Vec<_>>().join(", ");
-        format!("the report has no error {quantity}.{norm}; it has {known}")
+        let at = time.map(|time| format!(" at time {time}")).unwrap_or_default();
+        format!("the report has no error {quantity}.{norm}{at}; it has {known}")
     })
 }
 

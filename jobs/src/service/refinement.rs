@@ -1,19 +1,21 @@
 //! Studies that refine: in every round of the supervisor each of them takes its next step.
 //!
-//! A step follows from the study's spec and from what the store keeps of its levels ([`decision`]). It is made in one transaction,
+//! A step follows from the study's spec and from what the store keeps of its levels ([`crate::refinement::decision`]). It is made in one transaction,
 //! so that a service that is killed at any moment goes on where it was.
 
-pub mod decision;
 mod measuring;
 pub mod report;
+mod serving;
 
-use crate::service::store::{LevelRow, LevelSource, NewJob, NewLevel, Store, StoreError, StudyRow, scene_sha256};
+use crate::refinement::Plan;
+use crate::refinement::decision::{Setup, Step, level_cost, next_step};
+use crate::service::store::{
+    Change, LevelRow, LevelSource, NewJob, NewLevel, Store, StoreError, StudyRow, scene_sha256,
+};
 use crate::spec::body::{BodyError, JobBody};
-use crate::spec::quantity::Quantity;
-use crate::spec::states::State;
-use crate::spec::study::{RefineSpec, RefinementOutcome, Sweep, SweepPoint, point_body};
-use decision::{Setup, Step, level_cost, next_step};
-use meniscus::spec::{Parameter, Violation};
+use crate::spec::states::{Reason, State, Trigger};
+use crate::spec::study::{RefinementOutcome, point_body};
+use meniscus::spec::Violation;
 
 /// Lets every study that refines, and of which nothing is running, take its next step. Studies that cannot are logged, so that they
 /// do not hold up others; the number of those is the answer.
@@ -22,6 +24,9 @@ use meniscus::spec::{Parameter, Violation};
 /// When the store fails to list them.
 pub fn advance_all(store: &Store) -> Result<usize, StoreError> {
     let mut failed = 0;
+    for id in store.refinements_of_ended_jobs()? {
+        store.change_study(&id, Trigger::Cancel, &Change::because(Reason::DependencyFailed))?;
+    }
     for id in store.refinements_to_advance()? {
         if let Err(error) = advance(store, &id) {
             tracing::error!(study = id, %error, "a study could not take its next step");
@@ -31,49 +36,28 @@ pub fn advance_all(store: &Store) -> Result<usize, StoreError> {
     Ok(failed)
 }
 
-/// The spec of a study that refines, as it stands in the store.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    /// The levels.
-    pub spec: RefineSpec,
-    /// What is judged.
-    pub quantity: Quantity,
-    /// The set-ups that are compared.
-    pub setups: Vec<SweepPoint>,
+/// The plan of a study; None where it does not refine, or where this version of the program does not understand it.
+fn plan_of(study: &StudyRow) -> Option<Plan> {
+    study.refinement.as_ref()?;
+    Plan::new(&study.sweep, &study.base)
 }
 
-impl Plan {
-    /// The plan of a study; None where it does not refine, or where this version of the program does not understand it.
-    #[must_use]
-    pub fn new(study: &StudyRow) -> Option<Self> {
-        let Some(Sweep::Refine { refine: spec }) = Sweep::parse(&study.sweep, (), "/sweep", &mut Vec::new()) else {
-            return None;
-        };
-        let quantity = spec.judged(&study.base, &mut Vec::new())?;
-        let setups = spec.setups();
-        Some(Self { spec, quantity, setups })
-    }
-
-    /// The levels by set-up.
-    #[must_use]
-    pub fn by_setup(&self, levels: &[LevelRow]) -> Vec<Setup> {
-        let mut setups = vec![Setup::default(); self.setups.len()];
-        for row in levels {
-            let Some(setup) = setups.get_mut(row.setup as usize) else { continue };
-            match (&row.measured, row.state) {
-                (Some(measured), _) => setup.levels.push(measured.clone()),
-                (None, Some(State::Failed | State::Canceled)) if !row.is_to_repeat => {
-                    setup.obstacle = Some(obstacle(row))
-                }
-                (None, None) => {
-                    let message = format!("the job of level {} was deleted before it was read", row.level);
-                    setup.obstacle = Some((RefinementOutcome::Failed, message));
-                }
-                (None, _) => {}
+/// The levels by set-up.
+fn by_setup(plan: &Plan, levels: &[LevelRow]) -> Vec<Setup> {
+    let mut setups = vec![Setup::default(); plan.setups.len()];
+    for row in levels {
+        let Some(setup) = setups.get_mut(row.setup as usize) else { continue };
+        match (&row.measured, row.state) {
+            (Some(measured), _) => setup.levels.push(measured.clone()),
+            (None, Some(State::Failed | State::Canceled)) if !row.is_to_repeat => setup.obstacle = Some(obstacle(row)),
+            (None, None) => {
+                let message = format!("the job of level {} was deleted before it was read", row.level);
+                setup.obstacle = Some((RefinementOutcome::Failed, message));
             }
+            (None, _) => {}
         }
-        setups
     }
+    setups
 }
 
 /// Why a set-up cannot go on behind a level that has not succeeded.
@@ -89,26 +73,32 @@ fn obstacle(row: &LevelRow) -> (RefinementOutcome, String) {
 fn advance(store: &Store, id: &str) -> Result<(), StoreError> {
     let Some(study) = store.study(id)? else { return Ok(()) };
     let Some(refinement) = &study.refinement else { return Ok(()) };
-    let Some(plan) = Plan::new(&study) else {
+    let Some(plan) = plan_of(&study) else {
         let message = "this version of the program does not understand the sweep of the study";
-        return store.end_refinement(id, RefinementOutcome::Failed, message);
+        return end(store, &study, RefinementOutcome::Failed, message);
     };
     let mut levels = store.levels(id)?;
     if let Some(level) = levels.iter().find(|level| level.is_to_repeat) {
-        return match make(store, &study, &plan, Place::of(level), &plan.by_setup(&levels))? {
+        return match make(store, &study, &plan, Place::of(level), &by_setup(&plan, &levels))? {
             None => Ok(()),
-            Some((outcome, message)) => store.end_refinement(id, outcome, &message),
+            Some((outcome, message)) => end(store, &study, outcome, &message),
         };
     }
     if let Some(message) = take_results(store, &study, &plan, &mut levels)? {
-        return store.end_refinement(id, RefinementOutcome::Failed, &message);
+        return end(store, &study, RefinementOutcome::Failed, &message);
     }
-    let mut setups = plan.by_setup(&levels);
+    let mut setups = by_setup(&plan, &levels);
     // A set-up whose next level does not fit is put aside; there are as many turns as set-ups.
     for _ in 0..=setups.len() {
         let chosen = refinement.chosen.map(|chosen| chosen as usize);
-        let obstacle = match next_step(&plan.spec, &plan.quantity, &setups, chosen) {
-            Step::End { outcome, message } => return store.end_refinement(id, outcome, &message),
+        let step = next_step(&plan.spec, &plan.quantity, &setups, chosen);
+        if let Some(job) = &refinement.job
+            && serving::serve(store, &study, &plan, &setups, (job, &step))?.is_some()
+        {
+            return Ok(());
+        }
+        let obstacle = match step {
+            Step::End { outcome, message } => return end(store, &study, outcome, &message),
             Step::Choose { setup } => return store.choose_setup(id, setup as u64),
             Step::Make { setup, level } => {
                 let place = Place { number: levels.len() as u64, setup, level: level as u64, repeats: None };
@@ -118,12 +108,20 @@ fn advance(store: &Store, id: &str) -> Result<(), StoreError> {
         match obstacle {
             (_, None) => return Ok(()),
             (_, Some((RefinementOutcome::Budget, message))) => {
-                return store.end_refinement(id, RefinementOutcome::Budget, &message);
+                return end(store, &study, RefinementOutcome::Budget, &message);
             }
             (setup, obstacle) => setups[setup].obstacle = obstacle,
         }
     }
     Ok(())
+}
+
+/// Ends a study, and the job that waits for it.
+fn end(store: &Store, study: &StudyRow, outcome: RefinementOutcome, message: &str) -> Result<(), StoreError> {
+    match study.refinement.as_ref().and_then(|refinement| refinement.job.as_ref()) {
+        Some(job) => store.fail_waiting_job(&study.id, job, outcome, message),
+        None => store.end_refinement(&study.id, outcome, message),
+    }
 }
 
 /// Keeps what levels have come to that succeeded since the last round. Returns what a report lacks, if it lacks something.
@@ -136,7 +134,7 @@ fn take_results(
     for level in levels.iter_mut().filter(|level| level.measured.is_none() && level.state == Some(State::Succeeded)) {
         let Some(job) = level.job.as_ref().map(|id| store.job(id)).transpose()?.flatten() else { continue };
         match measuring::measure(store, &job, &plan.quantity, plan.spec.until.relative) {
-            Ok(measured) => {
+            Ok((measured, _)) => {
                 store.keep_measured(&study.id, level.number, &measured)?;
                 level.measured = Some(measured);
             }

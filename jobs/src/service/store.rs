@@ -27,6 +27,7 @@ mod group_commit;
 mod sources;
 pub mod transitions;
 pub mod uploads;
+mod waiting_jobs;
 
 pub use events::Event;
 pub use idempotency::{IdempotencyKey, Made, Receipt};

@@ -37,13 +37,13 @@ meniscus::words! {
 meniscus::group! {
     /// What is judged: one of `error`, `series` and `report`.
     pub struct QuantitySpec {
-        /// an error against an exact answer, at its latest time
+        /// an error against an exact answer, at `time`, or at its latest time
         error: Option<ErrorSpec>;
         /// an observable of the series; `of` says which number of it
         series: Option<String>;
         /// which number of the series; `at` when not given
         of: Option<SeriesNumber>;
-        /// scene time from which on the series counts; of `at` the time of the value
+        /// scene time from which on the series counts; of `at` and of an error the time of the value
         time: Option<f64>, in NOT_NEGATIVE;
         /// JSON pointer to a number of the report
         report: Option<String>;
@@ -53,12 +53,14 @@ meniscus::group! {
 /// The number of a run that is judged.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Quantity {
-    /// An error against an exact answer, at its latest time.
+    /// An error against an exact answer.
     Error {
         /// Quantity of the error.
         quantity: String,
         /// Norm of the error.
         norm: String,
+        /// Scene time; the latest one when not given.
+        time: Option<f64>,
     },
     /// A number of the series.
     Series {
@@ -86,18 +88,19 @@ impl QuantitySpec {
             let allowed = json!([{"error": {"quantity": "phi", "norm": "rms"}}, {"series": "area", "of": "mean"}, {"report": "/cost/steps"}]);
             errors.push(Violation::new(place, "conflict", detail, meniscus::spec::group::to_json(self), allowed));
         }
-        if self.series.is_none() {
-            let beside = [("of", self.of.map(|of| json!(of.word()))), ("time", self.time.map(|time| json!(time)))];
-            for (name, value) in beside.into_iter().filter_map(|(name, value)| Some((name, value?))) {
-                let detail = "this belongs to a number of the series";
-                errors.push(Violation::new(format!("{place}/{name}"), "conflict", detail, value, Value::Null));
-            }
-        }
+        let has_value = |name: &'static str, value: Option<Value>, is_meant: bool| {
+            let detail = "this does not belong to the quantity";
+            let at = format!("{place}/{name}");
+            value.filter(|_| !is_meant).map(|value| Violation::new(at, "conflict", detail, value, Value::Null))
+        };
+        errors.extend(has_value("of", self.of.map(|of| json!(of.word())), self.series.is_some()));
+        errors.extend(has_value("time", self.time.map(|time| json!(time)), self.report.is_none()));
         self.check_names(kind, place, errors);
         if errors.len() > before {
             return None;
         }
-        let error = self.error.clone().map(|ErrorSpec { quantity, norm }| Quantity::Error { quantity, norm });
+        let time = self.time;
+        let error = self.error.clone().map(|ErrorSpec { quantity, norm }| Quantity::Error { quantity, norm, time });
         let of = self.of.unwrap_or(SeriesNumber::At);
         let series = self.series.clone().map(|name| Quantity::Series { name, of, time: self.time });
         error.or(series).or_else(|| self.report.clone().map(|pointer| Quantity::Report { pointer }))
@@ -153,7 +156,8 @@ impl Quantity {
     #[must_use]
     pub fn label(&self) -> String {
         match self {
-            Self::Error { quantity, norm } => format!("{quantity}.{norm}"),
+            Self::Error { quantity, norm, time: None } => format!("{quantity}.{norm}"),
+            Self::Error { quantity, norm, time: Some(time) } => format!("{quantity}.{norm} at {time}"),
             Self::Series { name, of, time: None } => format!("{name} ({})", of.word()),
             Self::Series { name, of, time: Some(time) } => format!("{name} ({} {time})", of.word()),
             Self::Report { pointer } => pointer.clone(),

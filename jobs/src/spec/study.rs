@@ -283,7 +283,12 @@ pub fn point_body<S: Sources>(
             return Err(vec![Violation::new(pointer.clone(), "type", detail, value.clone(), Value::Null)].into());
         }
     }
-    body::parse(&body, allowance, sources)
+    let body = body::parse(&body, allowance, sources)?;
+    if body.wanted.is_some() {
+        let detail = "an accuracy is asked for in a single job; a study that refines has `until`";
+        return Err(vec![Violation::new("/accuracy", "conflict", detail, Value::Null, Value::Null)].into());
+    }
+    Ok(body)
 }
 
 /// Puts a value at a pointer; objects on the way are made where there are none. A choice given as a bare word becomes an

@@ -1,9 +1,10 @@
 //! The report of a study that refines: order, extrapolated value, uncertainty, and what is left to do; as JSON and as a picture.
 
-use super::Plan;
-use super::decision::{Setup, judge, predicted_cpu_s, prediction};
+use super::{by_setup, plan_of};
 use crate::convergence::{Assessment, Order};
 use crate::formats::speed_error::{self, Lines, Point, Slope};
+use crate::refinement::Plan;
+use crate::refinement::decision::{Setup, judge, predicted_cpu_s, prediction};
 use crate::service::store::{LevelRow, Store, StoreError, StudyRow};
 use crate::spec::study::{MeasuredLevel, RefinementOutcome};
 use meniscus::spec::Word;
@@ -114,9 +115,9 @@ struct Found {
 
 impl Found {
     fn new(store: &Store, study: &StudyRow) -> Result<Option<Self>, StoreError> {
-        let Some((plan, refinement)) = Plan::new(study).zip(study.refinement.as_ref()) else { return Ok(None) };
+        let Some((plan, refinement)) = plan_of(study).zip(study.refinement.as_ref()) else { return Ok(None) };
         let rows = store.levels(&study.id)?;
-        let setups = plan.by_setup(&rows);
+        let setups = by_setup(&plan, &rows);
         let shown = refinement.chosen.map_or(0, |chosen| chosen as usize).min(setups.len().saturating_sub(1));
         Ok(Some(Self { plan, rows, setups, shown }))
     }

@@ -218,9 +218,11 @@ const MIGRATIONS: &[&str] = &[
         chosen INTEGER,
         threads INTEGER NOT NULL,
         memory_bytes INTEGER NOT NULL,
-        most_levels INTEGER NOT NULL
+        most_levels INTEGER NOT NULL,
+        job TEXT
     ) STRICT, WITHOUT ROWID;
     CREATE INDEX refinements_open ON refinements (study) WHERE state = 'open';
+    CREATE INDEX refinements_serving ON refinements (study) WHERE job IS NOT NULL AND state <> 'ended';
     CREATE TABLE levels (
         study TEXT NOT NULL,
         number INTEGER NOT NULL,
@@ -233,6 +235,7 @@ const MIGRATIONS: &[&str] = &[
         PRIMARY KEY (study, number)
     ) STRICT, WITHOUT ROWID;
     ALTER TABLE jobs ADD COLUMN scene_sha256 TEXT;
+    ALTER TABLE jobs ADD COLUMN awaits TEXT;
     CREATE INDEX jobs_by_scene ON jobs (scene_sha256, id) WHERE scene_sha256 IS NOT NULL;
 ",
 ];

@@ -8,7 +8,7 @@ use super::submission::{NewJob, Place, insert};
 use super::transitions::apply;
 use super::{Change, ChangeError, JobRow, Store, StoreError, remove_directory, rows};
 use crate::spec::body::Allowance;
-use crate::spec::states::{State, Trigger};
+use crate::spec::states::{Reason, State, Trigger};
 use crate::spec::study::{MeasuredLevel, RefinementOutcome, RefinementState, Refines};
 use meniscus::spec::Word;
 use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
@@ -32,6 +32,8 @@ pub struct RefinementRow {
     pub levels: u64,
     /// Number of levels of all set-ups at most.
     pub most_levels: u64,
+    /// Job that waits for the spacing that the study finds.
+    pub job: Option<String>,
 }
 
 impl RefinementRow {
@@ -107,6 +109,20 @@ impl Store {
                  SELECT 1 FROM jobs WHERE jobs.study = refinements.study
                      AND jobs.state NOT IN ('succeeded', 'failed', 'canceled'))
              ORDER BY study",
+        )?;
+        let rows = statement.query_map([], |row| row.get(0))?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+
+    /// Studies whose job has ended, or is gone, before they could tell its spacing.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn refinements_of_ended_jobs(&self) -> Result<Vec<String>, StoreError> {
+        let connection = self.read();
+        let mut statement = connection.prepare_cached(
+            "SELECT study FROM refinements WHERE job IS NOT NULL AND state <> 'ended' AND NOT EXISTS (
+                 SELECT 1 FROM jobs WHERE jobs.id = refinements.job AND jobs.state IN ('queued', 'paused'))",
         )?;
         let rows = statement.query_map([], |row| row.get(0))?;
         Ok(rows.collect::<Result<_, _>>()?)
@@ -324,6 +340,7 @@ pub(super) fn of_study(connection: &Connection, study: &str) -> Result<Option<Re
                 memory_bytes: row.get::<_, i64>("memory_bytes")? as u64,
                 levels: row.get::<_, i64>("levels")? as u64,
                 most_levels: row.get::<_, i64>("most_levels")? as u64,
+                job: row.get("job")?,
             })
         })
         .optional()?;
@@ -346,6 +363,11 @@ pub(super) fn steer(
         _ => return Ok(()),
     };
     transaction.execute(&format!("UPDATE refinements SET {set} AND study = ?1"), [study])?;
+    if trigger == Trigger::Cancel
+        && let Some(job) = of_study(transaction, study)?.and_then(|row| row.job)
+    {
+        give_up_waiting(transaction, study, &job)?;
+    }
     let jobs: Vec<String> = {
         let mut statement = transaction.prepare_cached(
             "SELECT id FROM jobs WHERE study = ?1 AND state NOT IN ('succeeded', 'failed', 'canceled') ORDER BY id",
@@ -360,6 +382,19 @@ pub(super) fn steer(
         }
     }
     Ok(())
+}
+
+/// Cancels the job that waits for a study that was canceled; one that has its body goes on.
+fn give_up_waiting(transaction: &Transaction, study: &str, job: &str) -> Result<(), StoreError> {
+    let waits: bool = transaction
+        .prepare_cached("SELECT EXISTS (SELECT 1 FROM dependencies WHERE job = ?1 AND predecessor = ?2)")?
+        .query_row([job, study], |row| row.get(0))?;
+    let message = Some(format!("{study}, which was to find its spacing, was canceled"));
+    let change = Change { message, ..Change::because(Reason::DependencyFailed) };
+    match if waits { apply(transaction, job, Trigger::Cancel, &change) } else { Ok(()) } {
+        Err(ChangeError::Store(error)) => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// Opens a study again that ended because a level failed or was canceled; those levels are run anew.

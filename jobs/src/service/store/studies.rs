@@ -11,7 +11,7 @@ use crate::spec::records::{Progress, Usage};
 use crate::spec::report::Results;
 use crate::spec::states::{Reason, State, Trigger};
 use crate::spec::study::{RefinementState, Refines, Study, StudyForecast};
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
@@ -128,41 +128,19 @@ impl Store {
         receipt: impl FnOnce(&StudyRow) -> Receipt,
     ) -> Result<Made, StoreError> {
         let id = format!("std_{}", self.next_id());
-        let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, refines, owner } =
-            study;
+        let mut study = study;
+        let jobs = std::mem::take(&mut study.jobs);
         let mut prepared = Vec::with_capacity(jobs.len());
         for (index, mut job) in jobs.into_iter().enumerate() {
             let (number, clock_s) = self.next_submission();
             let job_id = format!("job_{number}");
             let start = self.prepare_start(&job_id, &job)?;
             job.study = Some((id.clone(), index as u64));
-            job.owner.clone_from(&owner);
+            job.owner.clone_from(&study.owner);
             prepared.push((job_id, clock_s, job, start));
         }
         let made = self.make_once(key, |transaction| {
-            transaction.execute(
-                "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at,
-                     made_s, owner)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
-                params![
-                    id,
-                    name,
-                    serde_json::to_string(&labels)?,
-                    base.to_string(),
-                    sweep.to_string(),
-                    serde_json::to_string(&axes)?,
-                    prepared.len() as i64,
-                    max_parallel.map(|most| most as i64),
-                    on_failure,
-                    serde_json::to_string(&forecast)?,
-                    crate::system::clock::now(),
-                    self.clock.seconds(),
-                    owner,
-                ],
-            )?;
-            if let Some(refines) = refines {
-                refinements::enter(transaction, &id, refines)?;
-            }
+            enter_study(transaction, (&id, prepared.len(), self.clock.seconds()), &study)?;
             for (job_id, clock_s, job, start) in &prepared {
                 insert(transaction, &Place { id: job_id, clock_s: *clock_s }, job, start.as_deref())?;
             }
@@ -367,6 +345,38 @@ impl Store {
         }
         Ok(true)
     }
+}
+
+/// Writes the row of a study with a number of points, at a reading of the clock.
+pub(super) fn enter_study(
+    transaction: &Transaction,
+    (id, points, clock_s): (&str, usize, f64),
+    study: &NewStudy,
+) -> Result<(), StoreError> {
+    transaction.execute(
+        "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at,
+             made_s, owner)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
+        params![
+            id,
+            study.name,
+            serde_json::to_string(&study.labels)?,
+            study.base.to_string(),
+            study.sweep.to_string(),
+            serde_json::to_string(&study.axes)?,
+            points as i64,
+            study.max_parallel.map(|most| most as i64),
+            study.on_failure,
+            serde_json::to_string(&study.forecast)?,
+            crate::system::clock::now(),
+            clock_s,
+            study.owner,
+        ],
+    )?;
+    if let Some(refines) = study.refines {
+        refinements::enter(transaction, id, refines)?;
+    }
+    Ok(())
 }
 
 fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, StoreError> {

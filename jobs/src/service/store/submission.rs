@@ -23,7 +23,7 @@ pub struct NewJob {
     pub(super) spec: String,
     pub(super) resolved: String,
     /// Digest of the resolved scene.
-    pub(super) scene_sha256: String,
+    pub(super) scene_sha256: Option<String>,
     pub(super) estimate: String,
     /// What is doubtful before it runs.
     pub(super) warnings: String,
@@ -41,6 +41,8 @@ pub struct NewJob {
     pub owner: Option<String>,
     /// Jobs that must have succeeded before it starts.
     pub predecessors: Vec<String>,
+    /// The study of its own that finds its spacing; it has no resolved body before.
+    pub awaits: Option<String>,
 }
 
 impl NewJob {
@@ -53,7 +55,7 @@ impl NewJob {
             kind: body.kind.clone(),
             spec: body.spec.to_string(),
             resolved: body.resolved.to_json().to_string(),
-            scene_sha256: scene_sha256(&body.resolved.scene),
+            scene_sha256: Some(scene_sha256(&body.resolved.scene)),
             estimate: json!(body.forecast.record()).to_string(),
             warnings: json!(body.scene.warnings()).to_string(),
             memory_bytes: body.forecast.memory_bytes,
@@ -65,6 +67,21 @@ impl NewJob {
             retry_of: None,
             owner: None,
             predecessors: body.predecessors.clone(),
+            awaits: None,
+        }
+    }
+
+    /// A job whose spacing a study is to find. What follows from the spacing is not known yet.
+    #[must_use]
+    pub fn waiting(body: &JobBody) -> Self {
+        Self {
+            resolved: "null".to_owned(),
+            scene_sha256: None,
+            estimate: "{}".to_owned(),
+            warnings: "[]".to_owned(),
+            memory_bytes: 0,
+            disk_bytes: 0,
+            ..Self::from_body(body)
         }
     }
 
@@ -83,7 +100,7 @@ impl NewJob {
             kind: SceneWord::deserialize(&body.scene)?.kind,
             spec: sent.to_string(),
             resolved: spec.body.to_string(),
-            scene_sha256: scene_sha256(&body.scene),
+            scene_sha256: Some(scene_sha256(&body.scene)),
             estimate: json!(forecast).to_string(),
             warnings: json!(warnings).to_string(),
             memory_bytes: forecast.memory_bytes,
@@ -95,6 +112,7 @@ impl NewJob {
             retry_of,
             owner,
             predecessors: Vec::new(),
+            awaits: None,
         })
     }
 }
@@ -225,9 +243,9 @@ pub(super) fn insert(
         .prepare_cached(
             "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
                  restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings,
-                 owner, predecessors, restart_job, scene_sha256)
+                 owner, predecessors, restart_job, scene_sha256, awaits)
              VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19,
-                 ?20, ?21, ?22)",
+                 ?20, ?21, ?22, ?23)",
         )?
         .execute(params![
             id,
@@ -252,6 +270,7 @@ pub(super) fn insert(
             serde_json::to_string(&job.predecessors)?,
             job.origin.as_ref().filter(|origin| matches!(origin, Origin::Job(_))).map(Origin::id),
             job.scene_sha256,
+            job.awaits,
         ])?;
     for upload in &job.uploads {
         let known = transaction

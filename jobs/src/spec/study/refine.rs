@@ -179,12 +179,6 @@ impl RefineSpec {
         (self.setups().len().max(1) as u64 - 1) * self.levels.least + self.levels.most
     }
 
-    /// The value of the axis at a level.
-    #[must_use]
-    pub fn axis_value(&self, level: u64) -> Json {
-        self.axis_at(self.ratio.powf(-(level as f64)))
-    }
-
     /// The value of the axis at a spacing, by that of the first level.
     #[must_use]
     pub fn axis_at(&self, share: f64) -> Json {
@@ -198,16 +192,21 @@ impl RefineSpec {
     /// A level of a set-up.
     #[must_use]
     pub fn point(&self, base: &Json, setup: &SweepPoint, level: u64) -> SweepPoint {
+        self.point_at(base, setup, self.ratio.powf(-(level as f64)))
+    }
+
+    /// A set-up at a spacing, by that of the first level.
+    #[must_use]
+    pub fn point_at(&self, base: &Json, setup: &SweepPoint, share: f64) -> SweepPoint {
         let mut point = setup.clone();
         let mut add = |pointer: &str, value: Json, place: String| {
             point.values.push((pointer.to_owned(), value));
             point.places.push(place);
         };
-        add(&self.axis.0, self.axis_value(level), "/sweep/axis".to_owned());
+        add(&self.axis.0, self.axis_at(share), "/sweep/axis".to_owned());
         for (pointer, Follows::Proportional) in self.followers() {
             let first = first_value(base, pointer).unwrap_or_default();
-            let value = json!(first * self.ratio.powf(-(level as f64)));
-            add(pointer, value, format!("/sweep/with/{}", escape(pointer)));
+            add(pointer, json!(first * share), format!("/sweep/with/{}", escape(pointer)));
         }
         point
     }

@@ -218,7 +218,7 @@ mod tests {
     }
 
     fn error() -> Quantity {
-        Quantity::Error { quantity: "phi".to_owned(), norm: "rms".to_owned() }
+        Quantity::Error { quantity: "phi".to_owned(), norm: "rms".to_owned(), time: None }
     }
 
     fn setup(count: i32, value: impl Fn(f64) -> f64) -> Setup {
