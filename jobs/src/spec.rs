@@ -19,3 +19,4 @@ pub mod states;
 pub mod strict_json;
 pub mod study;
 pub mod uploads;
+pub mod work_precision;

@@ -28,6 +28,10 @@ pub async fn estimate(
         let spec = request_body::parse_json(&bytes)?;
         let body = StoreSources::new(store).resolve(&spec, allowance, &store.calibration()?)?;
         if let Some(wanted) = &body.wanted {
+            if let Some(mut known) = accuracy::known_body(store, &body, wanted, allowance)? {
+                known.forecast.time_by(&store.calibration()?);
+                return Ok(Json(EstimateView::from(known)));
+            }
             let study = accuracy::study_for(store, &body, wanted, allowance)?;
             return Ok(Json(EstimateView::of_accuracy(body, &study.forecast)));
         }

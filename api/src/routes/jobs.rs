@@ -82,6 +82,10 @@ pub(super) fn make(
         stored_response(StatusCode::CREATED, Some(address(&format!("/v1/jobs/{}", row.id))), &JobView::from(row))
     };
     let Lineage { owner, study, retry_of } = lineage;
+    // Earlier runs of the same problem may tell the spacing at once.
+    let known = body.wanted.as_ref().map(|wanted| accuracy::known_body(store, body, wanted, state.config.allowance()));
+    let known = known.transpose()?.flatten();
+    let body = known.as_ref().unwrap_or(body);
     let mut job = if body.wanted.is_some() { NewJob::waiting(body) } else { NewJob::from_body(body) };
     job.owner.clone_from(&owner);
     job.study = study;

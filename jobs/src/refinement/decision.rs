@@ -248,7 +248,7 @@ mod tests {
         assert_eq!(run(&spec(&[]), &error(), |h| h), (6, RefinementOutcome::Levels));
         let value = Quantity::Report { pointer: "/x".to_owned() };
         assert_eq!(
-            run(&spec(&[]), &value, |h| 7.0 + h * h),
+            run(&spec(&[]), &value, |h| 7.0 + 1.5 * h * h),
             (4, RefinementOutcome::Tolerance),
             "the index is 1.25 times the error"
         );

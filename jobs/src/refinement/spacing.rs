@@ -5,7 +5,6 @@ use super::decision::{judge, target};
 use crate::convergence::{Assessment, Convergence};
 use crate::spec::accuracy::{ChosenAccuracy, KnownLevel};
 use crate::spec::study::MeasuredLevel;
-use meniscus::spec::Parameter;
 
 /// How much finer than the finest level the spacing may be that is told: orders are not known to the last digit.
 const FARTHEST: f64 = 2.2;
@@ -74,7 +73,7 @@ fn among(plan: &Plan, levels: &[MeasuredLevel], judged: &Assessment) -> Told {
 pub fn chosen(plan: &Plan, levels: &[MeasuredLevel], told: Told, study: &str) -> ChosenAccuracy {
     let known = |level: &MeasuredLevel| KnownLevel { spacing: level.spacing, value: level.value, cpu_s: level.cpu_s };
     ChosenAccuracy {
-        quantity: plan.spec.quantity.to_json(),
+        quantity: plan.spec.quantity.as_given(),
         tolerance: plan.spec.until.tolerance,
         relative: plan.spec.until.relative,
         predicted: told.predicted,

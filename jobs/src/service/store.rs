@@ -28,6 +28,7 @@ mod sources;
 pub mod transitions;
 pub mod uploads;
 mod waiting_jobs;
+mod work_precision;
 
 pub use events::Event;
 pub use idempotency::{IdempotencyKey, Made, Receipt};

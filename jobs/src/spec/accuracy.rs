@@ -63,7 +63,7 @@ impl Wanted {
             alternatives.iter().map(|(pointer, values)| (format!("/scene{pointer}"), json!(values))).collect();
         let mut sweep = json!({
             "mode": "refine", "axis": format!("/scene{}", self.axis), "from": from, "ratio": RATIO,
-            "levels": {"least": LEAST_LEVELS, "most": MOST_LEVELS}, "quantity": self.spec.quantity.to_json(),
+            "levels": {"least": LEAST_LEVELS, "most": MOST_LEVELS}, "quantity": self.spec.quantity.as_given(),
             "until": {"tolerance": self.spec.tolerance, "relative": self.spec.relative},
         });
         if let (false, Some(object)) = (lists.is_empty(), sweep.as_object_mut()) {

@@ -79,6 +79,14 @@ pub enum Quantity {
 }
 
 impl QuantitySpec {
+    /// The quantity as JSON, without what was not given.
+    #[must_use]
+    pub fn as_given(&self) -> Json {
+        let mut object = meniscus::spec::Object::new();
+        meniscus::spec::Group::write_fields(self, &mut object);
+        Json::Object(object.into_iter().filter(|(_, value)| !value.is_null()).collect())
+    }
+
     /// The quantity, with what is wrong with it; `kind` is that of the scene, where it is known.
     pub fn resolve(&self, kind: Option<&SceneKind>, place: &str, errors: &mut Vec<Violation>) -> Option<Quantity> {
         let before = errors.len();

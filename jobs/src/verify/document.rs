@@ -70,9 +70,9 @@ pub(super) fn compose_studies(cases: &[(&StudyCase, Vec<Outcome>, Vec<String>)])
     let mut text = format!(
         "# studies: accuracies that were asked for, orders, and series that are recognized\n\n\
          Written by `meniscus verify --only studies --full` on {}; machine: {machine} ({isa}), one core; build {build}.\n\
-         {count} targets, {missed} missed. A trial is a scene without a spacing and a tolerance. Its cost is that of the small study and of the\n\
-         run together. The best set-up by hand is the cheapest run that meets the tolerance, over the set-ups of the case and over spacings\n\
-         a tenth apart; what it cost to find it is not counted.\n",
+         {count} targets, {missed} missed. A trial is a scene without a spacing and a tolerance; a small study finds the spacing, and the run\n\
+         follows. The best set-up by hand is the cheapest run that meets the tolerance, over the set-ups of the case and over spacings a tenth\n\
+         apart; what it cost to find it is not counted, and the start of a process is part of every run.\n",
         &date[..10.min(date.len())],
     );
     for (case, outcomes, lines) in cases {
@@ -92,8 +92,8 @@ pub(super) fn compose_studies(cases: &[(&StudyCase, Vec<Outcome>, Vec<String>)])
             ));
         }
         if !lines.is_empty() {
-            text.push_str("\n| trial | scene | tolerance | reached | spacing | CPU s | by hand | ratio |\n");
-            text.push_str("| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+            text.push_str("\n| trial | scene | tolerance | reached | spacing | run, s | with study, s | by hand, s | ratio of runs |\n");
+            text.push_str("| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
             text.push_str(&lines.join("\n"));
             text.push('\n');
         }

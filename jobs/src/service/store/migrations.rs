@@ -236,6 +236,19 @@ const MIGRATIONS: &[&str] = &[
     ) STRICT, WITHOUT ROWID;
     ALTER TABLE jobs ADD COLUMN scene_sha256 TEXT;
     ALTER TABLE jobs ADD COLUMN awaits TEXT;
+    ALTER TABLE jobs ADD COLUMN problem TEXT;
+    ALTER TABLE jobs ADD COLUMN spacing REAL;
+    CREATE TABLE work_precision (
+        build TEXT NOT NULL,
+        isa TEXT NOT NULL,
+        problem TEXT NOT NULL,
+        quantity TEXT NOT NULL,
+        norm TEXT NOT NULL,
+        spacing REAL NOT NULL,
+        error REAL NOT NULL,
+        cpu_s REAL NOT NULL,
+        PRIMARY KEY (build, isa, problem, quantity, norm, spacing)
+    ) STRICT, WITHOUT ROWID;
     CREATE INDEX jobs_by_scene ON jobs (scene_sha256, id) WHERE scene_sha256 IS NOT NULL;
 ",
 ];

@@ -6,9 +6,11 @@ use super::transitions::{self, ChangeError};
 use super::{JobRow, Store, StoreError, dependencies, events, remove_directory, rows};
 use crate::spec::attempt_files::attempt_directory;
 use crate::spec::attempt_spec::{AttemptSpec, Submission};
-use crate::spec::body::{JobBody, Origin, ResolvedBody};
+use crate::spec::body::{JobBody, JobSpec, Origin, ResolvedBody};
 use crate::spec::states::State;
+use crate::spec::work_precision;
 use crate::system::digest;
+use meniscus::spec::Given;
 use rusqlite::{Transaction, params};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -43,6 +45,8 @@ pub struct NewJob {
     pub predecessors: Vec<String>,
     /// The study of its own that finds its spacing; it has no resolved body before.
     pub awaits: Option<String>,
+    /// Digest of the scene without its spacing, and the spacing, where that is known.
+    pub(super) problem: Option<(String, f64)>,
 }
 
 impl NewJob {
@@ -68,6 +72,7 @@ impl NewJob {
             owner: None,
             predecessors: body.predecessors.clone(),
             awaits: None,
+            problem: problem_of(body),
         }
     }
 
@@ -113,8 +118,15 @@ impl NewJob {
             owner,
             predecessors: Vec::new(),
             awaits: None,
+            problem: None,
         })
     }
+}
+
+/// Digest of the scene as sent without its spacing, and the spacing; None of a restart, which begins in the middle.
+fn problem_of(body: &JobBody) -> Option<(String, f64)> {
+    let sent = body.spec.as_object().map(|spec| Given::new(spec).raw(JobSpec::scene()))?;
+    work_precision::problem_of(&sent).zip(body.scene.spacing())
 }
 
 /// Digest of a resolved scene, as the provenance of reports has it.
@@ -243,9 +255,9 @@ pub(super) fn insert(
         .prepare_cached(
             "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
                  restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings,
-                 owner, predecessors, restart_job, scene_sha256, awaits)
+                 owner, predecessors, restart_job, scene_sha256, awaits, problem, spacing)
              VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19,
-                 ?20, ?21, ?22, ?23)",
+                 ?20, ?21, ?22, ?23, ?24, ?25)",
         )?
         .execute(params![
             id,
@@ -271,6 +283,8 @@ pub(super) fn insert(
             job.origin.as_ref().filter(|origin| matches!(origin, Origin::Job(_))).map(Origin::id),
             job.scene_sha256,
             job.awaits,
+            job.problem.as_ref().map(|(problem, _)| problem),
+            job.problem.as_ref().map(|(_, spacing)| spacing),
         ])?;
     for upload in &job.uploads {
         let known = transaction

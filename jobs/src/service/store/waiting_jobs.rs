@@ -47,7 +47,7 @@ impl Store {
             end(transaction, study, RefinementOutcome::Tolerance, message)?;
             transaction.execute(
                 "UPDATE jobs SET rev = rev + 1, resolved = ?2, estimate = ?3, warnings = ?4, memory_bytes = ?5, disk_bytes = ?6,
-                     scene_sha256 = ?7
+                     scene_sha256 = ?7, problem = ?8, spacing = ?9
                  WHERE id = ?1 AND state IN ('queued', 'paused')",
                 params![
                     job,
@@ -57,6 +57,8 @@ impl Store {
                     i64::try_from(ready.memory_bytes).unwrap_or(i64::MAX),
                     i64::try_from(ready.disk_bytes).unwrap_or(i64::MAX),
                     ready.scene_sha256,
+                    ready.problem.as_ref().map(|(problem, _)| problem),
+                    ready.problem.as_ref().map(|(_, spacing)| spacing),
                 ],
             )?;
             transaction

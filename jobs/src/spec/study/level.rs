@@ -61,6 +61,25 @@ pub struct MeasuredLevel {
     pub health: Option<HealthStatus>,
 }
 
+impl MeasuredLevel {
+    /// A level of which an error and its cost are known, and no more.
+    #[must_use]
+    pub fn of_error(level: Level, theory: Option<f64>) -> Self {
+        Self {
+            spacing: level.spacing,
+            value: level.value,
+            scale: 1.0,
+            theory,
+            cpu_s: level.cpu_s,
+            forecast_cpu_s: None,
+            wall_s: 0.0,
+            particles: 0,
+            steps: 0,
+            health: None,
+        }
+    }
+}
+
 impl From<&MeasuredLevel> for Level {
     fn from(measured: &MeasuredLevel) -> Self {
         Self { spacing: measured.spacing, value: measured.value, cpu_s: measured.cpu_s }
