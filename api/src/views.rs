@@ -352,6 +352,7 @@ impl From<JobRow> for JobView {
         let parts = ["cancel", "pause", "resume", "retry", "events", "log", "series", "report", "files", "checkpoints"];
         let links = links(address(&format!("/v1/jobs/{}", job.id)), &parts);
         let waiting_for = waiting_for(&job);
+        let study = job.study.or(job.awaits);
         let Progress {
             fraction,
             time,
@@ -397,11 +398,7 @@ impl From<JobRow> for JobView {
             after: job.predecessors,
             owner: job.owner,
             usage: UsageView { wall_s, cpu_s, peak_memory_bytes, disk_bytes },
-            lineage: LineageView {
-                study: job.study.or(job.awaits),
-                restarted_from: job.restarted_from,
-                retry_of: job.retry_of,
-            },
+            lineage: LineageView { study, restarted_from: job.restarted_from, retry_of: job.retry_of },
             deterministic: DeterministicView { build: build::name(), isa: build::isa() },
             created_at: job.created_at,
             started_at: job.started_at,

@@ -286,14 +286,7 @@ pub(super) fn insert(
             job.problem.as_ref().map(|(problem, _)| problem),
             job.problem.as_ref().map(|(_, spacing)| spacing),
         ])?;
-    for upload in &job.uploads {
-        let known = transaction
-            .prepare_cached("INSERT OR IGNORE INTO inputs SELECT ?1, id FROM uploads WHERE id = ?2")?
-            .execute(params![id, upload])?;
-        if known == 0 {
-            return Err(StoreError::UploadGone);
-        }
-    }
+    enter_inputs(transaction, id, &job.uploads)?;
     if let Some(old) = &job.retry_of {
         transaction.execute("UPDATE jobs SET superseded = 1 WHERE id = ?1", [old])?;
     }
@@ -303,6 +296,19 @@ pub(super) fn insert(
         && let Err(ChangeError::Store(error)) = transitions::give_up(transaction, id, &lost)
     {
         return Err(error);
+    }
+    Ok(())
+}
+
+/// Enters the uploads that a job takes points from.
+fn enter_inputs(transaction: &Transaction, id: &str, uploads: &[String]) -> Result<(), StoreError> {
+    for upload in uploads {
+        let known = transaction
+            .prepare_cached("INSERT OR IGNORE INTO inputs SELECT ?1, id FROM uploads WHERE id = ?2")?
+            .execute(params![id, upload])?;
+        if known == 0 {
+            return Err(StoreError::UploadGone);
+        }
     }
     Ok(())
 }
