@@ -16,7 +16,7 @@ fn study_of(service: &Service, job: &Value) -> Value {
 
 #[test]
 fn a_job_that_asks_for_an_error_waits_for_its_study_and_reaches_it() {
-    let (_directory, service) = service(&["--slots", "1"]);
+    let (_directory, mut service) = service(&["--slots", "1"]);
     let body = wanted(1e-7);
     let estimate = service.post("/v1/estimates", &body);
     assert_eq!(estimate.status, 200, "{}", estimate.text());
@@ -41,6 +41,7 @@ fn a_job_that_asks_for_an_error_waits_for_its_study_and_reaches_it() {
     let (predicted, reached) = (accuracy["predicted"].as_f64().unwrap(), accuracy["reached"].as_f64().unwrap());
     assert!(predicted <= 1e-7 && reached > 1e-9, "met, and not at any price: {accuracy}");
     assert_eq!(job["health"]["findings"], json!([]));
+    assert!(service.stop());
     service.fsck();
 }
 
@@ -83,6 +84,7 @@ fn a_job_that_waits_survives_a_crash_and_takes_its_study_along_when_it_is_cancel
     assert_eq!(answer.status, 202);
     let job = service.wait_for(&id, &["canceled", "failed"]);
     assert_eq!(job["reason"], "dependency.failed");
+    assert!(service.stop());
     service.fsck();
 }
 

@@ -56,7 +56,7 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn levels_are_made_until_the_tolerance_is_met_and_are_taken_from_equal_jobs() {
-    let (_directory, service) = service(&["--slots", "2"]);
+    let (_directory, mut service) = service(&["--slots", "2"]);
     let body = study(&json!({}));
     let dry = service.post("/v1/studies?dry_run=true", &body).json();
     assert_eq!(dry["points"].as_array().unwrap().len(), 6);
@@ -104,6 +104,7 @@ fn levels_are_made_until_the_tolerance_is_met_and_are_taken_from_equal_jobs() {
     let table = service.request("GET", &format!("/v1/studies/{again}/table"), &[("accept", "application/json")], None);
     assert_eq!(table.json()["rows"].as_array().unwrap().len(), 3);
     assert_eq!(service.request("DELETE", &format!("/v1/studies/{again}"), &[], None).status, 204);
+    assert!(service.stop());
     service.fsck();
 }
 
@@ -134,7 +135,7 @@ fn the_cheapest_alternative_goes_on_and_the_others_stop() {
 fn points_of_a_surface_are_refined_by_their_count_and_values_are_extrapolated() {
     let (_directory, service) = service(&["--slots", "1"]);
     let sweep = |quantity: Value, tolerance: f64| {
-        json!({"base": {"scene": {"kind": "surface_pde", "problem": "poisson"}},
+        json!({"base": {"scene": {"kind": "surface_pde"}},
             "sweep": {"mode": "refine", "axis": "/scene/count", "from": 1000, "ratio": 1.4, "levels": {"least": 3, "most": 5},
                 "quantity": quantity, "until": {"tolerance": tolerance}}})
     };
@@ -216,10 +217,13 @@ fn what_the_levels_cannot_tell_or_afford_ends_the_study_with_a_sentence() {
     let (outcome, message, id) = end(json!({"budget": {"cpu_s": 1e-6}, "until": {"tolerance": 1e-12}, "from": 0.09}));
     assert!(outcome == "budget" && message.contains("CPU seconds"), "{message}");
     assert!(jobs(&service, &id).len() < 3);
-    // Sixteen times finer at every level: the third one is beyond any memory.
-    let (outcome, message, id) =
-        end(json!({"ratio": 10, "levels": {"least": 2, "most": 8}, "until": {"tolerance": 1e-30}, "from": 0.1}));
-    assert!(["memory", "levels"].contains(&outcome.as_str()), "{outcome}: {message}");
+    // The third level has ten thousand times as many particles as the first, and a small machine.
+    let mut large = study(&json!({"ratio": 10, "levels": {"least": 2, "most": 8}, "until": {"tolerance": 1e-30}}));
+    large["base"]["limits"] = json!({"memory_bytes": 64 << 20});
+    let id = submit(&service, &large);
+    let found = ended(&service, &id);
+    assert_eq!(found["outcome"], "memory", "{found}");
+    assert!(found["message"].as_str().unwrap().contains("particles need"), "{found}");
     assert_eq!(report(&service, &id)["tolerance_met"], false);
     let (outcome, ..) = end(json!({"quantity": {"report": "/cost/steps"}, "until": {"tolerance": 0.1}}));
     assert_eq!(outcome, "tolerance", "values that are equal are known");
@@ -260,5 +264,6 @@ fn a_study_pauses_between_levels_resumes_cancels_and_repeats_what_was_canceled()
     assert!(study["message"].as_str().unwrap().contains("level 0 was canceled"), "{study}");
     act(&service, &id, "cancel");
     assert_eq!(service.request("DELETE", &format!("/v1/studies/{id}"), &[], None).status, 204);
+    assert!(service.stop());
     service.fsck();
 }
