@@ -114,8 +114,12 @@ fn wrong_measures_are_told_at_their_place() {
     let printed = String::from_utf8_lossy(&done.stderr).into_owned() + &String::from_utf8_lossy(&done.stdout);
     assert!(!done.status.success());
     for place in [
-        "/output/probes/0/name", "/output/probes/0/at", "/output/probes/0/field", "/output/probes/1",
-        "/output/measures/0/over", "/output/measures/1",
+        "/output/probes/0/name",
+        "/output/probes/0/at",
+        "/output/probes/0/field",
+        "/output/probes/1",
+        "/output/measures/0/over",
+        "/output/measures/1",
     ] {
         assert!(printed.contains(place), "{place}: {printed}");
     }

@@ -8,6 +8,9 @@ use serde_json::{Value, json};
 /// Norms of errors that are shares of the exact answer already.
 const NORMS_OF_SHARES: [&str; 3] = ["relative", "max_relative", "of_measure"];
 
+/// Beginnings of the observables that a body declares itself (`output.probes`, `output.measures`).
+const OWN_OBSERVABLES: [&str; 2] = ["probe.", "measure."];
+
 meniscus::group! {
     /// An error against an exact answer.
     pub struct ErrorSpec {
@@ -129,7 +132,8 @@ impl QuantitySpec {
         let Some(kind) = kind else { return };
         let known = (kind.quantities)();
         let mut check = |name: &str, known: Vec<&'static str>, at: &str, detail: &str| {
-            if !known.contains(&name) {
+            let is_own = OWN_OBSERVABLES.iter().any(|beginning| name.starts_with(beginning));
+            if !known.contains(&name) && !is_own {
                 let at = format!("{place}/{at}");
                 let mut violation = Violation::new(at, "unknown", detail, name, Json::from(known.clone()));
                 violation.did_you_mean = suggest(name, &known);

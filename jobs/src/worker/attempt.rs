@@ -24,7 +24,7 @@ use crate::worker::observers::{Control, Observers};
 use crate::worker::report;
 use meniscus::scene::{self, BuildContext, Scene};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::run::{Ending, Observer, ObserverError};
+use meniscus::simulation::run::{Ending, ObserverError};
 use meniscus::simulation::{CpuClock, LoadError, Measures, RunError, Section, Simulation, StepError, run};
 use serde::Deserialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -440,21 +440,10 @@ fn finish(
     let compose = |findings: &FindingLog| {
         report::compose(simulation, findings, &usage, phases.clone(), ended.threads, &ended.scene_sha256)
     };
-    let mut report = compose(&observers.findings);
-    if let Some(chosen) = &ended.accuracy {
-        let series = std::fs::read_to_string(directory.join(attempt_files::SERIES))?;
-        match accuracy::judge(chosen, &report, &series, ended.scene) {
-            Ok(reached) => {
-                let clock = simulation.clock();
-                if let Some(finding) = accuracy::missed(&reached, (clock.step, clock.time)) {
-                    observers.notice(&finding)?;
-                    report = compose(&observers.findings);
-                }
-                report.accuracy = Some(reached.report);
-            }
-            Err(cause) => log.line(&format!("the accuracy cannot be told: {cause}")),
-        }
-    }
+    let report = match &ended.accuracy {
+        Some(chosen) => accuracy::report(chosen, directory, ended.scene, observers, compose)?,
+        None => compose(&observers.findings),
+    };
     artifacts::write(&directory.join(attempt_files::REPORT), &serde_json::to_vec_pretty(&report)?)?;
     let report = FileRecord::from_file(directory, attempt_files::REPORT, "application/json")?;
     files.push(report.clone());
