@@ -154,6 +154,17 @@ pub trait Scene: Send + Sync {
     /// Distance of neighboring particles or points, where it is known before a run.
     fn spacing(&self) -> Option<f64>;
 
+    /// Order p of an error ~ spacingᵖ that theory gives, by quantity and norm of the report; None where none is known.
+    fn order(&self, _quantity: &str, _norm: &str) -> Option<f64> {
+        None
+    }
+
+    /// Fields that decide between speed and accuracy, by JSON pointer, with the values that are worth a comparison. Where a body
+    /// leaves one open and asks for an accuracy, the cheapest value is found by runs.
+    fn choices(&self) -> Vec<(&'static str, Vec<Json>)> {
+        Vec::new()
+    }
+
     /// The parameters with every default and every automatic choice that is known before a run.
     fn resolved(&self) -> Json;
 

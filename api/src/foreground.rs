@@ -78,6 +78,8 @@ pub fn resume(file: &Path, out: &Path, threads: Option<usize>) -> Result<ExitCod
         map.shift_remove("restart");
         // The limits are those of the machine that wrote the checkpoint.
         map.shift_remove("limits");
+        // The spacing was chosen.
+        map.shift_remove("accuracy");
     }
     let path = std::fs::canonicalize(file)?;
     let candidate =
@@ -104,6 +106,10 @@ fn resolve(spec: &Value, threads: Option<usize>) -> Result<ResolvedBody, RunErro
             .collect();
         RunError::Invalid(lines.join("\n"))
     })?;
+    if body.wanted.is_some() {
+        let message = "/accuracy: a study chooses the spacing, which only the service runs; give a spacing";
+        return Err(RunError::Invalid(message.to_owned()));
+    }
     Ok(body.resolved)
 }
 

@@ -57,7 +57,7 @@ pub struct JobView {
     pub labels: BTreeMap<String, String>,
     /// The body as sent.
     pub spec: Value,
-    /// The body with every default filled in.
+    /// The body with every default filled in; null as long as a study of its own looks for its spacing.
     pub resolved: Value,
     /// Progress of the run.
     pub progress: ProgressView,
@@ -69,7 +69,7 @@ pub struct JobView {
     pub attempt: u64,
     /// Resources used so far.
     pub usage: UsageView,
-    /// What a queued job waits for.
+    /// What a queued job waits for; the id of a study where that finds its spacing.
     pub waiting_for: Option<String>,
     /// Ids of jobs that must have succeeded before it starts.
     pub after: Vec<String>,
@@ -128,7 +128,7 @@ pub struct UsageView {
 /// Objects that a job was made from.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct LineageView {
-    /// Id of the study that the job belongs to.
+    /// Id of the study that the job belongs to, or that found its spacing.
     pub study: Option<String>,
     /// Id of the checkpoint that the job started from.
     pub restarted_from: Option<String>,
@@ -337,7 +337,9 @@ fn links(base: String, parts: &[&'static str]) -> BTreeMap<&'static str, String>
 
 /// What a queued job waits for.
 fn waiting_for(job: &JobRow) -> Option<String> {
+    let study = job.awaits.clone().filter(|_| job.resolved.is_null());
     (job.state == State::Queued).then(|| match (job.waits_for, &job.hint) {
+        (1.., _) if study.is_some() => study.unwrap_or_default(),
         (0, Some(_)) => "another try to start it (see hint)".to_owned(),
         (0, None) => "a free slot, its memory and its disk space".to_owned(),
         (1, _) => "one job of `after` to succeed".to_owned(),
@@ -350,6 +352,7 @@ impl From<JobRow> for JobView {
         let parts = ["cancel", "pause", "resume", "retry", "events", "log", "series", "report", "files", "checkpoints"];
         let links = links(address(&format!("/v1/jobs/{}", job.id)), &parts);
         let waiting_for = waiting_for(&job);
+        let study = job.study.or(job.awaits);
         let Progress {
             fraction,
             time,
@@ -395,7 +398,7 @@ impl From<JobRow> for JobView {
             after: job.predecessors,
             owner: job.owner,
             usage: UsageView { wall_s, cpu_s, peak_memory_bytes, disk_bytes },
-            lineage: LineageView { study: job.study, restarted_from: job.restarted_from, retry_of: job.retry_of },
+            lineage: LineageView { study, restarted_from: job.restarted_from, retry_of: job.retry_of },
             deterministic: DeterministicView { build: build::name(), isa: build::isa() },
             created_at: job.created_at,
             started_at: job.started_at,

@@ -3,7 +3,9 @@
 //! The modules stand in order: each uses only those above it.
 //!
 //! - [`system`]: files, digests, the clock, what the operating system says of processes;
+//! - [`convergence`]: what levels of refinement say of their limit, as plain numbers;
 //! - [`spec`]: plain data that the service and its workers exchange: bodies, states, records, the attempt's specification;
+//! - [`refinement`]: what studies that refine do next, and which spacing their levels tell;
 //! - [`formats`]: files that other programs read, and checkpoints;
 //! - [`worker`]: the process of one attempt;
 //! - [`inspection`]: the process that looks into one uploaded file, under limits;
@@ -15,7 +17,11 @@
 
 pub mod system;
 
+pub mod convergence;
+
 pub mod spec;
+
+pub mod refinement;
 
 pub mod formats;
 

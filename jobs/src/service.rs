@@ -6,6 +6,8 @@ pub mod executor;
 pub mod found_folders;
 pub mod fsck;
 pub mod inspector;
+pub mod refinement;
+pub mod accuracy;
 pub mod store;
 pub mod study_report;
 pub mod study_table;

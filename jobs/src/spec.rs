@@ -1,5 +1,6 @@
 //! Plain data that the service and its workers exchange. Nothing here opens the store or steps a simulation.
 
+pub mod accuracy;
 pub mod action;
 pub mod attempt_files;
 pub mod attempt_spec;
@@ -8,6 +9,7 @@ pub mod calibration;
 pub mod forecast;
 pub mod health;
 mod json_numbers;
+pub mod quantity;
 pub mod records;
 pub mod report;
 pub mod requests;
@@ -17,3 +19,4 @@ pub mod states;
 pub mod strict_json;
 pub mod study;
 pub mod uploads;
+pub mod work_precision;

@@ -10,6 +10,8 @@ pub mod measure;
 mod outcome;
 pub mod plot;
 mod plots;
+mod studies;
+pub mod study_case;
 mod workspace;
 
 pub use case::{Case, CaseError};
@@ -72,7 +74,8 @@ pub enum VerifyError {
 /// [`VerifyError`].
 pub fn verify(request: &Request, mut show: impl FnMut(&Outcome) -> io::Result<()>) -> Result<bool, VerifyError> {
     let catalog = request.cases.as_deref().map_or_else(Catalog::built_in, Catalog::from_directory)?;
-    let known: Vec<&str> = catalog.kinds.iter().map(|kind| kind.kind).collect();
+    let kinds = catalog.kinds.iter().map(|kind| kind.kind);
+    let known: Vec<&str> = kinds.chain(std::iter::once(catalog::STUDIES)).collect();
     if let Some(name) = request.only.iter().find(|name| !known.contains(&name.as_str())) {
         return Err(VerifyError::UnknownKind { name: name.clone(), known: known.join(", ") });
     }
@@ -95,6 +98,11 @@ pub fn verify(request: &Request, mut show: impl FnMut(&Outcome) -> io::Result<()
         }
         documents.entry(&cases.document).or_default().push(KindOutcomes { cases, outcomes });
     }
+    let has_studies =
+        request.only.iter().any(|name| name == catalog::STUDIES) || request.full && request.only.is_empty();
+    if has_studies {
+        all_met &= verify_studies(request, &catalog, &workspace, &mut show)?;
+    }
     let mut undrawn = None;
     if request.full {
         for (name, results) in &documents {
@@ -107,6 +115,26 @@ pub fn verify(request: &Request, mut show: impl FnMut(&Outcome) -> io::Result<()
         }
     }
     undrawn.map_or(Ok(all_met), Err)
+}
+
+/// Runs the cases of studies, and writes their document where everything is measured. Returns whether every target is met.
+fn verify_studies(
+    request: &Request,
+    catalog: &Catalog,
+    workspace: &Workspace,
+    show: &mut dyn FnMut(&Outcome) -> io::Result<()>,
+) -> io::Result<bool> {
+    let mut all = Vec::new();
+    for (name, case) in &catalog.studies {
+        let (outcomes, lines) =
+            studies::outcomes(workspace, &format!("{}/{name}", catalog::STUDIES), case, request.full, show)?;
+        all.push((case, outcomes, lines));
+    }
+    if request.full {
+        fs::create_dir_all(&request.results)?;
+        fs::write(request.results.join("studies.md"), document::compose_studies(&all))?;
+    }
+    Ok(all.iter().flat_map(|(_, outcomes, _)| outcomes).all(|outcome| outcome.is_met))
 }
 
 /// Writes a document and draws its plots. Returns why a plot could not be drawn; the others are drawn all the same.

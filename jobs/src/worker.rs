@@ -1,5 +1,6 @@
 //! The process of one attempt: restores, runs under observers, writes checkpoints and output, reports.
 
+pub mod accuracy;
 pub mod attempt;
 pub mod calibration;
 pub mod inputs;

@@ -22,6 +22,7 @@ macro_rules! quick {
 quick!(
     kills_of_the_service,
     kills_of_workers,
+    kills_of_a_refinement,
     kills_between_operations_of_a_checkpoint,
     truncated_checkpoints,
     flipped_bits_of_checkpoints,

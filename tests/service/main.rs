@@ -5,6 +5,7 @@
 #[expect(dead_code, reason = "each test target uses a part")]
 mod support;
 
+mod accuracy;
 mod files;
 mod jobs;
 mod access;
@@ -17,6 +18,7 @@ mod estimates;
 mod examples;
 mod http;
 mod readers;
+mod refinement;
 mod requests;
 mod studies;
 mod upload_kinds;

@@ -10,6 +10,7 @@ use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::HeaderMap;
+use meniscus_jobs::service::accuracy;
 
 /// Checks the body of a job and estimates its particles, steps, memory, disk space and time. Creates nothing.
 #[utoipa::path(post, path = "/v1/estimates", operation_id = "estimate_job", tag = "jobs",
@@ -26,6 +27,14 @@ pub async fn estimate(
     let estimated = state.with_store(move |store| {
         let spec = request_body::parse_json(&bytes)?;
         let body = StoreSources::new(store).resolve(&spec, allowance, &store.calibration()?)?;
+        if let Some(wanted) = &body.wanted {
+            if let Some(mut known) = accuracy::known_body(store, &body, wanted, allowance)? {
+                known.forecast.time_by(&store.calibration()?);
+                return Ok(Json(EstimateView::from(known)));
+            }
+            let study = accuracy::study_for(store, &body, wanted, allowance)?;
+            return Ok(Json(EstimateView::of_accuracy(body, &study.forecast)));
+        }
         Ok::<_, ApiError>(Json(EstimateView::from(body)))
     });
     estimated.await

@@ -1,24 +1,22 @@
 //! Changes of jobs: of one that waits, of all that a filter matches, and a new one in place of one that failed.
 
 use crate::access::Client;
-use crate::base_path::address;
 use crate::creation::{Creation, check_capacity};
 use crate::error::{ApiError, Problem, ProblemItem};
-use crate::idempotency::stored_response;
 use crate::path::Path;
 use crate::query;
 use crate::request_body;
 use crate::resource;
-use crate::routes::jobs::{BODY_LIMIT, JobQuery, tag_revision};
+use crate::routes::jobs::{self, BODY_LIMIT, JobQuery, tag_revision};
 use crate::state::AppState;
 use crate::store_sources::StoreSources;
 use crate::views::{ActionView, JobView, SkippedView};
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
 use axum::response::Response;
 use axum::{Extension, Json};
 use meniscus::spec::Word;
-use meniscus_jobs::service::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store};
+use meniscus_jobs::service::store::{Change, ChangeError, JobFilter, JobRow, Store};
 use meniscus_jobs::spec::action::{self, Action, ActionSpec};
 use meniscus_jobs::spec::body;
 use meniscus_jobs::spec::forecast::WORKER_BASE_BYTES;
@@ -46,6 +44,10 @@ pub async fn change(
     }
     let allowance = state.config.allowance();
     let work = move |store: &Store| {
+        if let Some(study) = row.awaits.as_ref().filter(|_| row.resolved.is_null()) {
+            let why = format!("The job has no body to be changed yet: {study} still looks for its spacing.");
+            return Err(ApiError::Conflict(why));
+        }
         let needed = row.forecast.memory_bytes.max(WORKER_BASE_BYTES);
         let amended = body::amend(&row.spec, &row.resolved, &patch, allowance, needed)?;
         if !matches!(row.state, JobState::Queued | JobState::Paused) {
@@ -99,15 +101,12 @@ pub async fn retry(
         }
         let body = StoreSources::new(store).resolve(&old.spec, here.config.allowance(), &store.calibration()?)?;
         check_capacity(&here, store, 1, body.forecast.disk_bytes)?;
-        let mut job = NewJob::from_body(&body);
-        job.owner.clone_from(&creation.owner);
-        job.study = old.study.clone().zip(old.study_index);
-        job.retry_of = Some(old.id.clone());
-        let answer = |row: JobRow| {
-            let location = address(&format!("/v1/jobs/{}", row.id));
-            stored_response(StatusCode::CREATED, Some(location), &JobView::from(row))
+        let lineage = jobs::Lineage {
+            owner: creation.owner.clone(),
+            study: old.study.clone().zip(old.study_index),
+            retry_of: Some(old.id.clone()),
         };
-        creation.respond(store.submit(job, creation.keyed.clone(), answer)?)
+        creation.respond(jobs::make(&here, store, &body, lineage, creation.keyed.clone())?)
     };
     let response = state.with_store(work).await?;
     state.supervisor.wake();

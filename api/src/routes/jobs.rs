@@ -18,7 +18,11 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
-use meniscus_jobs::service::store::{Change, ChangeError, JobFilter, JobRow, NewJob, Store, StoreError};
+use meniscus_jobs::service::accuracy;
+use meniscus_jobs::service::store::{
+    Change, ChangeError, IdempotencyKey, JobFilter, JobRow, Made, NewJob, NewStudy, Store, StoreError,
+};
+use meniscus_jobs::spec::body::JobBody;
 use meniscus_jobs::spec::health::HealthStatus;
 use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
 use meniscus_jobs::system::clock;
@@ -47,16 +51,52 @@ pub async fn submit(State(state): State<AppState>, request: Request) -> Result<R
         }
         let body = StoreSources::new(store).resolve(&spec, here.config.allowance(), &store.calibration()?)?;
         check_capacity(&here, store, 1, body.forecast.disk_bytes)?;
-        let answer = |row: JobRow| {
-            stored_response(StatusCode::CREATED, Some(address(&format!("/v1/jobs/{}", row.id))), &JobView::from(row))
-        };
-        let mut job = NewJob::from_body(&body);
-        job.owner.clone_from(&creation.owner);
-        creation.respond(store.submit(job, creation.keyed.clone(), answer)?)
+        let lineage = Lineage { owner: creation.owner.clone(), ..Lineage::default() };
+        creation.respond(make(&here, store, &body, lineage, creation.keyed.clone())?)
     };
     let response = state.with_store(work).await?;
     state.supervisor.wake();
     Ok(response)
+}
+
+/// Where a new job comes from.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Lineage {
+    /// Name of the token that makes it.
+    pub(super) owner: Option<String>,
+    /// The study that it is a point of, with the point's number.
+    pub(super) study: Option<(String, u64)>,
+    /// The job that it repeats.
+    pub(super) retry_of: Option<String>,
+}
+
+/// Makes a job; one that asks for an accuracy together with the study that finds its spacing.
+pub(super) fn make(
+    state: &AppState,
+    store: &Store,
+    body: &JobBody,
+    lineage: Lineage,
+    keyed: Option<IdempotencyKey>,
+) -> Result<Made, ApiError> {
+    let answer = |row: JobRow| {
+        stored_response(StatusCode::CREATED, Some(address(&format!("/v1/jobs/{}", row.id))), &JobView::from(row))
+    };
+    let Lineage { owner, study, retry_of } = lineage;
+    // Earlier runs of the same problem may tell the spacing at once.
+    let known = body.wanted.as_ref().map(|wanted| accuracy::known_body(store, body, wanted, state.config.allowance()));
+    let known = known.transpose()?.flatten();
+    let body = known.as_ref().unwrap_or(body);
+    let mut job = if body.wanted.is_some() { NewJob::waiting(body) } else { NewJob::from_body(body) };
+    job.owner.clone_from(&owner);
+    job.study = study;
+    job.retry_of = retry_of;
+    if let Some(wanted) = &body.wanted {
+        let finding = accuracy::study_for(store, body, wanted, state.config.allowance())?;
+        check_capacity(state, store, 2, finding.forecast.disk_bytes)?;
+        let finding = NewStudy { owner, ..finding };
+        return Ok(store.submit_with_study(job, &finding, keyed.as_ref(), answer)?);
+    }
+    Ok(store.submit(job, keyed, answer)?)
 }
 
 impl Resource for JobRow {

@@ -19,7 +19,7 @@ use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use meniscus_jobs::service::store::{Change, NewJob, NewStudy, Store, StoreError, StudyRow};
-use meniscus_jobs::service::{study_report, study_table};
+use meniscus_jobs::service::{refinement, study_report, study_table};
 use meniscus_jobs::spec::states::{Reason, State as JobState, Trigger};
 use meniscus_jobs::spec::study;
 use serde::Deserialize;
@@ -59,9 +59,8 @@ pub async fn submit(
         if let Some(made) = creation.known.take() {
             return creation.respond(made);
         }
-        let sources = StoreSources::new(store);
         let (allowance, slots) = (here.config.allowance(), here.config.slots);
-        let study = study::parse(&spec, allowance, slots, &sources, &store.calibration()?, NewJob::from_body)?;
+        let study = study::parse(&spec, allowance, slots, store, &store.calibration()?, NewJob::from_body)?;
         if query.dry_run {
             let view = DryRunView { points: study.points, estimate: serde_json::json!(study.forecast) };
             return Ok(Json(view).into_response());
@@ -188,11 +187,13 @@ pub async fn table(
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct ReportQuery {
-    /// Quantity and norm of the picture, such as `phi.rms`; the first error of the report by default.
+    /// Quantity and norm of the picture, such as `phi.rms`; the first error of the report by default. A study that refines then
+    /// answers as a sweep does.
     error: Option<String>,
 }
 
-/// Errors over spacing and over time with fitted orders, as JSON, or as a picture (SVG) by `Accept`.
+/// Errors over spacing and over time with fitted orders, as JSON, or as a picture (SVG) by `Accept`. Of a study that refines:
+/// levels, observed order, extrapolated value, grid convergence index, and what would meet the tolerance.
 #[utoipa::path(get, path = "/v1/studies/{id}/report", operation_id = "study_report", tag = "studies",
     params(("id" = String, Path), ReportQuery, ("Accept" = Option<String>, Header)),
     responses((status = 200, content_type = "application/json"), (status = 404, body = Problem), (status = 422, body = Problem)))]
@@ -205,6 +206,9 @@ pub async fn report(
     let row = resource::find::<StudyRow>(&state, id).await?;
     let is_picture = accept::prefers(&headers, "svg", "json");
     let compose = move |store: &Store| {
+        if row.refinement.is_some() && query.error.is_none() {
+            return refinement(store, &row, is_picture);
+        }
         let points = store.points(&row, None, ALL_POINTS)?;
         if !is_picture {
             return Ok(Json(study_report::compose(&row, &points)).into_response());
@@ -214,6 +218,17 @@ pub async fn report(
         Ok(([(header::CONTENT_TYPE, "image/svg+xml")], picture).into_response())
     };
     state.with_store(compose).await
+}
+
+/// The report of a study that refines.
+fn refinement(store: &Store, study: &StudyRow, is_picture: bool) -> Result<Response, ApiError> {
+    if !is_picture {
+        let report = refinement::report::compose(store, study)?;
+        return Ok(Json(report.ok_or(ApiError::NotFound("report of the study"))?).into_response());
+    }
+    let picture = refinement::report::draw(store, study)?.ok_or(ApiError::NotFound("level with an error"))?;
+    let picture = picture.map_err(ApiError::Internal)?;
+    Ok(([(header::CONTENT_TYPE, "image/svg+xml")], picture).into_response())
 }
 
 /// Applies a trigger to all jobs of a study that it concerns.
@@ -301,6 +316,10 @@ fn new_jobs(state: &AppState, store: &Store, study: &StudyRow) -> Result<Vec<New
     let sources = StoreSources::new(store);
     let calibration = store.calibration()?;
     let mut new = Vec::new();
+    if study.refinement.is_some() {
+        // Its levels are made again one after another, by the supervisor.
+        return Ok(new);
+    }
     for point in store.points(study, None, ALL_POINTS)? {
         let was_stopped = study.is_stopping && point.state == JobState::Canceled;
         if point.state != JobState::Failed && !was_stopped {

@@ -2,9 +2,11 @@
 
 use super::FindingView;
 use crate::base_path::address;
-use meniscus_jobs::service::store::{StudyRow, UploadRow};
+use meniscus::spec::Word;
+use meniscus_jobs::service::store::{RefinementRow, StudyRow, UploadRow};
 use meniscus_jobs::spec::body::JobBody;
 use meniscus_jobs::spec::states::State;
+use meniscus_jobs::spec::study::{RefinementOutcome, RefinementState, StudyForecast};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -23,9 +25,9 @@ pub struct StudyView {
     pub state: &'static str,
     /// Points by the state of their latest job; `deleted` where the job was deleted.
     pub counts: BTreeMap<String, u64>,
-    /// Number of points.
+    /// Number of points; of a study that refines, of the levels made so far.
     pub points: u64,
-    /// Share of the points that have ended.
+    /// Share of the points that have ended; of a study that refines, of the levels that it may make.
     pub fraction: f64,
     /// The body that all points share.
     pub base: Value,
@@ -37,8 +39,13 @@ pub struct StudyView {
     pub max_parallel: Option<u64>,
     /// What happens if a point fails: `continue` or `stop`.
     pub on_failure: String,
-    /// Estimate of all points together.
+    /// Estimate of all points together; of a study that refines, of the levels that are made in any case.
     pub estimate: Value,
+    /// Why a study that refines makes no further level: `tolerance`, `levels`, `budget`, `memory`, `divergent`, `failed` or
+    /// `canceled`; null while it goes on, and of other studies.
+    pub outcome: Option<&'static str>,
+    /// The same in a sentence.
+    pub message: Option<String>,
     /// Name of the token that made it; null without tokens.
     pub owner: Option<String>,
     /// Time of creation (RFC 3339, UTC).
@@ -98,8 +105,10 @@ list! {
 /// What a job would need.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct EstimateView {
-    /// The body with every default filled in.
+    /// The body with every default filled in; null where a study is to find its spacing first.
     pub resolved: Value,
+    /// What the study takes that finds the spacing for an accuracy; null where none is needed.
+    pub study: Option<Value>,
     /// Number of particles.
     pub particles: u64,
     /// Time step, in units of the scene.
@@ -129,6 +138,7 @@ impl From<JobBody> for EstimateView {
         let time = body.forecast.time.as_ref();
         Self {
             resolved: body.resolved.to_json(),
+            study: None,
             particles: estimate.particles,
             time_step: estimate.time_step,
             steps: estimate.steps,
@@ -139,6 +149,33 @@ impl From<JobBody> for EstimateView {
             basis,
             numbers: body.scene.numbers().into_iter().collect(),
             warnings: body.scene.warnings().into_iter().map(FindingView::from).collect(),
+        }
+    }
+}
+
+impl EstimateView {
+    /// The estimate of a body that asks for an accuracy: the study that finds its spacing comes first, and tells what the run takes.
+    #[must_use]
+    pub fn of_accuracy(body: JobBody, study: &StudyForecast) -> Self {
+        let basis = format!(
+            "the spacing is not known before a study has run; its first {} levels are estimated, and it goes on until the spacing can \
+             be told",
+            study.points
+        );
+        let numbers = body.scene.numbers().into_iter().collect();
+        Self {
+            resolved: Value::Null,
+            study: Some(serde_json::json!(study)),
+            particles: 0,
+            time_step: 0.0,
+            steps: 0,
+            memory_bytes: study.memory_bytes,
+            disk_bytes: study.disk_bytes,
+            cpu_s: None,
+            wall_s: None,
+            basis,
+            numbers,
+            warnings: Vec::new(),
         }
     }
 }
@@ -162,11 +199,42 @@ fn state_of(counts: &BTreeMap<State, u64>) -> &'static str {
     }
 }
 
+/// State of a study that refines: between two levels it runs, and in the end it is what its outcome says.
+fn state_of_refinement(row: &StudyRow, refinement: &RefinementRow) -> &'static str {
+    let has_unfinished = row.counts.iter().any(|(state, count)| *count > 0 && !state.is_terminal());
+    match (refinement.state, refinement.outcome) {
+        (RefinementState::Ended, _) if has_unfinished => "running",
+        (RefinementState::Ended, Some(RefinementOutcome::Failed)) => "failed",
+        (RefinementState::Ended, Some(RefinementOutcome::Canceled)) => "canceled",
+        (RefinementState::Ended, _) => "succeeded",
+        (RefinementState::Paused, _) if !has_unfinished => "paused",
+        (RefinementState::Open, _) if !has_unfinished => {
+            if refinement.levels == 0 {
+                "queued"
+            } else {
+                "running"
+            }
+        }
+        _ => state_of(&row.counts),
+    }
+}
+
+/// Share of a study that is done; once no further point is made it is 1.
+fn fraction_of(row: &StudyRow, ended: u64) -> f64 {
+    match &row.refinement {
+        Some(refinement) if refinement.state == RefinementState::Ended => 1.0,
+        Some(refinement) => ended as f64 / refinement.most_levels.max(1) as f64,
+        None => ended as f64 / row.points.max(1) as f64,
+    }
+}
+
 impl From<StudyRow> for StudyView {
     fn from(row: StudyRow) -> Self {
         let there: u64 = row.counts.values().sum();
         let ended: u64 = row.counts.iter().filter(|(state, _)| state.is_terminal()).map(|(_, count)| count).sum();
-        let deleted = row.points.saturating_sub(there);
+        let state =
+            row.refinement.as_ref().map_or_else(|| state_of(&row.counts), |found| state_of_refinement(&row, found));
+        let deleted = if row.refinement.is_some() { 0 } else { row.points.saturating_sub(there) };
         let mut counts: BTreeMap<String, u64> =
             row.counts.iter().map(|(state, count)| (state.word().to_owned(), *count)).collect();
         if deleted > 0 {
@@ -175,8 +243,10 @@ impl From<StudyRow> for StudyView {
         let parts = ["jobs", "events", "table", "report", "cancel", "pause", "resume", "retry"];
         let links = super::links(address(&format!("/v1/studies/{}", row.id)), &parts);
         Self {
-            state: state_of(&row.counts),
-            fraction: (ended + deleted) as f64 / row.points.max(1) as f64,
+            state,
+            fraction: fraction_of(&row, ended + deleted),
+            outcome: row.refinement.as_ref().and_then(|found| found.outcome).map(RefinementOutcome::word),
+            message: row.refinement.as_ref().and_then(|found| found.message.clone()),
             counts,
             id: row.id,
             name: row.name,

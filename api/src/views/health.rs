@@ -70,10 +70,27 @@ pub struct ReportView {
     pub health: HealthView,
     /// What the method counted of its own work.
     pub diagnostics: Vec<DiagnosticView>,
+    /// What came of the accuracy that was asked for; null where none was.
+    pub accuracy: Option<AccuracyView>,
     /// Outcomes of automatic choices, and their reasons.
     pub method: BTreeMap<String, String>,
     /// Where the numbers come from.
     pub provenance: ProvenanceView,
+}
+
+/// What came of an accuracy that was asked for.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct AccuracyView {
+    /// The quantity as sent.
+    pub quantity: serde_json::Value,
+    /// The tolerance.
+    pub tolerance: f64,
+    /// Predicted error.
+    pub predicted: f64,
+    /// Error that was reached, known or estimated; null where it cannot be told.
+    pub reached: Option<f64>,
+    /// Whether the tolerance is met.
+    pub met: bool,
 }
 
 /// An error against a reference.

@@ -3,7 +3,7 @@
 use super::chart::{self, style};
 use plotters::coord::Shift;
 use plotters::prelude::{
-    ChartBuilder, Circle, DrawingArea, IntoDrawingArea, IntoLogRange, PathElement, SVGBackend, WHITE,
+    ChartBuilder, Circle, DrawingArea, IntoDrawingArea, IntoLogRange, PathElement, SVGBackend, ShapeStyle, WHITE,
 };
 use plotters::style::{BLACK, Color};
 use std::ops::Range;
@@ -22,11 +22,34 @@ pub struct Point {
 /// Labels and runs.
 pub type Lines = Vec<(String, Vec<Point>)>;
 
+/// A thin line of an order through the finest run of a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slope {
+    /// Number of the line.
+    pub line: usize,
+    /// The order p of errors ~ h^p.
+    pub order: f64,
+}
+
 /// Both pictures side by side, as SVG; `seconds` names what was timed.
 ///
 /// # Errors
 /// A message when it cannot be drawn.
 pub fn draw(title: &str, seconds: &str, lines: &[(String, Vec<Point>)]) -> Result<String, String> {
+    draw_with_slope(title, seconds, lines, None)
+}
+
+/// The same with a slope over the spacing.
+///
+/// # Errors
+/// A message when it cannot be drawn.
+pub fn draw_with_slope(
+    title: &str,
+    seconds: &str,
+    lines: &[(String, Vec<Point>)],
+    slope: Option<Slope>,
+) -> Result<String, String> {
+    let expected = slope.map(|slope| expected(lines, slope)).unwrap_or_default();
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, (1480, 560)).into_drawing_area();
@@ -34,12 +57,20 @@ pub fn draw(title: &str, seconds: &str, lines: &[(String, Vec<Point>)]) -> Resul
         let root = root.titled(title, ("sans-serif", 22)).map_err(|e| e.to_string())?;
         let (charts, legend) = root.split_horizontally(1200);
         let panels = charts.split_evenly((1, 2));
-        panel(&panels[0], lines, "spacing h", |p| p.spacing)?;
-        panel(&panels[1], lines, seconds, |p| p.seconds)?;
+        panel(&panels[0], (lines, &expected), "spacing h", |p| p.spacing)?;
+        panel(&panels[1], (lines, &[]), seconds, |p| p.seconds)?;
         chart::legend(&legend, lines.iter().map(|(label, _)| label))?;
         root.present().map_err(|e| e.to_string())?;
     }
     Ok(text)
+}
+
+/// The line of an order over the spacings of the runs.
+fn expected(lines: &[(String, Vec<Point>)], slope: Slope) -> Vec<(f64, f64)> {
+    let Some((_, points)) = lines.get(slope.line) else { return Vec::new() };
+    let Some(finest) = points.iter().min_by(|a, b| a.spacing.total_cmp(&b.spacing)) else { return Vec::new() };
+    let error_at = |spacing: f64| finest.error * (spacing / finest.spacing).powf(slope.order);
+    points.iter().map(|point| (point.spacing, error_at(point.spacing))).collect()
 }
 
 /// The order p of errors ~ h^p by least squares over the logarithms; None of fewer than two spacings.
@@ -64,12 +95,13 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
 
 fn panel(
     area: &DrawingArea<SVGBackend, Shift>,
-    lines: &[(String, Vec<Point>)],
+    (lines, expected): (&[(String, Vec<Point>)], &[(f64, f64)]),
     axis: &str,
     x: fn(&Point) -> f64,
 ) -> Result<(), String> {
     let points = || lines.iter().flat_map(|(_, points)| points);
-    let (across, up) = (range(points().map(x)), range(points().map(|p| p.error)));
+    let errors = points().map(|p| p.error).chain(expected.iter().map(|(_, error)| *error));
+    let (across, up) = (range(points().map(x)), range(errors));
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(40)
@@ -87,6 +119,8 @@ fn panel(
         .light_line_style(BLACK.mix(0.05))
         .draw()
         .map_err(|e| e.to_string())?;
+    let thin = ShapeStyle::from(&BLACK).stroke_width(1);
+    chart.draw_series(std::iter::once(PathElement::new(expected.to_vec(), thin))).map_err(|e| e.to_string())?;
     for (k, (_, points)) in lines.iter().enumerate() {
         let places: Vec<(f64, f64)> = points.iter().map(|p| (x(p), p.error)).collect();
         let line = PathElement::new(places.clone(), style(k));

@@ -15,6 +15,7 @@ pub mod import;
 pub mod integrity;
 pub mod listing;
 pub mod migrations;
+pub mod refinements;
 pub mod retention;
 pub mod rows;
 pub mod finish_attempt;
@@ -23,15 +24,19 @@ pub mod studies;
 mod study_limits;
 pub mod submission;
 mod group_commit;
+mod sources;
 pub mod transitions;
 pub mod uploads;
+mod waiting_jobs;
+mod work_precision;
 
 pub use events::Event;
 pub use idempotency::{IdempotencyKey, Made, Receipt};
 pub use listing::JobFilter;
+pub use refinements::{LevelRow, LevelSource, NewLevel, RefinementRow};
 pub use rows::{CheckpointRow, FileRow, JobRow};
 pub use studies::{NewStudy, PointRow, StudyRow};
-pub use submission::{NewJob, START_CHECKPOINT};
+pub use submission::{NewJob, START_CHECKPOINT, scene_sha256};
 pub use transitions::{Change, ChangeError};
 pub use uploads::{NewUpload, UploadRow};
 

@@ -1,5 +1,6 @@
 //! The live table of a study: a row a point, columns `index`, one an axis, `job`, `state`, `reason`, `cpu_s`, `wall_s`,
-//! `particles`, `steps`, `health`, then `error.QUANTITY.NORM` (at the latest time it was taken).
+//! `particles`, `steps`, `health`, then `error.QUANTITY.NORM` (at the latest time it was taken). The rows of a study that refines
+//! have a `level` behind their `index`.
 
 use crate::service::store::PointRow;
 use crate::spec::health::HealthStatus;
@@ -21,12 +22,15 @@ pub struct Table {
 pub fn compose(axes: &[String], points: &[PointRow]) -> Table {
     let kinds: BTreeSet<&String> =
         points.iter().filter_map(|point| point.errors.as_ref()).flat_map(BTreeMap::keys).collect();
+    let has_levels = points.iter().any(|point| point.level.is_some());
     let mut columns = vec!["index".to_owned()];
+    columns.extend(has_levels.then(|| "level".to_owned()));
     columns.extend(axes.iter().cloned());
     columns.extend(["job", "state", "reason", "cpu_s", "wall_s", "particles", "steps", "health"].map(str::to_owned));
     columns.extend(kinds.iter().map(|kind| format!("error.{kind}")));
     let rows = points.iter().map(|point| {
         let mut row = vec![json!(point.index)];
+        row.extend(has_levels.then(|| json!(point.level)));
         row.extend(point.values.iter().cloned());
         row.extend([
             json!(point.job),

@@ -8,6 +8,7 @@ mod recovery;
 mod starting;
 
 use crate::service::executor::{EndCause, Executor, Worker};
+use crate::service::refinement;
 use crate::service::store::finish_attempt::LossCause;
 use crate::service::store::import::{Imported, ProgressPace};
 use crate::service::store::{Change, ChangeError, Store, StoreError};
@@ -227,7 +228,7 @@ impl Supervisor {
         self.drain_until.is_some()
     }
 
-    /// One round: import records, hold workers to their limits, finish attempts, start workers.
+    /// One round: import records, hold workers to their limits, finish attempts, let studies refine, start workers.
     fn round(&mut self) -> Result<(), StoreError> {
         self.clock.begin_round();
         for mut running in std::mem::take(&mut self.running) {
@@ -243,6 +244,9 @@ impl Supervisor {
             self.running.push(running);
         }
         self.store.stop_failed_studies()?;
+        if !self.is_draining() {
+            self.round_failed |= refinement::advance_all(&self.store)? > 0;
+        }
         self.expire()?;
         if self.clock_saved.elapsed() >= CLOCK_INTERVAL {
             self.clock_saved = Instant::now();

@@ -12,6 +12,7 @@ pub use predecessors::JobIds;
 pub use restart::RestartSpec;
 pub use sources::{BodyError, JobSource, NoSources, Origin, RestartSource, Sources};
 
+use crate::spec::accuracy::{AccuracySpec, ChosenAccuracy, Wanted};
 use crate::spec::forecast::{self, Forecast, WORKER_BASE_BYTES};
 use crate::spec::own_measures::{Kept, OwnMeasures};
 use crate::spec::run_options::{CheckpointSpec, Checkpoints, Limits, LimitsSpec, Output, OutputSpec, RunOptions};
@@ -43,6 +44,8 @@ meniscus::group! {
         priority: Option<Priority>;
         /// ids of jobs that must have succeeded before this one starts
         after: Option<JobIds>;
+        /// an error that is asked for; the service then chooses the spacing, or the count of points
+        accuracy: Option<AccuracySpec>;
     }
 }
 
@@ -74,6 +77,9 @@ pub struct ResolvedBody {
     pub options: RunOptions,
     /// Rank in the queue.
     pub priority: i64,
+    /// The accuracy that was asked for, once the spacing is chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<ChosenAccuracy>,
 }
 
 impl ResolvedBody {
@@ -116,6 +122,8 @@ pub struct JobBody {
     pub uploads: Vec<String>,
     /// Jobs that must have succeeded before it starts.
     pub predecessors: Vec<String>,
+    /// An accuracy that is asked for: the scene then is the one with the default spacing, which is still to be chosen.
+    pub wanted: Option<Wanted>,
 }
 
 /// From a client's JSON to a job.
@@ -152,6 +160,7 @@ pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Res
     }
     let mut predecessors = given.read(JobSpec::after()).flatten().unwrap_or_default().0;
     predecessors::check(&predecessors, sources, &mut errors).map_err(BodyError::Lookup)?;
+    let wanted = wanted(given, &start, scene.as_deref(), &mut errors);
     let (Some(parsed), Some(scene), Some(estimate), Some(limits)) = (parsed, scene, estimate, limits) else {
         return Err(errors.into());
     };
@@ -167,6 +176,7 @@ pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Res
         restart: parsed.restart.map(|restart| restart.to_json()),
         options,
         priority: parsed.priority.unwrap_or_default().0,
+        accuracy: None,
     };
     let origin = start.source.map(|source| source.origin);
     if let Some(Origin::Job(job)) = &origin
@@ -175,7 +185,17 @@ pub fn parse<S: Sources>(spec: &Value, allowance: Allowance, sources: &S) -> Res
         predecessors.push(job.clone());
     }
     let (spec, kind) = (spec.clone(), scene.kind().to_owned());
-    Ok(JobBody { spec, kind, resolved, scene, forecast, origin, uploads, predecessors })
+    Ok(JobBody { spec, kind, resolved, scene, forecast, origin, uploads, predecessors, wanted })
+}
+
+/// The accuracy that is asked for.
+fn wanted(given: Given, start: &SceneStart, scene: Option<&dyn Scene>, errors: &mut Vec<Violation>) -> Option<Wanted> {
+    let spec = given.read(JobSpec::accuracy()).flatten()?;
+    if given.has(JobSpec::restart()) {
+        let detail = "a restart has the spacing of its checkpoint";
+        errors.push(Violation::new("/accuracy", "conflict", detail, spec.to_json(), Value::Null));
+    }
+    Wanted::new(spec, start.scene.as_ref(), scene?, errors)
 }
 
 /// Where the scene of a job comes from.

@@ -1,5 +1,6 @@
 //! `report.json`: the report of a finished run. What reads it reads this type.
 
+use super::accuracy::AccuracyReport;
 use super::health::HealthRecord;
 use meniscus::simulation::{Diagnostic, ErrorEntry};
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,9 @@ pub struct RunReport {
     pub health: HealthRecord,
     /// What the method counted of its own work.
     pub diagnostics: Vec<Diagnostic>,
+    /// What came of the accuracy that was asked for.
+    #[serde(default)]
+    pub accuracy: Option<AccuracyReport>,
     /// Outcomes of automatic choices, and their reasons.
     pub method: BTreeMap<String, String>,
     /// Where the numbers come from.

@@ -156,6 +156,9 @@ pub const TRANSITIONS: &[(State, Trigger, State)] = &[
     (State::Queued, Trigger::Claim, State::Running),
     (State::Queued, Trigger::Cancel, State::Canceled),
     (State::Queued, Trigger::Pause, State::Paused),
+    // The study that was to choose its spacing could not.
+    (State::Queued, Trigger::Fail, State::Failed),
+    (State::Paused, Trigger::Fail, State::Failed),
     (State::Paused, Trigger::Cancel, State::Canceled),
     (State::Paused, Trigger::Resume, State::Queued),
     (State::Running, Trigger::Miss, State::Queued),

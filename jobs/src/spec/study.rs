@@ -1,11 +1,18 @@
 //! Studies: a base body and a sweep over it.
 //!
 //! `{"base": {job body}, "sweep": {"mode": "grid" | "zip" | "list", "axes": {POINTER: [values]} | "points": [{POINTER:
-//! value}]}, "max_parallel", "on_failure": "continue" | "stop", "name", "labels"}`. Pointers start at the job's body.
+//! value}]}, "max_parallel", "on_failure": "continue" | "stop", "name", "labels"}`. Pointers start at the job's body. With the mode
+//! `refine` the points are levels that come one after another ([`refine`]).
 
+mod axes;
+pub mod level;
+pub mod refine;
 mod sweep;
 
-pub use sweep::{Axes, MOST_POINTS, Points, Sweep, SweepPoint};
+pub use axes::{Axes, Pointer, SweepPoint};
+pub use level::{MeasuredLevel, RefinementOutcome, RefinementState};
+pub use refine::RefineSpec;
+pub use sweep::{MOST_POINTS, Points, Sweep};
 
 use crate::spec::body::{self, Allowance, BodyError, JobBody, Labels, Name, Sources};
 use crate::spec::calibration::Calibration;
@@ -109,12 +116,23 @@ pub struct Study<J> {
     pub on_failure: &'static str,
     /// The values of every point by pointer.
     pub points: Vec<Json>,
-    /// What is kept of the body of each point.
+    /// What is kept of the body of each point; of a study that refines nothing, since its levels come one after another.
     pub jobs: Vec<J>,
-    /// What all points will take.
+    /// How far it may go, where it refines.
+    pub refines: Option<Refines>,
+    /// What all points will take; of a study that refines the levels that are made in any case.
     pub total: Total,
     /// What the study will take.
     pub forecast: StudyForecast,
+}
+
+/// How far a study that refines may go.
+#[derive(Debug, Clone, Copy)]
+pub struct Refines {
+    /// What a level may ask for.
+    pub allowance: Allowance,
+    /// Number of levels of all set-ups at most.
+    pub most_levels: u64,
 }
 
 /// From a client's JSON to a study; `slots` jobs run at once, `keep` makes of each body what is needed later.
@@ -142,10 +160,14 @@ pub fn parse<J, S: Sources>(
     let (Some(parsed), Some(base), true) = (parsed, base, errors.is_empty()) else {
         return Err(errors.into());
     };
-    let points = parsed.sweep.points().map_err(|error| vec![error])?;
-    let axes = axes_of(&points)?;
-    let (jobs, total) = bodies(&base, &points, (allowance, sources), calibration, keep)?;
+    let Swept { points, axes, jobs, total, count } =
+        swept(&parsed.sweep, &base, (allowance, sources), calibration, keep)?;
+    let refines = match &parsed.sweep {
+        Sweep::Refine { refine } => Some(Refines { allowance, most_levels: refine.most_levels() }),
+        _ => None,
+    };
     let at_once = parsed.max_parallel.map_or(slots, |most| slots.min(most as usize));
+    let at_once = if refines.is_some() { 1 } else { at_once };
     Ok(Study {
         name: parsed.name.map(|name| name.0),
         labels: parsed.labels.map(|labels| labels.0).unwrap_or_default(),
@@ -154,11 +176,40 @@ pub fn parse<J, S: Sources>(
         axes,
         max_parallel: parsed.max_parallel,
         on_failure: parsed.on_failure.unwrap_or(OnFailure::Continue).word(),
-        forecast: total.forecast(jobs.len(), at_once),
+        refines,
+        forecast: total.forecast(count, at_once),
         points: points.into_iter().map(|point| Value::Object(point.values.into_iter().collect())).collect(),
         jobs,
         total,
     })
+}
+
+/// The points of a sweep, and what is kept of them.
+struct Swept<J> {
+    points: Vec<SweepPoint>,
+    axes: Vec<String>,
+    jobs: Vec<J>,
+    total: Total,
+    /// Number of points that will be run in any case.
+    count: usize,
+}
+
+fn swept<J, S: Sources>(
+    sweep: &Sweep,
+    base: &Json,
+    (allowance, sources): (Allowance, &S),
+    calibration: &Calibration,
+    keep: impl Fn(&JobBody) -> J,
+) -> Result<Swept<J>, BodyError<S::Error>> {
+    if let Sweep::Refine { refine } = sweep {
+        let refine::Levels { points, sure, total } =
+            refine::check_levels(refine, base, (allowance, sources), calibration)?;
+        return Ok(Swept { points, axes: refine.axes(), jobs: Vec::new(), total, count: sure });
+    }
+    let points = sweep.points().map_err(|error| vec![error])?;
+    let axes = axes_of(&points)?;
+    let (jobs, total) = bodies(base, &points, (allowance, sources), calibration, keep)?;
+    Ok(Swept { count: jobs.len(), points, axes, jobs, total })
 }
 
 fn check_base(base: Option<&Json>, errors: &mut Vec<Violation>) {
@@ -205,10 +256,7 @@ fn bodies<J, S: Sources>(
         match point_body(base, point, allowance, sources) {
             Ok(mut body) => {
                 body.forecast.time_by(calibration);
-                let time = body.forecast.time.as_ref().map(|time| time.cpu_s);
-                total.cpu_s = total.cpu_s.zip(time).map(|(a, b)| a + b);
-                total.memory_bytes = total.memory_bytes.max(body.forecast.memory_bytes);
-                total.disk_bytes = total.disk_bytes.saturating_add(body.forecast.disk_bytes);
+                total.add(&body);
                 jobs.push(keep(&body));
             }
             Err(BodyError::Invalid(violations)) => found.add(point, violations),
@@ -218,8 +266,11 @@ fn bodies<J, S: Sources>(
     if found.by_pointer.is_empty() { Ok((jobs, total)) } else { Err(found.listed().into()) }
 }
 
-/// The body of one point.
-fn point_body<S: Sources>(
+/// The body of one point: the base with the values of the point.
+///
+/// # Errors
+/// Everything that is wrong with it, at the pointers of the body, or a failed look-up.
+pub fn point_body<S: Sources>(
     base: &Value,
     point: &SweepPoint,
     allowance: Allowance,
@@ -232,7 +283,12 @@ fn point_body<S: Sources>(
             return Err(vec![Violation::new(pointer.clone(), "type", detail, value.clone(), Value::Null)].into());
         }
     }
-    body::parse(&body, allowance, sources)
+    let body = body::parse(&body, allowance, sources)?;
+    if body.wanted.is_some() {
+        let detail = "an accuracy is asked for in a single job; a study that refines has `until`";
+        return Err(vec![Violation::new("/accuracy", "conflict", detail, Value::Null, Value::Null)].into());
+    }
+    Ok(body)
 }
 
 /// Puts a value at a pointer; objects on the way are made where there are none. A choice given as a bare word becomes an
@@ -280,12 +336,16 @@ impl Found {
                 Some(((pointer, _), place)) => format!("{place}{}", &violation.pointer[pointer.len()..]),
                 None => format!("/base{}", violation.pointer),
             };
-            let key = (violation.pointer.clone(), violation.code);
-            if self.by_pointer.len() >= MOST_VIOLATIONS && !self.by_pointer.contains_key(&key) {
-                self.more += 1;
-            } else {
-                self.by_pointer.entry(key).or_insert(violation);
-            }
+            self.add_one(violation);
+        }
+    }
+
+    fn add_one(&mut self, violation: Violation) {
+        let key = (violation.pointer.clone(), violation.code);
+        if self.by_pointer.len() >= MOST_VIOLATIONS && !self.by_pointer.contains_key(&key) {
+            self.more += 1;
+        } else {
+            self.by_pointer.entry(key).or_insert(violation);
         }
     }
 

@@ -4,10 +4,12 @@
 //! documents.json           names of the result documents with the kinds that share each
 //! KIND/NAME.json           a case
 //! KIND/plots/NAME.json     a plot
+//! studies/NAME.json        a case of studies and accuracies
 //! ```
 
 use super::case::{Case, CaseError, parse};
 use super::plot::Plot;
+use super::study_case::StudyCase;
 use meniscus::scenes::SCENES;
 use std::collections::BTreeMap;
 use std::fs;
@@ -50,7 +52,12 @@ pub struct KindCases {
 pub struct Catalog {
     /// The kinds in the order of the engine's list; those without cases have empty lists.
     pub kinds: Vec<KindCases>,
+    /// The cases of studies, in the order of their names.
+    pub studies: Vec<(String, StudyCase)>,
 }
+
+/// The folder of the cases of studies, and their name among the kinds.
+pub const STUDIES: &str = "studies";
 
 impl Catalog {
     /// The cases that the program carries.
@@ -77,7 +84,12 @@ impl Catalog {
         let mut documents: BTreeMap<String, Vec<String>> = BTreeMap::new();
         let empty = |kind| KindCases { kind, document: String::new(), cases: Vec::new(), plots: Vec::new() };
         let mut kinds: Vec<KindCases> = SCENES.iter().map(|kind| empty(kind.kind)).collect();
+        let mut studies = Vec::new();
         for (file, text) in files {
+            if let Some(name) = file.strip_prefix("studies/").and_then(|name| name.strip_suffix(".json")) {
+                studies.push((name.to_owned(), StudyCase::parse(&file, &text)?));
+                continue;
+            }
             if file == DOCUMENTS {
                 documents = parse(&file, &text)?;
                 continue;
@@ -103,7 +115,7 @@ impl Catalog {
             let shared = documents.iter().find(|(_, of)| of.iter().any(|name| name == kind.kind));
             kind.document = shared.map_or(kind.kind, |(name, _)| name).to_owned();
         }
-        Ok(Self { kinds })
+        Ok(Self { kinds, studies })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::catalog::KindCases;
 use super::outcome::{Outcome, number};
+use super::study_case::StudyCase;
 use crate::system::{build, clock, process};
 use std::fmt::Write;
 
@@ -56,6 +57,46 @@ pub(super) fn compose(results: &[KindOutcomes], notes: Option<&str>) -> String {
     }
     for (name, plot) in results.iter().flat_map(|result| &result.cases.plots) {
         let _ = write!(text, "\n![{}]({name}.svg)\n", plot.title);
+    }
+    text
+}
+
+/// The document of the cases of studies: their outcomes, and a line for every trial.
+pub(super) fn compose_studies(cases: &[(&StudyCase, Vec<Outcome>, Vec<String>)]) -> String {
+    let (date, build, isa) = (clock::now(), build::name(), build::isa());
+    let machine = process::cpu_name().unwrap_or_else(|| "unknown".to_owned());
+    let all = || cases.iter().flat_map(|(_, outcomes, _)| outcomes);
+    let (count, missed) = (all().count(), all().filter(|outcome| !outcome.is_met).count());
+    let mut text = format!(
+        "# studies: accuracies that were asked for, orders, and series that are recognized\n\n\
+         Written by `meniscus verify --only studies --full` on {}; machine: {machine} ({isa}), one core; build {build}.\n\
+         {count} targets, {missed} missed. A trial is a scene without a spacing and a tolerance; a small study finds the spacing, and the run\n\
+         follows. The best set-up by hand is the cheapest run that meets the tolerance, over the set-ups of the case and over spacings a tenth\n\
+         apart; what it cost to find it is not counted, and the start of a process is part of every run.\n",
+        &date[..10.min(date.len())],
+    );
+    for (case, outcomes, lines) in cases {
+        text.push_str(&format!(
+            "\n## {}\n\n{}.\n\n| target | to reach | measured | time | verdict |\n",
+            case.title, case.source
+        ));
+        text.push_str("| --- | --- | --- | --- | --- |\n");
+        for outcome in outcomes {
+            text.push_str(&format!(
+                "| {} | {} | {} | {:.1} s | {} |\n",
+                outcome.title,
+                outcome.bound,
+                number(outcome.value),
+                outcome.cpu_s,
+                outcome.verdict()
+            ));
+        }
+        if !lines.is_empty() {
+            text.push_str("\n| trial | scene | tolerance | reached | spacing | run, s | with study, s | by hand, s | ratio of runs |\n");
+            text.push_str("| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
+            text.push_str(&lines.join("\n"));
+            text.push('\n');
+        }
     }
     text
 }

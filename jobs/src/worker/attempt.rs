@@ -2,6 +2,7 @@
 
 use crate::formats::checkpoint::{self, CheckpointError, Counters, Meta};
 use crate::formats::{frame_view, operator_files, picture};
+use crate::spec::accuracy::ChosenAccuracy;
 use crate::spec::attempt_files;
 use crate::spec::attempt_spec::{AttemptSpec, StartCheckpoint};
 use crate::spec::body::ResolvedBody;
@@ -12,6 +13,7 @@ use crate::spec::run_options::RunOptions;
 use crate::spec::states::Reason;
 use crate::system::process;
 use crate::system::{artifacts, digest};
+use crate::worker::accuracy;
 use crate::worker::inputs;
 use crate::worker::log::Log;
 use crate::worker::observers::checkpoints::Checkpoints;
@@ -118,7 +120,7 @@ fn attempt(
     log: &Log,
 ) -> Result<Verdict, Failure> {
     let internal = |error: &dyn std::error::Error| Failure::Known(Reason::Internal, error.to_string());
-    let ResolvedBody { scene, options, .. } =
+    let ResolvedBody { scene, options, accuracy, .. } =
         ResolvedBody::deserialize(&spec.body).map_err(|error| internal(&error))?;
     let scene_sha256 = digest::of_bytes(scene.to_string().as_bytes());
     let scene = parsed(scene)?;
@@ -162,8 +164,8 @@ fn attempt(
                     }
                     written => written?,
                 };
-                let ended =
-                    Ended { simulation: simulation.as_ref(), scene: scene.as_ref(), scene_sha256, threads, operators };
+                let (simulation, scene) = (simulation.as_ref(), scene.as_ref());
+                let ended = Ended { simulation, scene, scene_sha256, threads, operators, accuracy };
                 finish(spec, directory, &ended, &mut observers, log)?;
                 Ok(Verdict::Succeeded)
             }
@@ -382,6 +384,8 @@ struct Ended<'a> {
     threads: usize,
     /// Files of operators.
     operators: Vec<FileRecord>,
+    /// The accuracy that was asked for.
+    accuracy: Option<ChosenAccuracy>,
 }
 
 /// The files of operators that were asked for.
@@ -433,8 +437,13 @@ fn finish(
     }
     let phases = observers.progress.phases(simulation);
     let usage = observers.progress.usage();
-    let (threads, scene_sha256) = (ended.threads, &ended.scene_sha256);
-    let report = report::compose(simulation, &observers.findings, &usage, phases, threads, scene_sha256);
+    let compose = |findings: &FindingLog| {
+        report::compose(simulation, findings, &usage, phases.clone(), ended.threads, &ended.scene_sha256)
+    };
+    let report = match &ended.accuracy {
+        Some(chosen) => accuracy::report(chosen, directory, ended.scene, observers, compose)?,
+        None => compose(&observers.findings),
+    };
     artifacts::write(&directory.join(attempt_files::REPORT), &serde_json::to_vec_pretty(&report)?)?;
     let report = FileRecord::from_file(directory, attempt_files::REPORT, "application/json")?;
     files.push(report.clone());

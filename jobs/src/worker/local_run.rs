@@ -64,6 +64,10 @@ pub fn run_to_verdict(body: &Value, directory: &Path, threads: u64, keep: Keep) 
         let pointer = violations.first().map_or_else(String::new, |first| first.pointer.clone());
         Refused { pointer, message: lines.join("; ") }
     })?;
+    if body.wanted.is_some() {
+        let message = "accuracy: a study chooses the spacing, which only the service runs; give a spacing".to_owned();
+        return Err(Refused { pointer: "/accuracy".to_owned(), message });
+    }
     if directory.exists() {
         fs::remove_dir_all(directory)?;
     }

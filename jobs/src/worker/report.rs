@@ -33,6 +33,7 @@ pub fn compose(
         },
         health: HealthRecord { findings: findings.findings().to_vec(), ..findings.health(report.health) },
         diagnostics: report.diagnostics,
+        accuracy: None,
         method: report.method.into_iter().map(|(name, outcome)| (name.to_owned(), outcome)).collect(),
         provenance: Provenance {
             build: build::name(),

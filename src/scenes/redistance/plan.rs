@@ -209,6 +209,24 @@ impl<const D: usize> Scene for RedistanceScene<D> {
         Some(self.lattice.spacing)
     }
 
+    fn choices(&self) -> Vec<(&'static str, Vec<Value>)> {
+        let degree = |degree: u64| json!({"type": "pcp", "degree": degree});
+        vec![("/method", [3, 4, 5, 6].map(degree).to_vec())]
+    }
+
+    /// Fits of degree n about smooth shapes: the distance has the order n + 1, and every derivative loses one.
+    fn order(&self, quantity: &str, _norm: &str) -> Option<f64> {
+        let Method::Pcp { method } = &self.spec.method else { return None };
+        self.shape.quadric::<D>()?;
+        let lost = match quantity {
+            "phi" | "closest_point" => 0.0,
+            "normal" => 1.0,
+            "curvature" => 2.0,
+            _ => return None,
+        };
+        Some(method.degree as f64 + 1.0 - lost)
+    }
+
     fn resolved(&self) -> Value {
         scene::resolved(super::KIND.kind, &self.spec)
     }

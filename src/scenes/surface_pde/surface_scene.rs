@@ -5,6 +5,7 @@ use super::plan::{Normals, SurfaceScene};
 use super::points;
 use super::problems::ProblemChoice;
 use super::simulations::{self, Run};
+use super::spec::MethodSpec;
 use super::surfaces::{self, Shape};
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Surface, Vector};
@@ -21,7 +22,7 @@ use crate::schemes::surface_equation::{Form, Method, SurfaceCloud};
 use crate::simulation::fields::COMMON_FIELDS;
 use crate::simulation::{CpuClock, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::Violation;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 impl SurfaceScene {
     /// Entries of a row, about.
@@ -108,6 +109,27 @@ impl Scene for SurfaceScene {
 
     fn spacing(&self) -> Option<f64> {
         self.points.is_none().then(|| self.shape.spacing(self.count))
+    }
+
+    fn choices(&self) -> Vec<(&'static str, Vec<Value>)> {
+        let of_order = |order: u64| json!({"type": "surface_dcpse", "order": order});
+        let is_exact = self.points.is_none() && matches!(self.normals, Normals::Exact);
+        if is_exact { vec![("/method", [2, 4, 6].map(of_order).to_vec())] } else { Vec::new() }
+    }
+
+    fn order(&self, quantity: &str, _norm: &str) -> Option<f64> {
+        let order = match self.spec.method.as_ref()? {
+            MethodSpec::SurfaceDcpse { order, .. } | MethodSpec::ClosestPoint { order, .. } => *order as f64,
+            MethodSpec::Conservative => 2.0,
+            MethodSpec::Auto { .. } => return None,
+        };
+        // First derivatives gain an order over second ones.
+        let order = match quantity {
+            "value" => order,
+            "gradient" => order + 1.0,
+            _ => return None,
+        };
+        matches!(self.normals, Normals::Exact).then_some(order)
     }
 
     fn resolved(&self) -> Value {

@@ -3,7 +3,7 @@
 use crate::common::Expected;
 use crate::support::{Service, chance, eventually, signal, steady_job};
 use rustix::process::Signal;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
 /// Kills of the service under load: no acknowledged job is lost, doubled or stuck, and all data are those of an
@@ -48,6 +48,62 @@ pub fn of_the_service(count: u64, seed: u64) -> String {
     assert!(service.stop(), "the service did not end well");
     service.fsck();
     format!("{count} kills of the service, {} jobs acknowledged and finished, all data identical", acknowledged.len())
+}
+
+/// Kills of the service while a study refines: its levels and its table are those of an undisturbed study, and none is made twice.
+pub fn of_a_refinement(count: u64, seed: u64) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    let mut service = Service::start(directory.path(), &["--slots", "1"]);
+    let body = json!({
+        "base": {"scene": {"kind": "redistance", "repeat": 12}, "checkpoint": {"every_steps": 3}},
+        "sweep": {"mode": "refine", "axis": "/scene/spacing", "from": 0.08, "ratio": 1.5, "levels": {"least": 3, "most": 4},
+            "quantity": {"error": {"quantity": "phi", "norm": "rms"}}, "until": {"tolerance": 1e-30}, "reuse": false},
+    });
+    let submit = |service: &Service| service.post("/v1/studies", &body).json()["id"].as_str().unwrap().to_owned();
+    let is_over = |service: &Service, id: &str| {
+        (service.get(&format!("/v1/studies/{id}")).json()["state"] == "succeeded").then_some(())
+    };
+    let start = Instant::now();
+    let calm = submit(&service);
+    eventually("the undisturbed study ends", Duration::from_secs(120), || is_over(&service, &calm));
+    let whole = start.elapsed().as_secs_f64();
+    let expected = told(&service, &calm);
+    let (mut kills, mut studies) = (0, 0);
+    while kills < count {
+        let id = submit(&service);
+        studies += 1;
+        while is_over(&service, &id).is_none() && kills < count {
+            std::thread::sleep(Duration::from_secs_f64(0.5 * whole * chance(seed, kills)));
+            service.kill();
+            kills += 1;
+            service.restart();
+        }
+        eventually("the disturbed study ends", Duration::from_secs(120), || is_over(&service, &id));
+        assert_eq!(told(&service, &id), expected, "{id}");
+    }
+    assert!(service.stop(), "the service did not end well");
+    service.fsck();
+    format!("{kills} kills of the service in {studies} studies that refine, all levels and tables as undisturbed")
+}
+
+/// What a study tells but for ids and times: the rows of its table, the values of its levels, and the number of its jobs.
+fn told(service: &Service, id: &str) -> Vec<String> {
+    let accept = [("accept", "application/json")];
+    let table = service.request("GET", &format!("/v1/studies/{id}/table"), &accept, None).json();
+    let mut told: Vec<String> = table["rows"].as_array().unwrap().iter().cloned().map(without_times).collect();
+    let report = service.get(&format!("/v1/studies/{id}/report")).json();
+    told.extend(report["levels"].as_array().unwrap().iter().cloned().map(without_times));
+    told.extend(["order", "gci", "convergence", "outcome"].map(|name| report[name].to_string()));
+    let jobs = service.get(&format!("/v1/studies/{id}/jobs?limit=100")).json()["items"].as_array().unwrap().len();
+    told.push(format!("{jobs} jobs"));
+    told
+}
+
+fn without_times(mut row: Value) -> String {
+    for name in ["job", "cpu_s", "wall_s"] {
+        row.as_object_mut().unwrap().shift_remove(name);
+    }
+    row.to_string()
 }
 
 /// Kills of workers: at most what came after the last checkpoint is done again, and the final data are identical.

@@ -30,6 +30,7 @@ pub struct Proof {
 pub static PROOFS: &[Proof] = &[
     Proof { name: "kills_of_the_service", quick: 20, full: 1000, batch: 50, run: kills::of_the_service },
     Proof { name: "kills_of_workers", quick: 20, full: 1000, batch: 50, run: kills::of_workers },
+    Proof { name: "kills_of_a_refinement", quick: 12, full: 1000, batch: 50, run: kills::of_a_refinement },
     Proof {
         name: "kills_between_operations_of_a_checkpoint",
         quick: 14,

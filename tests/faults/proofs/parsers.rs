@@ -182,6 +182,9 @@ pub fn studies(count: u64, seed: u64) -> String {
         json!({"base": base, "sweep": {"mode": "grid", "axes": {"/scene/spacing": [0.1, 0.05], "/scene/repeat": [1, 2]}}}),
         json!({"base": base, "sweep": {"mode": "zip", "axes": {"/scene/spacing": [0.1, 0.05]}}, "max_parallel": 2, "on_failure": "stop"}),
         json!({"base": base, "sweep": {"mode": "list", "points": [{"/scene/spacing": 0.1}, {"/scene/shape": "circle"}]}, "name": "x"}),
+        json!({"base": base, "sweep": {"mode": "refine", "axis": "/scene/spacing", "from": 0.1, "ratio": 1.5, "levels": {"least": 2, "most": 3},
+            "with": {"/scene/spacing": "proportional"}, "quantity": {"error": {"quantity": "phi", "norm": "rms"}},
+            "until": {"tolerance": 1e-3, "relative": true}, "budget": {"cpu_s": 3}, "alternatives": {"/scene/repeat": [1, 2]}, "reuse": false}}),
     ];
     let mut accepted = 0;
     for run in 0..count {
@@ -194,7 +197,8 @@ pub fn studies(count: u64, seed: u64) -> String {
             Err(found) => assert!(!found.violations().is_empty(), "refused without a word: {spec}"),
             Ok(study) => {
                 accepted += 1;
-                assert_eq!(study.points.len(), study.jobs.len());
+                let levels = study.refines.is_some();
+                assert!(if levels { study.jobs.is_empty() } else { study.points.len() == study.jobs.len() }, "{spec}");
             }
         }
     }

@@ -1,13 +1,14 @@
 //! Publishing a worker's records: each is taken exactly once, together with the offset behind it, and only while the
 //! job is at the record's attempt.
 
-use super::{Store, StoreError, calibration, events, rows};
+use super::{Store, StoreError, calibration, events, rows, work_precision};
 use crate::spec::attempt_files::{self, attempt_directory};
 use crate::spec::forecast::measured;
 use crate::spec::health::{Finding, FindingLog, HealthStatus, Severity};
 use crate::spec::records::{self, CheckpointRecord, FileRecord, Line, Progress, Record, Usage, Verdict};
 use crate::spec::report::{Results, RunReport};
 use crate::spec::run_options::RunOptions;
+use crate::spec::work_precision::of_report;
 use rusqlite::{OptionalExtension, Transaction, params};
 use serde_json::json;
 use std::borrow::Cow;
@@ -184,15 +185,18 @@ impl Store {
     /// Keeps the errors and the cost of a finished run in its row, so that tables of thousands open no file.
     fn keep_results(&self, transaction: &Transaction, of: &Attempt) -> Result<(), StoreError> {
         let directory = attempt_directory(&self.job_directory(of.job), of.epoch);
-        let RunReport { errors, cost, .. } =
-            serde_json::from_slice(&std::fs::read(directory.join(attempt_files::REPORT))?)?;
+        let report: RunReport = serde_json::from_slice(&std::fs::read(directory.join(attempt_files::REPORT))?)?;
         // Runs that began in the middle or were cut off tell nothing about whole ones.
         if let Some(row) =
             rows::job(transaction, of.job)?.filter(|row| row.attempt == 1 && row.restarted_from.is_none())
         {
             let threads = RunOptions::from_resolved(&row.resolved)?.limits.threads;
-            calibration::add(transaction, &measured(&row.forecast, &cost, threads))?;
+            calibration::add(transaction, &measured(&row.forecast, &report.cost, threads))?;
+            if let Some((problem, spacing)) = problem_of(transaction, of.job)? {
+                work_precision::keep(transaction, &of_report(&problem, spacing, &report))?;
+            }
         }
+        let RunReport { errors, cost, .. } = report;
         transaction.execute(
             "UPDATE jobs SET results = ?2 WHERE id = ?1",
             params![of.job, serde_json::to_string(&Results { errors, cost })?],
@@ -250,6 +254,15 @@ impl Store {
         }
         Ok(())
     }
+}
+
+/// Problem and spacing of a job, where they are known.
+fn problem_of(transaction: &Transaction, job: &str) -> rusqlite::Result<Option<(String, f64)>> {
+    let (problem, spacing): (Option<String>, Option<f64>) =
+        transaction.query_row("SELECT problem, spacing FROM jobs WHERE id = ?1", [job], |row| {
+            Ok((row.get(0)?, row.get(1)?))
+        })?;
+    Ok(problem.zip(spacing))
 }
 
 /// Changes the findings that a job keeps.

@@ -27,6 +27,10 @@ impl Store {
                 "SELECT COUNT(*) FROM jobs WHERE study IS NOT NULL AND study NOT IN (SELECT id FROM studies)",
             ),
             (
+                "levels of studies that are gone",
+                "SELECT COUNT(*) FROM levels WHERE study NOT IN (SELECT study FROM refinements)",
+            ),
+            (
                 "points of studies with two latest jobs",
                 "SELECT COUNT(*) FROM (SELECT 1 FROM jobs WHERE study IS NOT NULL AND superseded = 0
                      GROUP BY study, study_index HAVING COUNT(*) > 1)",

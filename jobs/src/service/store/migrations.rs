@@ -208,6 +208,49 @@ const MIGRATIONS: &[&str] = &[
     ) STRICT, WITHOUT ROWID;
     CREATE INDEX dependencies_by_predecessor ON dependencies (predecessor);
 ",
+    // Studies that refine, and the digest by which equal jobs are found.
+    "
+    CREATE TABLE refinements (
+        study TEXT PRIMARY KEY,
+        state TEXT NOT NULL,
+        outcome TEXT,
+        message TEXT,
+        chosen INTEGER,
+        threads INTEGER NOT NULL,
+        memory_bytes INTEGER NOT NULL,
+        most_levels INTEGER NOT NULL,
+        job TEXT
+    ) STRICT, WITHOUT ROWID;
+    CREATE INDEX refinements_open ON refinements (study) WHERE state = 'open';
+    CREATE INDEX refinements_serving ON refinements (study) WHERE job IS NOT NULL AND state <> 'ended';
+    CREATE TABLE levels (
+        study TEXT NOT NULL,
+        number INTEGER NOT NULL,
+        setup INTEGER NOT NULL,
+        level INTEGER NOT NULL,
+        job TEXT,
+        is_reused INTEGER NOT NULL,
+        is_to_repeat INTEGER NOT NULL,
+        measured TEXT,
+        PRIMARY KEY (study, number)
+    ) STRICT, WITHOUT ROWID;
+    ALTER TABLE jobs ADD COLUMN scene_sha256 TEXT;
+    ALTER TABLE jobs ADD COLUMN awaits TEXT;
+    ALTER TABLE jobs ADD COLUMN problem TEXT;
+    ALTER TABLE jobs ADD COLUMN spacing REAL;
+    CREATE TABLE work_precision (
+        build TEXT NOT NULL,
+        isa TEXT NOT NULL,
+        problem TEXT NOT NULL,
+        quantity TEXT NOT NULL,
+        norm TEXT NOT NULL,
+        spacing REAL NOT NULL,
+        error REAL NOT NULL,
+        cpu_s REAL NOT NULL,
+        PRIMARY KEY (build, isa, problem, quantity, norm, spacing)
+    ) STRICT, WITHOUT ROWID;
+    CREATE INDEX jobs_by_scene ON jobs (scene_sha256, id) WHERE scene_sha256 IS NOT NULL;
+",
 ];
 
 /// Number of schema changes that this program knows.

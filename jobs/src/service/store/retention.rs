@@ -28,15 +28,17 @@ impl Store {
             }
         }
         self.write(|transaction| -> Result<(), StoreError> {
-            for table in ["study_events WHERE study", "studies WHERE id"] {
+            for table in ["study_events WHERE study", "levels WHERE study", "studies WHERE id"] {
                 transaction.execute(
                     &format!(
                         "DELETE FROM {table} IN (SELECT id FROM studies s WHERE made_s < ?1
-                             AND NOT EXISTS (SELECT 1 FROM jobs WHERE study = s.id))"
+                             AND NOT EXISTS (SELECT 1 FROM jobs WHERE study = s.id)
+                             AND NOT EXISTS (SELECT 1 FROM refinements WHERE study = s.id AND state <> 'ended'))"
                     ),
                     params![before_s],
                 )?;
             }
+            transaction.execute("DELETE FROM refinements WHERE study NOT IN (SELECT id FROM studies)", [])?;
             Ok(())
         })?;
         Ok(old.len())

@@ -94,6 +94,8 @@ pub struct JobRow {
     pub waits_for: u64,
     /// Job whose last checkpoint it begins with, which is taken when it starts.
     pub restart_job: Option<String>,
+    /// The study of its own that finds its spacing.
+    pub awaits: Option<String>,
     /// Errors and cost, once it has succeeded.
     pub results: Option<Results>,
 }
@@ -226,6 +228,7 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         predecessors: json(row, "predecessors")?,
         waits_for: row.get::<_, i64>("waits_for")? as u64,
         restart_job: row.get("restart_job")?,
+        awaits: row.get("awaits")?,
         results: json(row, "results")?,
     })
 }

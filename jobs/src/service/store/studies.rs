@@ -1,6 +1,7 @@
 //! Studies: sweeps of jobs as one object. Its state is that of its jobs.
 
 use super::idempotency::{IdempotencyKey, Made, Receipt};
+use super::refinements::{self, RefinementRow};
 use super::submission::{NewJob, Place, insert};
 use super::transitions::apply;
 use super::{Change, ChangeError, Store, StoreError, deletion, remove_directory, rows};
@@ -9,8 +10,8 @@ use crate::spec::health::HealthStatus;
 use crate::spec::records::{Progress, Usage};
 use crate::spec::report::Results;
 use crate::spec::states::{Reason, State, Trigger};
-use crate::spec::study::{Study, StudyForecast};
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use crate::spec::study::{RefinementState, Refines, Study, StudyForecast};
+use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
@@ -45,6 +46,8 @@ pub struct StudyRow {
     pub owner: Option<String>,
     /// Points by the state of their latest job.
     pub counts: BTreeMap<State, u64>,
+    /// How far it has come, where it refines.
+    pub refinement: Option<RefinementRow>,
 }
 
 /// A study to be made.
@@ -66,16 +69,18 @@ pub struct NewStudy {
     pub on_failure: &'static str,
     /// Forecast of all points together.
     pub forecast: StudyForecast,
-    /// Jobs, one for each point.
+    /// Jobs, one for each point; of a study that refines none, since its levels come one after another.
     pub jobs: Vec<NewJob>,
+    /// How far it may go, where it refines.
+    pub refines: Option<Refines>,
     /// Name of the token that makes it; None without tokens.
     pub owner: Option<String>,
 }
 
 impl From<Study<NewJob>> for NewStudy {
     fn from(study: Study<NewJob>) -> Self {
-        let Study { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, .. } = study;
-        Self { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, owner: None }
+        let Study { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, refines, .. } = study;
+        Self { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, refines, owner: None }
     }
 }
 
@@ -84,6 +89,8 @@ impl From<Study<NewJob>> for NewStudy {
 pub struct PointRow {
     /// Number of the point.
     pub index: u64,
+    /// Number of the level within its set-up, in a study that refines.
+    pub level: Option<u64>,
     /// Id of the latest job.
     pub job: String,
     /// State of that job.
@@ -121,37 +128,19 @@ impl Store {
         receipt: impl FnOnce(&StudyRow) -> Receipt,
     ) -> Result<Made, StoreError> {
         let id = format!("std_{}", self.next_id());
-        let NewStudy { name, labels, base, sweep, axes, max_parallel, on_failure, forecast, jobs, owner } = study;
+        let mut study = study;
+        let jobs = std::mem::take(&mut study.jobs);
         let mut prepared = Vec::with_capacity(jobs.len());
         for (index, mut job) in jobs.into_iter().enumerate() {
             let (number, clock_s) = self.next_submission();
             let job_id = format!("job_{number}");
             let start = self.prepare_start(&job_id, &job)?;
             job.study = Some((id.clone(), index as u64));
-            job.owner.clone_from(&owner);
+            job.owner.clone_from(&study.owner);
             prepared.push((job_id, clock_s, job, start));
         }
         let made = self.make_once(key, |transaction| {
-            transaction.execute(
-                "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at,
-                     made_s, owner)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
-                params![
-                    id,
-                    name,
-                    serde_json::to_string(&labels)?,
-                    base.to_string(),
-                    sweep.to_string(),
-                    serde_json::to_string(&axes)?,
-                    prepared.len() as i64,
-                    max_parallel.map(|most| most as i64),
-                    on_failure,
-                    serde_json::to_string(&forecast)?,
-                    crate::system::clock::now(),
-                    self.clock.seconds(),
-                    owner,
-                ],
-            )?;
+            enter_study(transaction, (&id, prepared.len(), self.clock.seconds()), &study)?;
             for (job_id, clock_s, job, start) in &prepared {
                 insert(transaction, &Place { id: job_id, clock_s: *clock_s }, job, start.as_deref())?;
             }
@@ -185,6 +174,7 @@ impl Store {
         }
         let made = self.make_once(key, |transaction| {
             transaction.execute("UPDATE studies SET stopping = 0 WHERE id = ?1", [study])?;
+            refinements::reopen(transaction, study)?;
             for (id, clock_s, job, start) in &prepared {
                 // Another request may have repeated it in the meantime.
                 let is_latest: bool = transaction
@@ -233,6 +223,9 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn points(&self, study: &StudyRow, after: Option<u64>, limit: u64) -> Result<Vec<PointRow>, StoreError> {
+        if study.refinement.is_some() {
+            return self.level_points(study, after, limit);
+        }
         let mut points = Vec::new();
         let mut after = after.map_or(-1, |after| i64::try_from(after).unwrap_or(i64::MAX));
         // A reader is held for a chunk, not for the whole: others read, too.
@@ -262,6 +255,12 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn change_study(&self, study: &str, trigger: Trigger, change: &Change) -> Result<(), StoreError> {
+        if refinements::of_study(&self.read(), study)?.is_some() {
+            if trigger == Trigger::Pause {
+                self.keep_paused_where("study", study)?;
+            }
+            return self.write(|transaction| refinements::steer(transaction, study, trigger, change));
+        }
         let from: HashSet<&str> =
             State::ALL.iter().filter(|state| state.after(trigger).is_some()).map(|state| state.word()).collect();
         let ids: Vec<String> = {
@@ -326,9 +325,12 @@ impl Store {
                 let rows = statement.query_map([id], |row| Ok((row.get(0)?, row.get(1)?)))?;
                 rows.collect::<Result<_, _>>()?
             };
-            if jobs.iter().any(|(_, state)| !State::from_word(state).is_some_and(State::is_terminal)) {
+            let goes_on =
+                refinements::of_study(transaction, id)?.is_some_and(|row| row.state != RefinementState::Ended);
+            if goes_on || jobs.iter().any(|(_, state)| !State::from_word(state).is_some_and(State::is_terminal)) {
                 return Ok(None);
             }
+            refinements::delete(transaction, id)?;
             for (job, _) in &jobs {
                 super::delete_rows(transaction, job)?;
                 deletion::intend(transaction, &super::job_folder(job))?;
@@ -343,6 +345,38 @@ impl Store {
         }
         Ok(true)
     }
+}
+
+/// Writes the row of a study with a number of points, at a reading of the clock.
+pub(super) fn enter_study(
+    transaction: &Transaction,
+    (id, points, clock_s): (&str, usize, f64),
+    study: &NewStudy,
+) -> Result<(), StoreError> {
+    transaction.execute(
+        "INSERT INTO studies (id, name, labels, base, sweep, axes, points, max_parallel, on_failure, estimate, created_at,
+             made_s, owner)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
+        params![
+            id,
+            study.name,
+            serde_json::to_string(&study.labels)?,
+            study.base.to_string(),
+            study.sweep.to_string(),
+            serde_json::to_string(&study.axes)?,
+            points as i64,
+            study.max_parallel.map(|most| most as i64),
+            study.on_failure,
+            serde_json::to_string(&study.forecast)?,
+            crate::system::clock::now(),
+            clock_s,
+            study.owner,
+        ],
+    )?;
+    if let Some(refines) = study.refines {
+        refinements::enter(transaction, id, refines)?;
+    }
+    Ok(())
 }
 
 fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, StoreError> {
@@ -364,10 +398,15 @@ fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, Store
                 created_at: row.get("created_at")?,
                 owner: row.get("owner")?,
                 counts: BTreeMap::new(),
+                refinement: None,
             })
         })
         .optional()?;
     let Some(mut study) = found else { return Ok(None) };
+    study.refinement = refinements::of_study(connection, id)?;
+    if let Some(refinement) = &study.refinement {
+        study.points = refinement.levels;
+    }
     let mut statement = connection
         .prepare_cached("SELECT state, COUNT(*) FROM jobs WHERE study = ?1 AND superseded = 0 GROUP BY state")?;
     let counts = statement.query_map([id], |row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)? as u64)))?;
@@ -380,7 +419,7 @@ fn study_of(connection: &Connection, id: &str) -> Result<Option<StudyRow>, Store
     Ok(Some(study))
 }
 
-fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
+pub(super) fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
     let state: String = row.get("state")?;
     let forecast: ForecastRecord = rows::json(row, "estimate")?;
     let progress: Progress = rows::json(row, "progress")?;
@@ -394,6 +433,7 @@ fn point_of(row: &Row, axes: &[String]) -> rusqlite::Result<PointRow> {
     let results: Option<Results> = rows::json(row, "results")?;
     Ok(PointRow {
         index: row.get::<_, i64>("study_index")? as u64,
+        level: None,
         job: row.get("id")?,
         state: State::from_word(&state).ok_or(rusqlite::Error::InvalidQuery)?,
         reason: row.get("reason")?,

@@ -3,10 +3,14 @@
 use rusqlite::{Connection, Transaction};
 use std::collections::HashSet;
 
-/// Marks a study of which a point has failed, if it stops at failures; the supervisor cancels the rest.
+/// Marks a study of which a point has failed, if it stops at failures; the supervisor cancels the rest. A study that refines ends by
+/// itself.
 pub(super) fn note_failure(transaction: &Transaction, study: &str) -> rusqlite::Result<()> {
     transaction
-        .prepare_cached("UPDATE studies SET stopping = 1 WHERE id = ?1 AND on_failure = 'stop' AND stopping = 0")?
+        .prepare_cached(
+            "UPDATE studies SET stopping = 1 WHERE id = ?1 AND on_failure = 'stop' AND stopping = 0
+                 AND NOT EXISTS (SELECT 1 FROM refinements WHERE study = ?1)",
+        )?
         .execute([study])
         .map(|_| ())
 }

@@ -6,8 +6,11 @@ use super::transitions::{self, ChangeError};
 use super::{JobRow, Store, StoreError, dependencies, events, remove_directory, rows};
 use crate::spec::attempt_files::attempt_directory;
 use crate::spec::attempt_spec::{AttemptSpec, Submission};
-use crate::spec::body::{JobBody, Origin, ResolvedBody};
+use crate::spec::body::{JobBody, JobSpec, Origin, ResolvedBody};
 use crate::spec::states::State;
+use crate::spec::work_precision;
+use crate::system::digest;
+use meniscus::spec::Given;
 use rusqlite::{Transaction, params};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -21,6 +24,8 @@ pub struct NewJob {
     pub(super) kind: String,
     pub(super) spec: String,
     pub(super) resolved: String,
+    /// Digest of the resolved scene.
+    pub(super) scene_sha256: Option<String>,
     pub(super) estimate: String,
     /// What is doubtful before it runs.
     pub(super) warnings: String,
@@ -38,6 +43,10 @@ pub struct NewJob {
     pub owner: Option<String>,
     /// Jobs that must have succeeded before it starts.
     pub predecessors: Vec<String>,
+    /// The study of its own that finds its spacing; it has no resolved body before.
+    pub awaits: Option<String>,
+    /// Digest of the scene without its spacing, and the spacing, where that is known.
+    pub(super) problem: Option<(String, f64)>,
 }
 
 impl NewJob {
@@ -50,6 +59,7 @@ impl NewJob {
             kind: body.kind.clone(),
             spec: body.spec.to_string(),
             resolved: body.resolved.to_json().to_string(),
+            scene_sha256: Some(scene_sha256(&body.resolved.scene)),
             estimate: json!(body.forecast.record()).to_string(),
             warnings: json!(body.scene.warnings()).to_string(),
             memory_bytes: body.forecast.memory_bytes,
@@ -61,6 +71,22 @@ impl NewJob {
             retry_of: None,
             owner: None,
             predecessors: body.predecessors.clone(),
+            awaits: None,
+            problem: problem_of(body),
+        }
+    }
+
+    /// A job whose spacing a study is to find. What follows from the spacing is not known yet.
+    #[must_use]
+    pub fn waiting(body: &JobBody) -> Self {
+        Self {
+            resolved: "null".to_owned(),
+            scene_sha256: None,
+            estimate: "{}".to_owned(),
+            warnings: "[]".to_owned(),
+            memory_bytes: 0,
+            disk_bytes: 0,
+            ..Self::from_body(body)
         }
     }
 
@@ -79,6 +105,7 @@ impl NewJob {
             kind: SceneWord::deserialize(&body.scene)?.kind,
             spec: sent.to_string(),
             resolved: spec.body.to_string(),
+            scene_sha256: Some(scene_sha256(&body.scene)),
             estimate: json!(forecast).to_string(),
             warnings: json!(warnings).to_string(),
             memory_bytes: forecast.memory_bytes,
@@ -90,8 +117,22 @@ impl NewJob {
             retry_of,
             owner,
             predecessors: Vec::new(),
+            awaits: None,
+            problem: None,
         })
     }
+}
+
+/// Digest of the scene as sent without its spacing, and the spacing; None of a restart, which begins in the middle.
+fn problem_of(body: &JobBody) -> Option<(String, f64)> {
+    let sent = body.spec.as_object().map(|spec| Given::new(spec).raw(JobSpec::scene()))?;
+    work_precision::problem_of(&sent).zip(body.scene.spacing())
+}
+
+/// Digest of a resolved scene, as the provenance of reports has it.
+#[must_use]
+pub fn scene_sha256(scene: &Value) -> String {
+    digest::of_bytes(scene.to_string().as_bytes())
 }
 
 /// The kind of a scene.
@@ -214,9 +255,9 @@ pub(super) fn insert(
         .prepare_cached(
             "INSERT INTO jobs (id, rev, state, name, labels, kind, spec, resolved, estimate, priority, created_at,
                  restarted_from, restart_sha256, study, study_index, retry_of, rank, memory_bytes, disk_bytes, warnings,
-                 owner, predecessors, restart_job)
+                 owner, predecessors, restart_job, scene_sha256, awaits, problem, spacing)
              VALUES (?1, 1, 'queued', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19,
-                 ?20, ?21)",
+                 ?20, ?21, ?22, ?23, ?24, ?25)",
         )?
         .execute(params![
             id,
@@ -240,15 +281,12 @@ pub(super) fn insert(
             job.owner,
             serde_json::to_string(&job.predecessors)?,
             job.origin.as_ref().filter(|origin| matches!(origin, Origin::Job(_))).map(Origin::id),
+            job.scene_sha256,
+            job.awaits,
+            job.problem.as_ref().map(|(problem, _)| problem),
+            job.problem.as_ref().map(|(_, spacing)| spacing),
         ])?;
-    for upload in &job.uploads {
-        let known = transaction
-            .prepare_cached("INSERT OR IGNORE INTO inputs SELECT ?1, id FROM uploads WHERE id = ?2")?
-            .execute(params![id, upload])?;
-        if known == 0 {
-            return Err(StoreError::UploadGone);
-        }
-    }
+    enter_inputs(transaction, id, &job.uploads)?;
     if let Some(old) = &job.retry_of {
         transaction.execute("UPDATE jobs SET superseded = 1 WHERE id = ?1", [old])?;
     }
@@ -258,6 +296,19 @@ pub(super) fn insert(
         && let Err(ChangeError::Store(error)) = transitions::give_up(transaction, id, &lost)
     {
         return Err(error);
+    }
+    Ok(())
+}
+
+/// Enters the uploads that a job takes points from.
+fn enter_inputs(transaction: &Transaction, id: &str, uploads: &[String]) -> Result<(), StoreError> {
+    for upload in uploads {
+        let known = transaction
+            .prepare_cached("INSERT OR IGNORE INTO inputs SELECT ?1, id FROM uploads WHERE id = ?2")?
+            .execute(params![id, upload])?;
+        if known == 0 {
+            return Err(StoreError::UploadGone);
+        }
     }
     Ok(())
 }

@@ -1,15 +1,12 @@
 //! Sweeps: the points of a study, as axes or as a list.
 
+use super::axes::{AXES, Axes, SweepPoint, check_pointer, check_value};
+use super::refine::RefineSpec;
 use meniscus::spec::{Json, Object, Parameter, Violation, escape};
 use serde_json::{Map, Value, json};
 
 /// Points of a study at most.
 pub const MOST_POINTS: usize = 10_000;
-/// Bytes of a value of an axis at most: there may be ten thousand copies of it.
-const LARGEST_VALUE: usize = 16 << 10;
-/// Bytes of a pointer at most.
-const LONGEST_POINTER: usize = 200;
-
 meniscus::choice! {
     /// How the points of a study come about.
     pub enum Sweep by "mode" {
@@ -28,28 +25,20 @@ meniscus::choice! {
             /// objects from JSON pointers into the job's body to values
             points: Points;
         }
+        /// levels of refinement, one after another, until a quantity is known to a tolerance
+        Refine = "refine" {
+            /// the levels
+            refine: RefineSpec => flatten;
+        }
     }
 }
-
-/// A point: its values by pointer, and where each of them stands in the sweep.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SweepPoint {
-    /// Values by pointer.
-    pub values: Vec<(String, Json)>,
-    /// Pointers to the values in the study's body.
-    pub places: Vec<String>,
-}
-
-/// Lists of values by pointer.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Axes(Vec<(String, Vec<Json>)>);
 
 /// Points one by one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Points(Vec<Object>);
 
 impl Sweep {
-    /// The points in order.
+    /// The points in order; those of a refinement follow from its base.
     ///
     /// # Errors
     /// Where there are too many, and where the axes of a zip differ in length.
@@ -58,17 +47,18 @@ impl Sweep {
             Self::Grid { axes } => {
                 let count = axes.0.iter().map(|(_, values)| values.len()).fold(1_usize, usize::saturating_mul);
                 check_count(count)?;
-                Ok((0..count).map(|index| axes.grid_point(index)).collect())
+                Ok(axes.grid(AXES, count))
             }
             Self::Zip { axes } => {
                 let count = axes.common_length()?;
                 check_count(count)?;
-                Ok((0..count).map(|index| axes.point(|_| index)).collect())
+                Ok((0..count).map(|index| axes.point(AXES, |_| index)).collect())
             }
             Self::List { points } => {
                 check_count(points.0.len())?;
                 Ok(points.0.iter().enumerate().map(|(k, values)| listed_point(k, values)).collect())
             }
+            Self::Refine { .. } => Ok(Vec::new()),
         }
     }
 }
@@ -78,113 +68,11 @@ fn check_count(count: usize) -> Result<(), Violation> {
     if count > MOST_POINTS { Err(Violation::new("/sweep", "range", detail, count, MOST_POINTS)) } else { Ok(()) }
 }
 
-fn axis_place(pointer: &str) -> String {
-    format!("/sweep/axes/{}", escape(pointer))
-}
-
-impl Axes {
-    /// The point with the `index_of(axis)`-th value of each axis.
-    fn point(&self, index_of: impl Fn(usize) -> usize) -> SweepPoint {
-        let indices = (0..self.0.len()).map(index_of);
-        let (values, places) = self
-            .0
-            .iter()
-            .zip(indices)
-            .map(|((pointer, values), k)| {
-                ((pointer.clone(), values[k].clone()), format!("{}/{k}", axis_place(pointer)))
-            })
-            .unzip();
-        SweepPoint { values, places }
-    }
-
-    /// The point of a grid; the last axis runs fastest.
-    fn grid_point(&self, index: usize) -> SweepPoint {
-        self.point(|axis| {
-            let faster: usize = self.0[axis + 1..].iter().map(|(_, values)| values.len()).product();
-            index / faster % self.0[axis].1.len()
-        })
-    }
-
-    fn common_length(&self) -> Result<usize, Violation> {
-        let count = self.0.first().map_or(0, |(_, values)| values.len());
-        match self.0.iter().find(|(_, values)| values.len() != count) {
-            None => Ok(count),
-            Some((pointer, values)) => {
-                let detail = format!("axes of a zip are of one length; the first has {count} values");
-                Err(Violation::new(axis_place(pointer), "range", detail, values.len(), count))
-            }
-        }
-    }
-}
-
 fn listed_point(k: usize, values: &Object) -> SweepPoint {
     let place = |pointer: &String| format!("/sweep/points/{k}/{}", escape(pointer));
     SweepPoint {
         values: values.iter().map(|(pointer, value)| (pointer.clone(), value.clone())).collect(),
         places: values.keys().map(place).collect(),
-    }
-}
-
-fn check_pointer(pointer: &str, at: &str, errors: &mut Vec<Violation>) {
-    if !pointer.starts_with('/') || pointer.len() > LONGEST_POINTER {
-        let detail = "an axis is a JSON pointer into the job's body";
-        errors.push(Violation::new(at, "type", detail, pointer, "/scene/spacing, for instance"));
-    }
-}
-
-/// Adds an error where a value is too large for ten thousand copies.
-fn check_value(value: &Json, at: &str, errors: &mut Vec<Violation>) {
-    // Numbers, the usual values, are not written out for that.
-    if !value.is_number() && value.to_string().len() > LARGEST_VALUE {
-        let detail = format!("a value of an axis has at most {LARGEST_VALUE} bytes");
-        errors.push(Violation::new(at, "range", detail, Value::Null, LARGEST_VALUE));
-    }
-}
-
-impl Parameter for Axes {
-    type Domain = ();
-
-    fn any() {}
-
-    fn parse(given: &Json, (): (), place: &str, errors: &mut Vec<Violation>) -> Option<Self> {
-        let Some(axes) = given.as_object().filter(|axes| !axes.is_empty()) else {
-            let detail = "axes are an object from JSON pointers to lists of values";
-            errors.push(Violation::new(place, "type", detail, given.clone(), Self::allowed(())));
-            return None;
-        };
-        let before = errors.len();
-        let mut lists = Vec::with_capacity(axes.len());
-        for (pointer, values) in axes {
-            let at = format!("{place}/{}", escape(pointer));
-            check_pointer(pointer, &at, errors);
-            let Some(values) = values.as_array().filter(|values| !values.is_empty()) else {
-                let detail = "an axis has a list of values";
-                errors.push(Violation::new(at, "type", detail, values.clone(), json!([0.02, 0.01])));
-                continue;
-            };
-            for (k, value) in values.iter().enumerate() {
-                check_value(value, &format!("{at}/{k}"), errors);
-            }
-            lists.push((pointer.clone(), values.clone()));
-        }
-        (errors.len() == before).then_some(Self(lists))
-    }
-
-    fn allowed((): ()) -> Json {
-        json!({"/scene/spacing": [0.02, 0.01]})
-    }
-
-    fn schema((): ()) -> Object {
-        let list = json!({"type": "array", "minItems": 1, "items": {}});
-        Map::from_iter([
-            ("type".to_owned(), json!("object")),
-            ("additionalProperties".to_owned(), list),
-            ("minProperties".to_owned(), json!(1)),
-        ])
-    }
-
-    fn to_json(&self) -> Json {
-        Json::Object(self.0.iter().map(|(pointer, values)| (pointer.clone(), json!(values))).collect())
     }
 }
 
