@@ -5,6 +5,7 @@
 
 pub mod choice;
 pub mod group;
+pub mod lists;
 mod macros;
 pub mod parameter;
 pub mod places;
@@ -13,7 +14,8 @@ pub mod violation;
 
 pub use choice::{AtLeast, Choice, Variant, Word};
 pub use group::{Declaration, Field, Group};
-pub use parameter::{Coordinates, Interval, Items, Listed, NOT_NEGATIVE, POSITIVE, Parameter, Raw, Sign, Whole, whole};
+pub use lists::{Items, Listed};
+pub use parameter::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, Parameter, Raw, Sign, Whole, whole};
 pub use places::Places;
 pub use preset::{Given, Key, Preset};
 pub use violation::{Violation, escape, suggest};

@@ -1,6 +1,7 @@
 //! `droplet`: two fluids with surface tension (PCP, sections 4.3 and 4.4, appendix B).
 
 mod cases;
+mod costs;
 mod dimensionless;
 mod flow;
 mod formulation;

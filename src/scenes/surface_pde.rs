@@ -2,6 +2,7 @@
 
 mod edges;
 mod field_choices;
+mod field_values;
 mod methods;
 mod motions;
 mod points;
@@ -12,6 +13,7 @@ mod simulations;
 mod plan;
 mod solvers;
 pub mod spec;
+mod starts;
 mod surface_scene;
 mod surfaces;
 mod transport_spec;

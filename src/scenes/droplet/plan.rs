@@ -17,7 +17,6 @@ use super::vectors::vector;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::Pencils;
-use crate::polynomials::multi_index::term_count;
 use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
@@ -28,7 +27,7 @@ use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
     DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
-    TensionLaw, WeaklyCompressibleSph, measurement_interval,
+    WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{Finding, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::{Parameter, Violation};
@@ -327,20 +326,11 @@ pub(super) fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) ->
 }
 
 impl<const D: usize> DropletScene<D> {
-    /// Work of the forces: sums over pairs, or fits.
-    fn momentum_work(&self, pairs: f64, particles: f64) -> f64 {
-        let Discretization::Dcpse(support) = self.config.discretization else { return pairs };
-        let cutoff = support.radius / self.config.spacing;
-        let nodes = if D == 2 { 3.1 } else { 4.2 } * cutoff.powi(D as i32);
-        let terms = term_count::<D>(support.degree) as f64;
-        particles * nodes * (40.0 + 0.25 * terms * terms)
-    }
-
     pub(super) fn lengths(&self) -> Vector<D> {
         self.high - self.low
     }
 
-    fn count(&self) -> u64 {
+    pub(super) fn count(&self) -> u64 {
         self.lattice.count() as u64
     }
 }
@@ -424,7 +414,7 @@ impl<const D: usize> Scene for DropletScene<D> {
             PhaseWork::every_step("sph/momentum", self.momentum_work(2.0 * pairs, particles * evaluations)),
             PhaseWork::every_step("sph/gather", particles * evaluations),
             PhaseWork::every_step("sph/advance", particles * evaluations),
-            PhaseWork::every_step("sph/tension", (particles + EXCHANGE * self.surfactant_pairs()) * evaluations),
+            PhaseWork::every_step("sph/tension", (particles + self.exchange_work()) * evaluations),
             PhaseWork::every_step("neighbors", particles * steps_done),
         ];
         if self.config.density == DensityMethod::Summation {
@@ -518,41 +508,5 @@ impl<const D: usize> DropletScene<D> {
         let nearest =
             |i: usize| (0..of_parts.len()).min_by(|a, b| of_parts[*a][i].total_cmp(&of_parts[*b][i])).unwrap_or(0);
         motion.at(positions, level, nearest).map_err(|found| vec![found])
-    }
-}
-
-/// Work of an exchange of a surfactant in a pair, by that of surface tension on a particle.
-const EXCHANGE: f64 = 12.0;
-/// Bytes of a pair that exchanges a surfactant.
-const PAIR_BYTES: f64 = 16.0;
-
-impl<const D: usize> DropletScene<D> {
-    /// Pairs of particles that exchange a surfactant: those of a band of 4 ε with feet within the radius of the exchange.
-    fn surfactant_pairs(&self) -> f64 {
-        if !matches!(self.config.tension_law, Some(TensionLaw::Surfactant(_))) {
-            return 0.0;
-        }
-        let width = 4.0 * self.config.smoothing_length;
-        let radius = weakly_compressible_sph::EXCHANGE_RADIUS_H;
-        let patch = if D == 2 { 2.0 * radius } else { std::f64::consts::PI * radius * radius };
-        self.near(width) * width / self.spec.spacing * patch
-    }
-
-    fn surfactant_bytes(&self) -> u64 {
-        (PAIR_BYTES * self.surfactant_pairs()) as u64
-    }
-
-    /// Particles within a band of this width about the drop, about: that of a ball of its measure, which is taken for a fifth of the
-    /// box where it is not known.
-    fn near(&self, width: f64) -> f64 {
-        let lengths = self.lengths();
-        let surface = self.surface.as_ref();
-        let measure = surface.map_or(lengths.product() / 5.0, |surface| surface.whole.area_or_volume());
-        let area = match self.shape {
-            Shape::Layer { .. } => 2.0 * lengths.product() / lengths[1],
-            _ if D == 2 => 2.0 * (std::f64::consts::PI * measure).sqrt(),
-            _ => (36.0 * std::f64::consts::PI).cbrt() * measure.powf(2.0 / 3.0),
-        };
-        (area * width / self.config.spacing.powi(D as i32)).min(self.count() as f64)
     }
 }

@@ -1,6 +1,7 @@
 //! What a problem costs: operators, work and memory.
 
-use super::problems::{ProblemChoice, Start};
+use super::problems::ProblemChoice;
+use super::starts::Start;
 use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{EvolutionIntegrator, Solver};
 

@@ -1,20 +1,19 @@
 //! The problem of a scene: what it is made of, what it costs.
 
 use super::field_choices::{Site, default_field, raised};
+use super::field_values::{operated, sites, values};
 use super::motions::{self, MotionPlan, place};
 use super::solvers::explicit;
-use super::spec::{
-    ConditionWord, EdgesChoice, EvolutionChoice, FieldChoice, InitialChoice, ModelChoice, ProblemSpec, SurfacePde,
-};
+use super::spec::{ConditionWord, EdgesChoice, EvolutionChoice, FieldChoice, InitialChoice, ProblemSpec, SurfacePde};
+use super::starts::{self, Start, begin};
 use super::surfaces::Shape;
 use super::velocities::{self, Velocity};
 use crate::geometry::Vector;
-use crate::geometry::random::CounterRandom;
 use crate::operators::charts::tangent::Metric;
 use crate::schemes::surface_equation::{
-    Advection, Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactCourse,
-    ExactField, FormulaField, FormulaTerms, GeodesicDistance, Model, MovingSurface, Pointwise, Poisson, Problem,
-    Reaction, Sites, Solver, Source, SurfaceCloud, SurfaceGradient, Terms, surface_gradient,
+    Advection, Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactField,
+    FormulaField, GeodesicDistance, MovingSurface, Pointwise, Poisson, Problem, Solver, Source, SurfaceCloud,
+    SurfaceGradient, surface_gradient,
 };
 use crate::simulation::Quantity;
 use crate::spec::{Choice, Parameter, Places, Violation};
@@ -66,33 +65,6 @@ pub(super) enum ProblemChoice {
         time_step: f64,
         integrator: EvolutionIntegrator,
     },
-}
-
-/// What evolves from where.
-#[derive(Debug, Clone)]
-pub(super) enum Start {
-    Field(ExactField, Option<Arc<FormulaField>>),
-    Reaction {
-        terms: Terms,
-        initial: Vec<Arc<FormulaField>>,
-        diffusivity: Vec<f64>,
-        noise: f64,
-        manufactured: Option<ExactField>,
-    },
-}
-
-impl Start {
-    /// Number of fields that evolve, those weighed more whose terms are long formulas.
-    pub fn fields(&self) -> f64 {
-        match self {
-            Self::Field(..) => 1.0,
-            // Twenty operations cost about as much as a row of the operator.
-            Self::Reaction { terms: Terms::Formulas(terms), diffusivity, .. } => {
-                diffusivity.len() as f64 + terms.operations() as f64 / 20.0
-            }
-            Self::Reaction { diffusivity, .. } => diffusivity.len() as f64,
-        }
-    }
 }
 
 /// Where the field of a problem stands.
@@ -169,8 +141,11 @@ pub(super) fn plan(
             time_step: time_step.unwrap_or(*end_time / DEFAULT_STEPS),
         },
         ProblemSpec::Curvature => ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights },
-        ProblemSpec::ReactionDiffusion { .. } => {
-            reaction_diffusion(site("/problem/manufactured"), &mut spec.problem, errors)?
+        ProblemSpec::ReactionDiffusion { end_time, time_step, tolerance, .. } => {
+            let (end_time, integrator) = (*end_time, explicit(*tolerance, *time_step));
+            let time_step = time_step.unwrap_or(end_time / DEFAULT_STEPS);
+            let start = starts::reaction(site("/problem/manufactured"), &mut spec.problem, errors)?;
+            ProblemChoice::Evolution { start, end_time, time_step, integrator }
         }
     })
 }
@@ -182,49 +157,6 @@ fn start(site: Site, initial: &mut Option<InitialChoice>, errors: &mut Vec<Viola
         shape => InitialChoice::Field(default_field(shape)),
     });
     site.initial(initial, errors)
-}
-
-/// Plans a reaction.
-fn reaction_diffusion(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<Violation>) -> Option<ProblemChoice> {
-    let ProblemSpec::ReactionDiffusion {
-        model,
-        diffusivity,
-        second_diffusivity,
-        noise,
-        manufactured,
-        end_time,
-        time_step,
-        tolerance,
-    } = problem
-    else {
-        return None;
-    };
-    let exact = manufactured.as_mut().map(|field| site.field(field, errors));
-    if let (Shape::Points(_), Some(_)) = (site.shape, &exact) {
-        let detail = "forcing takes the exact operator, which is not known on points from outside";
-        errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
-    }
-    let both = vec![*diffusivity, *second_diffusivity];
-    let (terms, initial, diffusivity) = match model {
-        ModelChoice::Formula { .. } => {
-            if exact.is_some() {
-                let detail = "forcing belongs to the models; formulas can have their own";
-                errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
-            }
-            formula_reaction(model, errors)?
-        }
-        ModelChoice::GrayScott { feed, kill } => {
-            (Terms::Model(Model::GrayScott { feed: *feed, kill: *kill }), Vec::new(), both)
-        }
-        ModelChoice::Brusselator { a, b } => (Terms::Model(Model::Brusselator { a: *a, b: *b }), Vec::new(), both),
-        ModelChoice::Schnakenberg { a, b, gamma } => {
-            (Terms::Model(Model::Schnakenberg { a: *a, b: *b, gamma: *gamma }), Vec::new(), both)
-        }
-    };
-    let start = Start::Reaction { terms, initial, diffusivity, noise: *noise, manufactured: exact };
-    let integrator = explicit(*tolerance, *time_step);
-    let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
-    Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
 }
 
 /// What eigenvalues do not go together with.
@@ -248,34 +180,6 @@ fn default_integrator(shape: &Shape) -> EvolutionChoice {
         Shape::Points(_) => EvolutionChoice::Bdf2,
         _ => EvolutionChoice::Dopri5 { tolerance: None },
     }
-}
-
-/// Terms, fields at the start and diffusivities of a reaction.
-type ReactionParts = (Terms, Vec<Arc<FormulaField>>, Vec<f64>);
-
-/// A reaction by formulas; None, with errors, where something is wrong with it.
-fn formula_reaction(model: &ModelChoice, errors: &mut Vec<Violation>) -> Option<ReactionParts> {
-    const POINTER: &str = "/problem/model";
-    let ModelChoice::Formula { species, rates, diffusivities, initial, parameters } = model else { return None };
-    let before = errors.len();
-    for (name, found) in [("diffusivities", diffusivities.len()), ("initial", initial.0.len())] {
-        if found != species.len() {
-            let detail = format!("there are {} substances, and {found} of these", species.len());
-            errors.push(Violation::new(format!("{POINTER}/{name}"), "conflict", detail, found, json!(species.len())));
-        }
-    }
-    let terms = FormulaTerms::new(species, rates, parameters, POINTER);
-    let terms = terms.map_err(|found| errors.extend(found)).ok();
-    let starts: Vec<Option<Arc<FormulaField>>> = initial
-        .at("initial")
-        .iter()
-        .map(|(place, text)| {
-            let field = FormulaField::new(text, parameters, POINTER, place);
-            field.map(Arc::new).map_err(|found| errors.extend(found)).ok()
-        })
-        .collect();
-    let starts: Option<Vec<_>> = starts.into_iter().collect();
-    (errors.len() == before).then_some((Terms::Formulas(terms?), starts?, diffusivities.clone()))
 }
 
 /// What a source of a Poisson equation does not go together with.
@@ -310,38 +214,6 @@ fn check_poisson(shape: &Shape, condition: ConditionWord, name: &str, errors: &m
         let at = "/problem/condition";
         errors.push(Violation::new(at, "conflict", detail, condition.to_json(), json!(["zero_mean"])));
     }
-}
-
-/// A field at the points of a cloud.
-///
-/// # Errors
-/// One [`Violation`] where a formula has no value.
-fn values<const D: usize>(
-    field: &ExactField,
-    cloud: &SurfaceCloud<D>,
-    pointer: &str,
-) -> Result<Vec<f64>, Vec<Violation>> {
-    if let ExactField::Formula(formula) = field {
-        let told = formula.values(&sites(cloud), 0.0);
-        return told.map_err(|fault| vec![Violation::new(pointer, "data", fault, formula.text(), Value::Null)]);
-    }
-    Ok(cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect())
-}
-
-/// The unknowns of a cloud as sites of formulas.
-fn sites<const D: usize>(cloud: &SurfaceCloud<D>) -> Sites {
-    Sites::new(&cloud.points[..cloud.rows], &cloud.normals[..cloud.rows])
-}
-
-/// Δ_S of it, by the exact normals and curvatures of a shape that has them.
-fn operated<const D: usize>(field: &ExactField, shape: &Shape, cloud: &SurfaceCloud<D>) -> Option<Vec<f64>> {
-    let at = |(x, curvature): (&Vector<D>, &f64)| {
-        let x = raised(x);
-        Some(field.laplace_beltrami(&x, &shape.normal(&x)?, *curvature))
-    };
-    let is_of_place = !matches!(field, ExactField::Formula(formula) if !formula.is_of_place());
-    let is_known = cloud.curvatures.len() == cloud.rows && is_of_place;
-    is_known.then(|| cloud.points.iter().zip(&cloud.curvatures).map(at).collect()).flatten()
 }
 
 impl ProblemChoice {
@@ -531,98 +403,4 @@ fn held<const D: usize>(shape: &Shape, cloud: &SurfaceCloud<D>) -> Vec<usize> {
     }
     let half = 0.5 * shape.spacing(cloud.rows as u64);
     (0..cloud.rows).filter(|i| cloud.points[*i][0].abs() <= half).collect()
-}
-
-/// Fields at the start, the reaction, and what is known of the course.
-type Beginning = (Vec<f64>, Option<Reaction>, ExactCourse);
-
-/// How an evolution begins.
-fn begin<const D: usize>(
-    start: &Start,
-    shape: &Shape,
-    cloud: &SurfaceCloud<D>,
-    seed: u64,
-) -> Result<Beginning, Vec<Violation>> {
-    match start {
-        Start::Field(field, source) => {
-            let decay = field.decay(shape.reach()).filter(|_| source.is_none());
-            let exact = decay.map_or(ExactCourse::Unknown, ExactCourse::Decay);
-            Ok((values(field, cloud, "/problem/initial")?, None, exact))
-        }
-        Start::Reaction { terms, initial, diffusivity, noise, manufactured } => {
-            let known = match manufactured {
-                Some(field) => {
-                    let values = values(field, cloud, "/problem/manufactured")?;
-                    operated(field, shape, cloud).map(|operated| (values, operated))
-                }
-                None => None,
-            };
-            let exact = if known.is_some() { ExactCourse::Manufactured } else { ExactCourse::Unknown };
-            let random = CounterRandom::new(seed ^ 0x7265_6163);
-            let (terms, values) = match terms {
-                Terms::Formulas(terms) => {
-                    let values =
-                        starts_of_formulas(initial, cloud, |i, k| noise * random.symmetric(&[i as i64, k as i64]))?;
-                    (Terms::Formulas(terms.with_sites(sites(cloud))), values)
-                }
-                Terms::Model(model) => {
-                    let disturbed = Disturbed { model: *model, noise: *noise, random };
-                    (Terms::Model(*model), disturbed.values(known.as_ref().map(|(field, _)| &field[..]), shape, cloud))
-                }
-            };
-            let reaction = Reaction { terms, diffusivity: diffusivity.clone(), manufactured: known };
-            Ok((values, Some(reaction), exact))
-        }
-    }
-}
-
-/// Substances by formulas at the start, with a random disturbance by their values.
-fn starts_of_formulas<const D: usize>(
-    initial: &[Arc<FormulaField>],
-    cloud: &SurfaceCloud<D>,
-    noise: impl Fn(usize, usize) -> f64,
-) -> Result<Vec<f64>, Vec<Violation>> {
-    let sites = sites(cloud);
-    let mut values = Vec::with_capacity(initial.len() * cloud.rows);
-    let mut errors = Vec::new();
-    for (k, field) in initial.iter().enumerate() {
-        match field.values(&sites, 0.0) {
-            Ok(found) => values.extend(found.iter().enumerate().map(|(i, value)| value * (1.0 + noise(i, k)))),
-            Err(fault) => {
-                let at = format!("/problem/model/initial/{k}");
-                errors.push(Violation::new(at, "data", fault, field.text(), Value::Null));
-            }
-        }
-    }
-    if errors.is_empty() { Ok(values) } else { Err(errors) }
-}
-
-/// The state of a model without a pattern, disturbed.
-struct Disturbed {
-    model: Model,
-    noise: f64,
-    random: CounterRandom,
-}
-
-impl Disturbed {
-    /// Both substances at the points; `field` is that of a manufactured solution.
-    fn values<const D: usize>(&self, field: Option<&[f64]>, shape: &Shape, cloud: &SurfaceCloud<D>) -> Vec<f64> {
-        let Self { model, noise, random } = self;
-        let rest = model.rest();
-        let exact = Reaction { terms: Terms::Model(*model), diffusivity: Vec::new(), manufactured: None };
-        let at = |i: usize| match (field, model) {
-            (Some(field), _) => exact.exact(field[i], 0.0),
-            (None, Model::GrayScott { .. }) => {
-                // The second substance is sown on a cap.
-                let [u, v] = if shape.is_on_cap(&raised(&cloud.points[i])) { [0.5, 0.25] } else { rest };
-                let off = noise * random.symmetric(&[i as i64]);
-                [u, v * (1.0 + off)]
-            }
-            (None, Model::Brusselator { .. } | Model::Schnakenberg { .. }) => {
-                [0, 1].map(|k| rest[k] * (1.0 + noise * random.symmetric(&[i as i64, k as i64])))
-            }
-        };
-        let both: Vec<[f64; 2]> = (0..cloud.rows).map(at).collect();
-        both.iter().map(|b| b[0]).chain(both.iter().map(|b| b[1])).collect()
-    }
 }

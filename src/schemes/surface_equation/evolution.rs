@@ -4,15 +4,16 @@
 
 use super::cloud::SurfaceCloud;
 use super::conservative;
+use super::evolution_parts::{EvolutionIntegrator, EvolutionParts, ExactCourse};
 use super::field_bounds::FieldBounds;
 use super::format_1;
-use super::formula_field::{FormulaField, Sites};
 use super::formula_terms::MOST_SPECIES;
 use super::method::{Operators, Use, Wanted};
 use super::problem::{Problem, Tools, Watched, watch};
-use super::quantities::{INTEGRAL, LARGEST, LEAST, PROBES, RATE, REFERENCE, VALUE};
-use super::reactions::{Reaction, Terms};
+use super::quantities::{INTEGRAL, LARGEST, LEAST, PROBES, RATE, REFERENCE};
+use super::reactions::Reaction;
 use super::solver::{LinearSystem, Solver, Workspace};
+use super::substances::substance;
 use crate::linear_algebra::SparseRows;
 use crate::parallel::Interrupt;
 use crate::schemes::measured_errors::{against_exact, entry};
@@ -20,79 +21,6 @@ use crate::simulation::{Check, Diagnostic, ErrorEntry, Finding, LoadError, Obser
 use crate::time::Clock;
 use crate::time::embedded_pair::EmbeddedPair;
 use std::collections::BTreeMap;
-use std::sync::Arc;
-
-/// A computed substance.
-macro_rules! substance {
-    ($name:literal, $which:literal) => {
-        Quantity { name: $name, unit: "of the field", doc: concat!("Computed value of the ", $which, " substance.") }
-    };
-}
-
-/// The substances beyond the first.
-static MORE_VALUES: [Quantity; MOST_SPECIES - 1] = [
-    substance!("second_value", "second"),
-    substance!("third_value", "third"),
-    substance!("fourth_value", "fourth"),
-    substance!("fifth_value", "fifth"),
-    substance!("sixth_value", "sixth"),
-];
-
-/// The quantity of a substance.
-fn substance(k: usize) -> &'static Quantity {
-    if k == 0 { &VALUE } else { &MORE_VALUES[(k - 1).min(MOST_SPECIES - 2)] }
-}
-
-/// What is made or taken at every point of a surface, as a formula of place and time.
-#[derive(Debug, Clone)]
-pub struct Source {
-    /// The rate.
-    pub field: Arc<FormulaField>,
-    /// The points.
-    pub sites: Sites,
-}
-
-/// How time is integrated.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum EvolutionIntegrator {
-    /// Dormand and Prince's pair, one step of it a step.
-    FixedSteps,
-    /// The same, as many steps as keep the error of each below a tolerance.
-    Controlled {
-        /// Root mean square of the error by 1 + |u|.
-        tolerance: f64,
-    },
-    /// (3 u⁺ − 4 u + u⁻)/2Δt = Δ_S u⁺, begun with a backward Euler step.
-    Bdf2(Solver),
-}
-
-/// What is known exactly of a course.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ExactCourse {
-    /// No exact course is known.
-    Unknown,
-    /// The initial field times exp(−λ t): it is an eigenfunction.
-    Decay(f64),
-    /// The manufactured solution of the reaction.
-    Manufactured,
-}
-
-/// Fields, reaction and integrator of an evolution.
-#[derive(Debug, Clone)]
-pub struct EvolutionParts {
-    /// The substances, one after another.
-    pub initial: Vec<f64>,
-    /// Reaction of the substances; without one it is diffusion alone.
-    pub reaction: Option<Reaction>,
-    /// What is made at every point, without a reaction.
-    pub source: Option<Source>,
-    /// Δt of the implicit formula.
-    pub time_step: f64,
-    /// Integrator of time.
-    pub integrator: EvolutionIntegrator,
-    /// The exact course, where it is known.
-    pub exact: ExactCourse,
-}
 
 /// A field, or two, in time.
 #[derive(Debug)]
@@ -329,24 +257,6 @@ const FIRST_STEP: f64 = 1e-3;
 /// Inner steps below this share of a step end the run.
 const LEAST_STEP: f64 = 1e-9;
 const SAFETY: f64 = 0.9;
-impl EvolutionParts {
-    /// Diffusion alone: nothing makes or takes the substance.
-    fn is_plain(&self) -> bool {
-        self.reaction.is_none() && self.source.is_none()
-    }
-
-    /// Why formulas have no value where the substances have these values, if they have none.
-    fn undefined(&self, values: &[f64], time: f64) -> Option<String> {
-        if let Some(source) = &self.source {
-            return source.field.values(&source.sites, time).err();
-        }
-        match &self.reaction.as_ref()?.terms {
-            Terms::Formulas(terms) => terms.fault(values, time),
-            Terms::Model(_) => None,
-        }
-    }
-}
-
 /// d Δ_S u, the terms of a reaction and what a source makes.
 fn slopes(operator: &SparseRows, parts: &EvolutionParts, u: &[f64], time: f64, out: &mut [f64]) {
     let rows = operator.rows();
