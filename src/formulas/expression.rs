@@ -123,7 +123,7 @@ impl Graph {
         }
         let half = self.whole_power(base, exponent / 2);
         let square = self.binary(BinaryOp::Mul, half, half);
-        if exponent % 2 == 0 { square } else { self.binary(BinaryOp::Mul, square, base) }
+        if exponent.is_multiple_of(2) { square } else { self.binary(BinaryOp::Mul, square, base) }
     }
 
     fn intern(&mut self, node: Node) -> NodeId {

@@ -107,7 +107,7 @@ impl Parameter for NamedNumbers {
             match value.as_f64() {
                 Some(number) => numbers.push((name.clone(), number)),
                 None => {
-                    errors.push(Violation::new(&at, "type", "a number is needed", value.clone(), json!("a number")))
+                    errors.push(Violation::new(&at, "type", "a number is needed", value.clone(), json!("a number")));
                 }
             }
         }

@@ -46,8 +46,8 @@ fn plane_points(cloud: &Cloud) -> Result<Vec<Vector<2>>, Vec<String>> {
     Ok(cloud.positions.iter().map(|x| Vector::<2>::new(x[0], x[1])).collect())
 }
 
-fn sentences(faults: Vec<impl ToString>) -> Vec<String> {
-    faults.iter().map(ToString::to_string).collect()
+fn sentences<T: ToString>(faults: Vec<T>) -> Vec<String> {
+    faults.into_iter().map(|fault| fault.to_string()).collect()
 }
 
 /// The surface of the mesh that stands at a pointer of the scene.

@@ -254,7 +254,7 @@ impl<const D: usize> ExactFront<'_, D> {
         starts[..points.len()].copy_from_slice(points);
         at_start(TUNING.rough, &mut starts[..points.len()], distances);
         // A NaN is no side: the tight path tells it too.
-        let is_near = |side: f64| !(side.abs() > TUNING.rough_side);
+        let is_near = |side: f64| side.is_nan() || side.abs() <= TUNING.rough_side;
         let near: Vec<usize> = (0..points.len()).filter(|k| is_near(distances[*k])).collect();
         let mut starts: Vec<Vector<D>> = near.iter().map(|k| points[*k]).collect();
         let mut sides = [0.0; PATHS];

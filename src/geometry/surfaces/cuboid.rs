@@ -87,7 +87,7 @@ impl<const D: usize> Surface<D> for Cuboid<D> {
     fn faces(&self) -> Option<Vec<Arc<dyn LevelFunction<D>>>> {
         let face = |k: usize| -> Arc<dyn LevelFunction<D>> {
             let mut normal = Vector::<D>::zeros();
-            normal[k / 2] = if k % 2 == 0 { 1.0 } else { -1.0 };
+            normal[k / 2] = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
             Arc::new(PlaneLevel::through(&(self.center + normal * (0.5 * self.size[k / 2])), normal))
         };
         Some((0..2 * D).map(face).collect())

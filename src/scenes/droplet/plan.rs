@@ -33,13 +33,12 @@ use crate::simulation::{Finding, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 pub(super) struct DropletScene<const D: usize> {
     pub(super) spec: Droplet,
     pub(super) shape: Shape,
     /// Motion of the fluids at the start, where it is given.
-    motion: Option<StartMotion>,
+    pub(super) motion: Option<StartMotion>,
     /// The surface of the shape; none of a layer, and where points from outside tell it.
     pub(super) surface: Option<ShapeSurface<D>>,
     pub(super) low: Vector<D>,
@@ -491,22 +490,5 @@ impl<const D: usize> Scene for DropletScene<D> {
         let mut simulation = WeaklyCompressibleSph::new(system, self.time_step, end_time, plan, clock, chosen);
         simulation.course_mut().findings.extend(self.warnings());
         Ok(Box::new(simulation))
-    }
-}
-
-impl<const D: usize> DropletScene<D> {
-    /// Velocities of the particles at the start.
-    fn start_velocities(
-        &self,
-        motion: &StartMotion,
-        positions: &[Vector<D>],
-        level: &[f64],
-    ) -> Result<Vec<Vector<D>>, Vec<Violation>> {
-        // Points from outside have no parts.
-        let parts: &[Arc<dyn Surface<D>>] = self.surface.as_ref().map_or(&[], |surface| &surface.parts);
-        let of_parts: Vec<Vec<f64>> = parts.iter().map(|part| self.levels(part.as_ref(), positions)).collect();
-        let nearest =
-            |i: usize| (0..of_parts.len()).min_by(|a, b| of_parts[*a][i].total_cmp(&of_parts[*b][i])).unwrap_or(0);
-        motion.at(positions, level, nearest).map_err(|found| vec![found])
     }
 }

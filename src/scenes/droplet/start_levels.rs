@@ -1,5 +1,6 @@
-//! Signed distances of the particles at the start from the drop.
+//! Signed distances of the particles at the start from the drop, and their velocities.
 
+use super::own_motion::StartMotion;
 use super::plan::{DropletScene, RATIO, check_size, domain_of};
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::{Surface, Vector};
@@ -12,6 +13,7 @@ use crate::schemes::weakly_compressible_sph::Geometry;
 use crate::spec::Violation;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 impl<const D: usize> DropletScene<D> {
     /// The surface of the drop, if it has one; that of a mesh must fit into the box.
@@ -50,6 +52,21 @@ impl<const D: usize> DropletScene<D> {
                 least
             })
             .collect()
+    }
+
+    /// Velocities of the particles at the start.
+    pub(super) fn start_velocities(
+        &self,
+        motion: &StartMotion,
+        positions: &[Vector<D>],
+        level: &[f64],
+    ) -> Result<Vec<Vector<D>>, Vec<Violation>> {
+        // Points from outside have no parts.
+        let parts: &[Arc<dyn Surface<D>>] = self.surface.as_ref().map_or(&[], |surface| &surface.parts);
+        let of_parts: Vec<Vec<f64>> = parts.iter().map(|part| self.levels(part.as_ref(), positions)).collect();
+        let nearest =
+            |i: usize| (0..of_parts.len()).min_by(|a, b| of_parts[*a][i].total_cmp(&of_parts[*b][i])).unwrap_or(0);
+        motion.at(positions, level, nearest).map_err(|found| vec![found])
     }
 
     /// Signed distances from the surface of points that came from elsewhere.

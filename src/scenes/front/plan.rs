@@ -4,7 +4,7 @@ use super::choice::{Completed, FrontChoice, FrontPlan, Resolved};
 use super::method::{BYTES, FrontQuestion, REFINED_BYTES, is_within_grid, labels, plan_method};
 use super::spec::Front;
 use super::wavefront;
-use crate::geometry::Vector;
+use crate::geometry::{Surface, Vector};
 use crate::geometry::flows::Stretch;
 use crate::parallel::Interrupt;
 use crate::scene::cloud::{CloudReference, CloudSizes};
@@ -97,7 +97,7 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
     errors.extend(whole.and_then(|whole| check_extent(whole, BAND_H * choice.spacing, choice.spacing)));
     // Where the motion of another scene is done as a front, its flow stands at the top.
     let flow_pointer = if choice.pointer.is_empty() { "/law/flow" } else { "/flow" };
-    let extent = whole.map(|whole| whole.bounding_box());
+    let extent = whole.map(Surface::bounding_box);
     let about = extent.unwrap_or((Vector::<D>::zeros(), Vector::<D>::repeat(1.0)));
     let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about);
     errors.extend(law.as_ref().err().into_iter().flatten().cloned());

@@ -95,7 +95,7 @@ fn formula_reaction(model: &ModelChoice, errors: &mut Vec<Violation>) -> Option<
         })
         .collect();
     let starts: Option<Vec<_>> = starts.into_iter().collect();
-    (errors.len() == before).then_some((Terms::Formulas(terms?), starts?, diffusivities.clone()))
+    (errors.len() == before).then_some((Terms::Formulas(Box::new(terms?)), starts?, diffusivities.clone()))
 }
 
 /// Fields at the start, the reaction, and what is known of the course.
@@ -128,7 +128,7 @@ pub(super) fn begin<const D: usize>(
                 Terms::Formulas(terms) => {
                     let values =
                         starts_of_formulas(initial, cloud, |i, k| noise * random.symmetric(&[i as i64, k as i64]))?;
-                    (Terms::Formulas(terms.with_sites(sites(cloud))), values)
+                    (Terms::Formulas(Box::new(terms.with_sites(sites(cloud)))), values)
                 }
                 Terms::Model(model) => {
                     let disturbed = Disturbed { model: *model, noise: *noise, random };

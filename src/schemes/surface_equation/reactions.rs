@@ -72,7 +72,7 @@ pub enum Terms {
     /// Two substances.
     Model(Model),
     /// One to six.
-    Formulas(FormulaTerms),
+    Formulas(Box<FormulaTerms>),
 }
 
 /// A reaction of substances that diffuse.

@@ -102,8 +102,8 @@ impl<const D: usize, const N: usize> Paths<D, N> {
             }
         }
         let mut next = 0;
-        for slot in 0..count {
-            let (i, step) = (self.active[slot], steps[slot]);
+        for (slot, step) in steps.into_iter().enumerate().take(count) {
+            let i = self.active[slot];
             let mut error = Vector::<D>::zeros();
             for (j, e) in E.iter().enumerate() {
                 error += self.k[j][i] * *e;

@@ -93,13 +93,13 @@ impl<const D: usize> FormulaSpeed<D> {
         for from in (0..feet.len()).step_by(BLOCK) {
             let count = BLOCK.min(feet.len() - from);
             let mut columns = [[0.0; BLOCK]; 7];
-            for i in 0..count {
-                for d in 0..D {
-                    columns[d][i] = feet.positions[from + i][d];
-                    columns[D + d][i] = feet.normals[from + i][d];
-                }
-                columns[2 * D][i] = feet.curvatures[from + i];
+            for d in 0..D {
+                let places = feet.positions[from..from + count].iter().map(|x| x[d]);
+                columns[d].iter_mut().zip(places).for_each(|(slot, value)| *slot = value);
+                let normals = feet.normals[from..from + count].iter().map(|n| n[d]);
+                columns[D + d].iter_mut().zip(normals).for_each(|(slot, value)| *slot = value);
             }
+            columns[2 * D][..count].copy_from_slice(&feet.curvatures[from..from + count]);
             let inputs: [Input<'_>; 8] = std::array::from_fn(|k| match columns.get(k) {
                 Some(column) if k <= 2 * D => Input::Column(&column[..count]),
                 _ => Input::Uniform(time),
