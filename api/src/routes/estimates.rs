@@ -33,7 +33,7 @@ pub async fn estimate(
                 return Ok(Json(EstimateView::from(known)));
             }
             let study = accuracy::study_for(store, &body, wanted, allowance)?;
-            return Ok(Json(EstimateView::of_accuracy(body, &study.forecast)));
+            return Ok(Json(EstimateView::of_accuracy(&body, &study.forecast)));
         }
         Ok::<_, ApiError>(Json(EstimateView::from(body)))
     });

@@ -156,7 +156,7 @@ impl From<JobBody> for EstimateView {
 impl EstimateView {
     /// The estimate of a body that asks for an accuracy: the study that finds its spacing comes first, and tells what the run takes.
     #[must_use]
-    pub fn of_accuracy(body: JobBody, study: &StudyForecast) -> Self {
+    pub fn of_accuracy(body: &JobBody, study: &StudyForecast) -> Self {
         let basis = format!(
             "the spacing is not known before a study has run; its first {} levels are estimated, and it goes on until the spacing can \
              be told",

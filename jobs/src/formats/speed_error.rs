@@ -93,9 +93,12 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     if low <= high { low / 2.0..high * 2.0 } else { 0.1..10.0 }
 }
 
+/// Lines with their names, and points of the line that is expected.
+type Content<'a> = (&'a [(String, Vec<Point>)], &'a [(f64, f64)]);
+
 fn panel(
     area: &DrawingArea<SVGBackend, Shift>,
-    (lines, expected): (&[(String, Vec<Point>)], &[(f64, f64)]),
+    (lines, expected): Content<'_>,
     axis: &str,
     x: fn(&Point) -> f64,
 ) -> Result<(), String> {

@@ -45,6 +45,9 @@ struct Search<'a, S> {
     sources: &'a S,
 }
 
+/// Pointer of a value of the scene that the body leaves open, and the values that are compared.
+type OpenChoice = (&'static str, Vec<Json>);
+
 impl<S: Sources> Search<'_, S> {
     /// The body with some values of the scene, if that is valid.
     fn body_with(&self, values: &[(&str, Json)]) -> Result<Option<JobBody>, BodyError<S::Error>> {
@@ -75,7 +78,7 @@ impl<S: Sources> Search<'_, S> {
     }
 
     /// Values of the scene that the body leaves open, with those that are compared: the ones that go with the rest of the scene.
-    fn open_choices(&self, from: f64) -> Result<Vec<(&'static str, Vec<Json>)>, BodyError<S::Error>> {
+    fn open_choices(&self, from: f64) -> Result<Vec<OpenChoice>, BodyError<S::Error>> {
         let mut open = Vec::new();
         for (pointer, values) in self.body.scene.choices() {
             if Value::pointer(&self.base, &format!("/scene{pointer}")).is_some() {

@@ -79,7 +79,7 @@ fn advance(store: &Store, id: &str) -> Result<(), StoreError> {
     };
     let mut levels = store.levels(id)?;
     if let Some(level) = levels.iter().find(|level| level.is_to_repeat) {
-        return match make(store, &study, &plan, Place::of(level), &by_setup(&plan, &levels))? {
+        return match make(store, &study, &plan, &Place::of(level), &by_setup(&plan, &levels))? {
             None => Ok(()),
             Some((outcome, message)) => end(store, &study, outcome, &message),
         };
@@ -102,7 +102,7 @@ fn advance(store: &Store, id: &str) -> Result<(), StoreError> {
             Step::Choose { setup } => return store.choose_setup(id, setup as u64),
             Step::Make { setup, level } => {
                 let place = Place { number: levels.len() as u64, setup, level: level as u64, repeats: None };
-                (setup, make(store, &study, &plan, place, &setups)?)
+                (setup, make(store, &study, &plan, &place, &setups)?)
             }
         };
         match obstacle {
@@ -165,7 +165,7 @@ fn make(
     store: &Store,
     study: &StudyRow,
     plan: &Plan,
-    place: Place,
+    place: &Place,
     setups: &[Setup],
 ) -> Result<Option<(RefinementOutcome, String)>, StoreError> {
     let (Some(refinement), Some(setup)) = (&study.refinement, plan.setups.get(place.setup)) else { return Ok(None) };
@@ -181,7 +181,7 @@ fn make(
         let found = measuring::earlier(store, &body.resolved, &sha256, &plan.quantity, plan.spec.until.relative)?;
         if let Some((job, measured)) = found {
             let source = LevelSource::Earlier { job, measured };
-            store.make_level(study, new_level(&place, source))?;
+            store.make_level(&study.id, study.owner.as_ref(), new_level(place, source))?;
             return Ok(None);
         }
     }
@@ -191,7 +191,7 @@ fn make(
     }
     let mut job = NewJob::from_body(&body);
     job.retry_of.clone_from(&place.repeats);
-    store.make_level(study, new_level(&place, LevelSource::Job(Box::new(job))))?;
+    store.make_level(&study.id, study.owner.as_ref(), new_level(place, LevelSource::Job(Box::new(job))))?;
     Ok(None)
 }
 

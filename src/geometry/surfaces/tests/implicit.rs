@@ -184,6 +184,17 @@ fn corners_of_a_level_are_found() {
     }
     assert!((square.area_or_volume() - 1.0).abs() < 1e-3, "{}", square.area_or_volume());
 }
+/// A level with a pole at the origin.
+struct Pole;
+impl LevelFunction<2> for Pole {
+    fn value(&self, x: &Vector<2>) -> f64 {
+        1.0 - 0.01 / x.norm()
+    }
+
+    fn jet(&self, x: &Vector<2>) -> LevelJet<2> {
+        LevelJet { value: self.value(x), gradient: Vector::<2>::zeros(), hessian: Hessian::<2>::zeros() }
+    }
+}
 
 #[test]
 fn levels_without_a_surface_say_what_to_give() {
@@ -196,16 +207,6 @@ fn levels_without_a_surface_say_what_to_give() {
     assert!(side.contains("no zero"), "{side}");
     let side = message(within(circle(2.5), 2.0));
     assert!(side.contains("reaches the side"), "{side}");
-    struct Pole;
-    impl LevelFunction<2> for Pole {
-        fn value(&self, x: &Vector<2>) -> f64 {
-            1.0 - 0.01 / x.norm()
-        }
-
-        fn jet(&self, x: &Vector<2>) -> LevelJet<2> {
-            LevelJet { value: self.value(x), gradient: Vector::<2>::zeros(), hessian: Hessian::<2>::zeros() }
-        }
-    }
     let pole = message(within(Pole, 2.0));
     assert!(pole.contains("not finite at (0.0000, 0.0000)"), "{pole}");
     let cube = message(within(Power(circle(0.5), 3), 2.0));
