@@ -355,8 +355,8 @@ fn reactions_by_formula_run_on_the_bunny() {
     let excited = finished(
         &mesh,
         &problem(json!({
-            "type": "formula", "species": ["u", "w"], "rates": ["u - u^3/3 - w", "e*(u + b - c*w)"], "diffusivities": [fast, 0],
-            "initial": ["if(nz > 0.5, 1, -1.2)", "if(nx > 0, 0.8, -0.6)"], "parameters": {"e": 0.08, "b": 0.7, "c": 0.8}
+            "type": "formula", "species": ["u", "w"], "rates": ["u - u^3/3 - w", "q*(u + b - c*w)"], "diffusivities": [fast, 0],
+            "initial": ["if(nz > 0.5, 1, -1.2)", "if(nx > 0, 0.8, -0.6)"], "parameters": {"q": 0.08, "b": 0.7, "c": 0.8}
         })),
     );
     let u = column(&*excited, "value");

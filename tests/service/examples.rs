@@ -114,7 +114,7 @@ fn measures_and_probes_are_columns_of_the_series() {
     let (done, out) = run_body(&body, directory.path());
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let kinetic = column(&out, "measure.kinetic");
-    assert!((kinetic[0] - 0.125).abs() < 2e-3, "{}", kinetic[0]);
+    assert!((kinetic[0] - 0.25).abs() < 2e-3, "{}", kinetic[0]);
     let k = 2.0 * std::f64::consts::PI;
     let decay = (kinetic.last().unwrap() / kinetic[0]).ln() / 0.2;
     let exact = -4.0 * 0.02 * k * k;
