@@ -54,7 +54,8 @@ fn finish(
     }
     let left_out = mesh.leave_out_loose_points()?;
     mesh.check()?;
-    let is_closed = (!mesh.faces.is_empty()).then(|| mesh.is_closed());
+    // What is used as a closed mesh is closed, or refused below; its points may repeat.
+    let is_closed = (!mesh.faces.is_empty()).then(|| is_closed_mesh || mesh.is_closed());
     let faces = FaceContents { faces: mesh.faces.len(), is_closed };
     let triangles = mesh.triangles();
     if triangles.len() as u64 > cloud_file::MOST_TRIANGLES {

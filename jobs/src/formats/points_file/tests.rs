@@ -49,6 +49,23 @@ fn faces_and_normals_of_vtk_are_those_of_a_surface() {
     assert!(found(&tetrahedron(|_| ()), Purpose::Points).unwrap_err().contains("/VTKHDF/PointData/phi"));
 }
 
+/// Of a mesh the area and the volume are told; one that is not closed is refused by its edges.
+#[test]
+fn meshes_are_measured_and_must_be_closed() {
+    let (contents, cloud) = found(&tetrahedron(|_| ()), Purpose::Mesh).unwrap();
+    assert_eq!((contents.normals, cloud.normals.is_none(), cloud.triangles.len()), (None, true, 4));
+    assert!((contents.volume.unwrap() - 1.0 / 6.0).abs() < 1e-15);
+    assert!((contents.area.unwrap() - 1.5 - 0.75_f64.sqrt()).abs() < 1e-14);
+    let open = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
+    let refusal = found(open.as_bytes(), Purpose::Mesh).unwrap_err();
+    assert!(refusal.contains("edge from (1.0000, 0.0000, 0.0000) to (0.0000, 1.0000, 0.0000) is open"), "{refusal}");
+    assert_eq!(refusal.matches("is open").count(), 3, "{refusal}");
+    let (contents, cloud) = found(b"0 0\n2 0\n2 1\n0 1\n", Purpose::Mesh).unwrap();
+    assert_eq!((contents.area, contents.volume, cloud.triangles.len()), (Some(6.0), Some(2.0), 0));
+    let refusal = found(b"0 0\n1 1\n1 0\n0 1\n", Purpose::Mesh).unwrap_err();
+    assert!(refusal.contains("edges 0 and 2 cross"), "{refusal}");
+}
+
 #[test]
 fn strips_and_pieces_are_joined() {
     let (_, cloud) = found(

@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 
 /// Faults of one kind that are named.
 const MOST_NAMED: usize = 5;
+/// Crossings that are counted at most.
+const MOST_COUNTED: usize = 10_000;
 /// Places within this distance of a triangle touch it, relative to the extent of the mesh.
 const TOUCH: f64 = 1e-12;
 
@@ -123,7 +125,7 @@ pub(super) fn check_crossings(
     for (first, corners) in triangles.iter().enumerate() {
         tree.for_each_overlapping(&boxes[first].0, &boxes[first].1, |second| {
             let is_apart = |d: usize| boxes[first].0[d] > boxes[second].1[d] || boxes[second].0[d] > boxes[first].1[d];
-            if second == first || (0..3).any(is_apart) {
+            if second == first || found.len() >= MOST_COUNTED || (0..3).any(is_apart) {
                 return;
             }
             // Each edge against the other triangle; the other way round comes with the other triangle's turn.
