@@ -48,24 +48,24 @@ crate::choice! {
         /// what lies in all of several shapes
         Intersection = "intersection" {
             /// the shapes
-            of: Members;
+            of: Members<KnownShape>;
         }
         /// a shape without the parts that lie in others
         Difference = "difference" {
             /// the shape that parts are taken from
-            from: Member;
+            from: Member<KnownShape>;
             /// the shapes that are taken away
-            minus: Members;
+            minus: Members<KnownShape>;
         }
         /// everything outside a shape
         Complement = "complement" {
             /// the shape
-            of: Member;
+            of: Member<KnownShape>;
         }
         /// a shape that is rotated about the origin, then scaled, then moved
         Transformed = "transformed" {
             /// the shape
-            of: Member;
+            of: Member<KnownShape>;
             /// rotation; none when not given
             rotate: Option<Rotation>;
             /// factor of all lengths
@@ -108,7 +108,7 @@ impl<const D: usize> ShapeSurface<D> {
 impl KnownShape {
     /// The dimension that the shape implies: by its type, else by the length of its vectors.
     pub(super) fn dimension(&self) -> Option<usize> {
-        let of_all = |members: &Members| members.0.iter().find_map(Self::dimension);
+        let of_all = |members: &Members<KnownShape>| members.0.iter().find_map(Self::dimension);
         match self {
             Self::Plain(shape) => shape.dimension(),
             Self::Union { of } => of.iter().find_map(PlainShape::dimension),
@@ -152,7 +152,7 @@ impl KnownShape {
 
     /// Number of plain shapes.
     fn count(&self) -> usize {
-        let of_all = |members: &Members| members.0.iter().map(Self::count).sum::<usize>();
+        let of_all = |members: &Members<KnownShape>| members.0.iter().map(Self::count).sum::<usize>();
         match self {
             Self::Plain(_) | Self::Formula { .. } => 1,
             Self::Union { of } => of.len(),
@@ -233,7 +233,11 @@ fn plain_solid<const D: usize>(shape: &PlainShape, pointer: &str, errors: &mut V
 }
 
 /// The solids of all members; None where errors were found in any.
-fn solids_of<const D: usize>(members: &Members, pointer: &str, errors: &mut Vec<Violation>) -> Option<Vec<Solid<D>>> {
+fn solids_of<const D: usize>(
+    members: &Members<KnownShape>,
+    pointer: &str,
+    errors: &mut Vec<Violation>,
+) -> Option<Vec<Solid<D>>> {
     let all: Vec<Option<Solid<D>>> =
         members.0.iter().enumerate().map(|(k, member)| member.solid::<D>(&format!("{pointer}/{k}"), errors)).collect();
     all.into_iter().collect()

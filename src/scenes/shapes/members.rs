@@ -1,6 +1,5 @@
 //! Shapes within a shape, as parameters.
 
-use super::KnownShape;
 use crate::spec::{Choice, Parameter, Violation, choice};
 use serde_json::{Map, Value, json};
 
@@ -11,14 +10,14 @@ const MOST_MEMBERS: usize = 32;
 
 /// A shape within another one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Member(pub Box<KnownShape>);
+pub struct Member<T>(pub Box<T>);
 
 /// One or several shapes within another one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Members(pub Vec<KnownShape>);
+pub struct Members<T>(pub Vec<T>);
 
 /// A member at a place of the body, unless it is nested too deeply there.
-fn parse(given: &Value, place: &str, errors: &mut Vec<Violation>) -> Option<KnownShape> {
+fn parse<T: Choice>(given: &Value, place: &str, errors: &mut Vec<Violation>) -> Option<T> {
     let depth = place.split('/').filter(|part| ["of", "from", "minus"].contains(part)).count();
     if depth > MOST_DEPTH {
         let detail = "shapes are nested too deeply";
@@ -29,17 +28,17 @@ fn parse(given: &Value, place: &str, errors: &mut Vec<Violation>) -> Option<Know
 }
 
 /// The schema of a member. Shapes may contain shapes, so that it does not repeat the fields of all.
-fn member_schema() -> Map<String, Value> {
+fn member_schema<T: Choice>() -> Map<String, Value> {
     let schema = json!({
         "type": "object",
-        "properties": {"type": {"enum": KnownShape::names()}},
+        "properties": {"type": {"enum": T::names()}},
         "required": ["type"],
         "description": "a shape that is known exactly, with the fields that it has by itself",
     });
     schema.as_object().cloned().unwrap_or_default()
 }
 
-impl Parameter for Member {
+impl<T: Choice> Parameter for Member<T> {
     type Domain = ();
 
     fn any() {}
@@ -49,11 +48,11 @@ impl Parameter for Member {
     }
 
     fn allowed((): ()) -> Value {
-        KnownShape::names().into()
+        T::names().into()
     }
 
     fn schema((): ()) -> Map<String, Value> {
-        member_schema()
+        member_schema::<T>()
     }
 
     fn to_json(&self) -> Value {
@@ -61,7 +60,7 @@ impl Parameter for Member {
     }
 }
 
-impl Parameter for Members {
+impl<T: Choice> Parameter for Members<T> {
     type Domain = ();
 
     fn any() {}
@@ -72,17 +71,17 @@ impl Parameter for Members {
             errors.push(Violation::new(place, "type", detail, given.clone(), Self::allowed(())));
             return None;
         };
-        let members: Vec<Option<KnownShape>> =
+        let members: Vec<Option<T>> =
             list.iter().enumerate().map(|(k, item)| parse(item, &format!("{place}/{k}"), errors)).collect();
         members.into_iter().collect::<Option<Vec<_>>>().map(Self)
     }
 
     fn allowed((): ()) -> Value {
-        json!({"at_least": 1, "at_most": MOST_MEMBERS, "each": KnownShape::names()})
+        json!({"at_least": 1, "at_most": MOST_MEMBERS, "each": T::names()})
     }
 
     fn schema((): ()) -> Map<String, Value> {
-        let schema = json!({"type": "array", "items": member_schema(), "minItems": 1, "maxItems": MOST_MEMBERS});
+        let schema = json!({"type": "array", "items": member_schema::<T>(), "minItems": 1, "maxItems": MOST_MEMBERS});
         schema.as_object().cloned().unwrap_or_default()
     }
 
