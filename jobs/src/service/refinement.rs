@@ -181,7 +181,7 @@ fn make(
         let found = measuring::earlier(store, &body.resolved, &sha256, &plan.quantity, plan.spec.until.relative)?;
         if let Some((job, measured)) = found {
             let source = LevelSource::Earlier { job, measured };
-            store.make_level(study, new_level(&place, source))?;
+            store.make_level(&study.id, study.owner.as_ref(), new_level(&place, source))?;
             return Ok(None);
         }
     }
@@ -191,7 +191,7 @@ fn make(
     }
     let mut job = NewJob::from_body(&body);
     job.retry_of.clone_from(&place.repeats);
-    store.make_level(study, new_level(&place, LevelSource::Job(Box::new(job))))?;
+    store.make_level(&study.id, study.owner.as_ref(), new_level(&place, LevelSource::Job(Box::new(job))))?;
     Ok(None)
 }
 

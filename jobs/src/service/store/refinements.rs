@@ -3,7 +3,7 @@
 //! A level is a row of its own, made in one transaction with its job. What it has come to is kept there, so that neither a restart
 //! nor the deletion of a job changes what the study says.
 
-use super::studies::{PointRow, StudyRow, point_of};
+use super::points::{PointRow, point_of};
 use super::submission::{NewJob, Place, insert};
 use super::transitions::apply;
 use super::{Change, ChangeError, JobRow, Store, StoreError, remove_directory, rows};
@@ -148,27 +148,27 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn make_level(&self, study: &StudyRow, new: NewLevel) -> Result<(), StoreError> {
+    pub fn make_level(&self, study: &str, owner: Option<&String>, new: NewLevel) -> Result<(), StoreError> {
         let NewLevel { number, setup, level, source } = new;
         let prepared = match source {
             LevelSource::Earlier { job, measured } => Err((job, serde_json::to_string(&measured)?)),
             LevelSource::Job(mut job) => {
                 let id = format!("job_{}", self.next_id());
-                job.study = Some((study.id.clone(), number));
-                job.owner.clone_from(&study.owner);
+                job.study = Some((study.to_owned(), number));
+                job.owner = owner.cloned();
                 let start = self.prepare_start(&id, &job)?;
                 Ok((id, job, start))
             }
         };
         let made = self.write(|transaction| -> Result<bool, StoreError> {
-            if !is_open(transaction, &study.id)? {
+            if !is_open(transaction, study)? {
                 return Ok(false);
             }
             let is_new = transaction
                 .prepare_cached(
                     "SELECT NOT EXISTS (SELECT 1 FROM levels WHERE study = ?1 AND number = ?2 AND NOT is_to_repeat)",
                 )?
-                .query_row(params![study.id, number as i64], |row| row.get::<_, bool>(0))?;
+                .query_row(params![study, number as i64], |row| row.get::<_, bool>(0))?;
             if !is_new {
                 return Ok(false);
             }
@@ -177,8 +177,7 @@ impl Store {
                 Ok((id, job, start)) => {
                     // Levels wait no longer than the study does.
                     let clock_s =
-                        transaction
-                            .query_row("SELECT made_s FROM studies WHERE id = ?1", [&study.id], |row| row.get(0))?;
+                        transaction.query_row("SELECT made_s FROM studies WHERE id = ?1", [study], |row| row.get(0))?;
                     insert(transaction, &Place { id, clock_s }, job, start.as_deref())?;
                     (None, None)
                 }
@@ -186,7 +185,7 @@ impl Store {
             transaction.execute(
                 "INSERT OR REPLACE INTO levels (study, number, setup, level, job, is_reused, is_to_repeat, measured)
                  VALUES (?1, ?2, ?3, ?4, ?5, ?6, 0, ?7)",
-                params![study.id, number as i64, setup as i64, level as i64, job, job.is_some(), measured],
+                params![study, number as i64, setup as i64, level as i64, job, job.is_some(), measured],
             )?;
             Ok(true)
         });
@@ -267,11 +266,12 @@ impl Store {
     /// The levels of a study as points of its table.
     pub(super) fn level_points(
         &self,
-        study: &StudyRow,
+        study: &str,
+        axes: &[String],
         after: Option<u64>,
         limit: u64,
     ) -> Result<Vec<PointRow>, StoreError> {
-        let levels = self.levels(&study.id)?.into_iter().filter(|level| after.is_none_or(|after| level.number > after));
+        let levels = self.levels(study)?.into_iter().filter(|level| after.is_none_or(|after| level.number > after));
         let connection = self.read();
         let mut points = Vec::new();
         for level in levels.take(usize::try_from(limit).unwrap_or(usize::MAX)) {
@@ -280,9 +280,9 @@ impl Store {
                     "SELECT ?2 AS study_index, id, state, reason, spec, resolved, usage, progress, estimate, results, health
                      FROM jobs WHERE id = ?1",
                 )?
-                .query_row(params![level.job, level.number as i64], |row| point_of(row, &study.axes))
+                .query_row(params![level.job, level.number as i64], |row| point_of(row, axes))
                 .optional()?;
-            let point = found.or_else(|| Some(deleted_point(study, &level, level.measured.as_ref()?)));
+            let point = found.or_else(|| Some(deleted_point(axes, &level, level.measured.as_ref()?)));
             points.extend(point.map(|point| PointRow { level: Some(level.level), ..point }));
         }
         Ok(points)
@@ -290,14 +290,14 @@ impl Store {
 }
 
 /// The point of a level whose job was deleted.
-fn deleted_point(study: &StudyRow, level: &LevelRow, measured: &MeasuredLevel) -> PointRow {
+fn deleted_point(axes: &[String], level: &LevelRow, measured: &MeasuredLevel) -> PointRow {
     PointRow {
         index: level.number,
         level: Some(level.level),
         job: level.job.clone().unwrap_or_default(),
         state: State::Succeeded,
         reason: None,
-        values: vec![serde_json::Value::Null; study.axes.len()],
+        values: vec![serde_json::Value::Null; axes.len()],
         spacing: Some(measured.spacing),
         spent: [measured.cpu_s, measured.wall_s],
         particles: measured.particles,
