@@ -6,6 +6,7 @@
 
 mod bound;
 mod derivative;
+mod error;
 mod expression;
 mod functions;
 mod grammar;
@@ -15,8 +16,9 @@ mod scanner;
 mod spec;
 
 pub use bound::{Bound, Context, Fault};
+pub use error::FormulaError;
 pub use expression::Graph;
 pub use functions::FUNCTIONS;
-pub use grammar::{FormulaError, MOST_BYTES, Names, check_syntax, why_not_a_name};
+pub use grammar::{MOST_BYTES, Names, check_syntax, why_not_a_name};
 pub use program::{BLOCK, Input, Program, Workspace};
 pub use spec::{Count, FormulaList, FormulaLists, FormulaText, NamedNumbers, constants};

@@ -1,5 +1,6 @@
 //! The grammar of formulas, from weak to strong: `or`, `and`, `not`, comparison, `+ −`, `* /`, sign, `^` (right first).
 
+use super::error::FormulaError;
 use super::expression::{Graph, NodeId};
 use super::functions::{BinaryOp, FUNCTIONS, Function, Meaning, UnaryOp};
 use super::scanner::{Placed, Token, scan};
@@ -13,30 +14,6 @@ const MOST_DEPTH: usize = 100;
 const CONSTANTS: [(&str, f64); 2] = [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)];
 /// Names that are words of the grammar.
 const WORDS: [&str; 3] = ["and", "or", "not"];
-
-/// What is wrong with a formula, and where.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("column {column}: {detail}")]
-pub struct FormulaError {
-    /// Column of the character at fault, counted from 1.
-    pub column: usize,
-    /// What is wrong.
-    pub detail: String,
-    /// What may stand there; empty where it follows from the detail.
-    pub allowed: String,
-    /// A known name that is close to the one given.
-    pub did_you_mean: Option<String>,
-}
-
-impl FormulaError {
-    pub(super) fn new(column: usize, detail: impl Into<String>) -> Self {
-        Self { column, detail: detail.into(), allowed: String::new(), did_you_mean: None }
-    }
-
-    pub(super) fn allowing(self, allowed: impl Into<String>) -> Self {
-        Self { allowed: allowed.into(), ..self }
-    }
-}
 
 /// The names that a formula may use, beside functions and constants.
 #[derive(Debug, Clone, Copy)]

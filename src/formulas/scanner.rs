@@ -1,6 +1,6 @@
 //! From text to tokens, each with its column.
 
-use super::grammar::FormulaError;
+use super::error::FormulaError;
 
 /// A token of a formula.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! Precedence, and places of errors.
 
-use super::{FormulaError, Graph, Names, check_syntax, parse};
+use super::super::error::FormulaError;
+use super::{Graph, Names, check_syntax, parse};
 
 fn value(text: &str) -> f64 {
     let mut graph = Graph::default();

@@ -1,6 +1,7 @@
 //! Motion of one's own: velocities at the start and forces from outside that are given by formulas.
 
-use super::spec::{Droplet, InitialVelocitySpec};
+use super::spec::{Droplet, ForceChoice, InitialVelocitySpec};
+use super::vectors::vector;
 use crate::formulas::{Bound, Context, FormulaList, Input, NamedNumbers};
 use crate::geometry::Vector;
 use crate::schemes::weakly_compressible_sph::{BodyForce, FormulaForce};
@@ -25,8 +26,28 @@ const fn places<const D: usize>() -> &'static [&'static str] {
     if D == 2 { &["x", "y"] } else { &["x", "y", "z"] }
 }
 
+/// The velocity of the frame, the motion of the fluids in it, and the sizes of gravity and of both.
+pub(super) type MotionAtStart<const D: usize> = (Vector<D>, Option<StartMotion>, [f64; 3]);
+
+/// How a scene moves at the start, in a box with a lower corner and lengths; `parts` is the number of its drops.
+pub(super) fn motion_at_start<const D: usize>(
+    spec: &Droplet,
+    parts: Option<usize>,
+    (low, lengths): (&Vector<D>, &Vector<D>),
+    errors: &mut Vec<Violation>,
+) -> MotionAtStart<D> {
+    let gravity = match spec.body_force.as_ref() {
+        Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().map(|g| g * g).sum::<f64>().sqrt(),
+        Some(ForceChoice::Pulse { .. } | ForceChoice::Formula { .. } | ForceChoice::None) | None => 0.0,
+    };
+    let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, errors));
+    let motion = start_motion::<D>(spec, parts, errors);
+    let own_speed = motion.as_ref().map_or(0.0, |motion| motion.top_speed(low, lengths));
+    (velocity, motion, [gravity, velocity.norm(), own_speed])
+}
+
 /// The velocities of a spec; None where it gives none, or where something is wrong with them.
-pub(super) fn start_motion<const D: usize>(
+fn start_motion<const D: usize>(
     spec: &Droplet,
     parts_of_shape: Option<usize>,
     errors: &mut Vec<Violation>,

@@ -6,10 +6,9 @@ use super::flow::{FlowPlan, body_force};
 use super::formulation::{Scope, level_and_curvature, pressures};
 use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave};
 use super::numbers::SceneNumbers;
-use super::own_motion::{StartMotion, start_motion};
+use super::own_motion::{StartMotion, motion_at_start};
 use super::spec::{
-    Corners, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen,
-    TensionWord,
+    Corners, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen, TensionWord,
 };
 use super::start_lattice::StartLattice;
 use super::varying_tension::{StartBox, largest_tension, tension_law};
@@ -176,53 +175,32 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let geometry = geometry(&mut spec, &case, flow.scope, (flow.smoothing_h, smoothing_length), &mut errors);
     let geometry = geometry.map_err(|error| errors.push(error)).ok();
     let tension = *spec.surface_tension.get_or_insert(case.tension);
-    let gravity = match spec.body_force.as_ref() {
-        Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().map(|g| g * g).sum::<f64>().sqrt(),
-        Some(ForceChoice::Pulse { .. } | ForceChoice::Formula { .. } | ForceChoice::None) | None => 0.0,
-    };
-    let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, &mut errors));
-    let parts = shape.as_ref().and_then(|(_, surface, _)| Some(surface.as_ref()?.parts.len()));
-    let motion = start_motion::<D>(&spec, parts, &mut errors);
-    let own_speed = motion.as_ref().map_or(0.0, |motion| motion.top_speed(&low, &lengths));
-    let speeds = [gravity, velocity.norm(), own_speed];
     let surface = shape.as_ref().and_then(|(_, surface, _)| surface.as_ref());
+    let parts = surface.map(|surface| surface.parts.len());
+    let (velocity, motion, speeds) = motion_at_start::<D>(&spec, parts, (&low, &lengths), &mut errors);
     let start = StartBox { shape: shape.as_ref().map(|(shape, ..)| shape), surface, low, lengths };
     let tensions = [tension, tension * largest_tension(&spec, &start)];
     let numbers = SceneNumbers::new(start.radius(), tensions, speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
-    let lengths_of_scheme = (geometry, smoothing_length, expected_speed);
-    let extent = (&low, &lengths, spec.end_time);
-    let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
-    let body_force = body_force(force, &spec.fluids, extent, &mut errors);
-    let mut config = sph_config(&mut spec, &case, &flow, lengths_of_scheme, given_step, &mut errors);
-    config.body_force = body_force;
+    let scheme = (geometry, smoothing_length, expected_speed, (&low, &lengths));
+    let mut config = sph_config(&mut spec, &case, &flow, scheme, given_step, &mut errors);
     config.is_at_rest = motion.is_none();
     config.start_velocity = velocity;
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
     config.wave = shape.as_ref().and_then(|(shape, ..)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
-    if is_box
-        && lattice.count() >= 1.0
-        && let Err(error) = Pencils::<D>::new(&domain_of(&low, &lengths), config.cutoff())
-    {
-        let got = corners.to_json();
-        errors.push(Violation::new("/domain", "range", error.to_string(), got, error.least));
+    if is_box && lattice.count() >= 1.0 {
+        errors.extend(check_cutoff(&domain_of(&low, &lengths), &config, &corners));
     }
     numbers.check_sound_speeds(&spec, &mut errors);
     dimensionless::complete(&mut spec, &numbers, &mut errors);
     let Some((shape, surface, points)) = shape.filter(|_| errors.is_empty()) else {
         return Err(errors);
     };
-    let mut chosen = BTreeMap::new();
-    if config.is_adaptive {
-        let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {expected_speed:.4}");
-        chosen.insert("time_step", why);
-    }
+    let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {expected_speed:.4}");
+    let chosen = config.is_adaptive.then_some(("time_step", why)).into_iter().collect();
     spec.dimension = Some(D);
-    if spec.steps.is_none() {
-        spec.time_step = given_step;
-    }
-    let clouds = points.into_iter().collect();
+    spec.time_step = if spec.steps.is_none() { given_step } else { spec.time_step };
     Ok(Box::new(DropletScene {
         spec,
         shape,
@@ -236,19 +214,30 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         time_step,
         steps,
         chosen,
-        clouds,
+        clouds: points.into_iter().collect(),
     }))
 }
+
+/// An error where neighbors reach around the box.
+fn check_cutoff<const D: usize>(domain: &Domain<D>, config: &SphConfig<D>, corners: &Corners) -> Option<Violation> {
+    let error = Pencils::<D>::new(domain, config.cutoff()).err()?;
+    Some(Violation::new("/domain", "range", error.to_string(), corners.to_json(), error.least))
+}
+
+/// Geometry, smoothing length, expected speed, and the box by its lower corner and lengths.
+type SchemeParts<'a, const D: usize> = (Option<Geometry>, f64, f64, (&'a Vector<D>, &'a Vector<D>));
 
 /// What the scheme is made of; the spec gets what was left open.
 fn sph_config<const D: usize>(
     spec: &mut Droplet,
     case: &Case,
     flow: &FlowPlan,
-    (geometry, smoothing_length, expected_speed): (Option<Geometry>, f64, f64),
+    (geometry, smoothing_length, expected_speed, (low, lengths)): SchemeParts<'_, D>,
     given_step: Option<f64>,
     errors: &mut Vec<Violation>,
 ) -> SphConfig<D> {
+    let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
+    let body_force = body_force(force, &spec.fluids, (low, lengths, spec.end_time), errors);
     let pressure = pressures(spec, flow.scope, errors);
     SphConfig {
         spacing: spec.spacing,
@@ -267,7 +256,7 @@ fn sph_config<const D: usize>(
         discretization: flow.discretization,
         density: flow.density,
         is_shifted: *spec.shifting.get_or_insert(flow.default_shifting) == Shifting::Pst,
-        body_force: None,
+        body_force,
         integrator: match spec.integrator {
             IntegratorWord::KickDriftKick => Integrator::KickDriftKick,
             IntegratorWord::PredictorCorrector => Integrator::PredictorCorrector,

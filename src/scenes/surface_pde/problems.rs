@@ -98,19 +98,17 @@ pub(super) fn plan(
         }
         ProblemSpec::Poisson { field, source, condition } => {
             check_poisson(shape, *condition, name, errors);
-            let has_source = source.is_some();
             check_source(field.as_ref(), source.as_ref(), *condition, errors);
-            let field = match source {
-                Some(source) => site("/problem/source").field(source, errors),
-                None => site("/problem/field").field(field.get_or_insert_with(|| default_field(shape)), errors),
+            let is_dirichlet = *condition == ConditionWord::Dirichlet;
+            let (field, has_source) = match source {
+                Some(source) => (site("/problem/source").field(source, errors), true),
+                None => (site(FIELD).field(field.get_or_insert_with(|| default_field(shape)), errors), false),
             };
-            ProblemChoice::Poisson { field, has_source, is_dirichlet: *condition == ConditionWord::Dirichlet, solver }
+            ProblemChoice::Poisson { field, has_source, is_dirichlet, solver }
         }
         ProblemSpec::Diffusion { initial, source, parameters, end_time, time_step, integrator, .. } => {
-            let source = source.as_ref().and_then(|source| {
-                let field = FormulaField::new(source, parameters, "/problem", "source");
-                field.map(Arc::new).map_err(|found| errors.extend(found)).ok()
-            });
+            let source = source.as_ref().map(|source| FormulaField::new(source, parameters, "/problem", "source"));
+            let source = source.and_then(|field| field.map(Arc::new).map_err(|found| errors.extend(found)).ok());
             let start = Start::Field(start(site("/problem/initial"), initial, errors), source);
             let integrator = match integrator.get_or_insert_with(|| default_integrator(shape)) {
                 EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
@@ -126,6 +124,28 @@ pub(super) fn plan(
         ProblemSpec::GeodesicDistance { from } => {
             ProblemChoice::GeodesicDistance { from: from.as_ref().map(|from| places(from, shape, errors)) }
         }
+        ProblemSpec::MovingDiffusion { .. } | ProblemSpec::Advection { .. } => {
+            transport(&mut spec.problem, shape, count, errors)?
+        }
+        ProblemSpec::Curvature => ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights },
+        ProblemSpec::ReactionDiffusion { end_time, time_step, tolerance, .. } => {
+            let (end_time, integrator) = (*end_time, explicit(*tolerance, *time_step));
+            let time_step = time_step.unwrap_or(end_time / DEFAULT_STEPS);
+            let start = starts::reaction(site("/problem/manufactured"), &mut spec.problem, errors)?;
+            ProblemChoice::Evolution { start, end_time, time_step, integrator }
+        }
+    })
+}
+
+/// Plans what is carried by a motion of the surface, or by a velocity on it.
+fn transport(
+    problem: &mut ProblemSpec,
+    shape: &Shape,
+    count: u64,
+    errors: &mut Vec<Violation>,
+) -> Option<ProblemChoice> {
+    let site = |pointer| Site { pointer, shape, count };
+    Some(match problem {
         ProblemSpec::MovingDiffusion { initial, motion, diffusivity, end_time, time_step } => ProblemChoice::Moving {
             initial: start(site("/problem/initial"), initial, errors),
             motion: motions::plan(motion, shape, *end_time, errors),
@@ -140,13 +160,7 @@ pub(super) fn plan(
             end_time: *end_time,
             time_step: time_step.unwrap_or(*end_time / DEFAULT_STEPS),
         },
-        ProblemSpec::Curvature => ProblemChoice::Curvature { of_heights: metric == Metric::FromHeights },
-        ProblemSpec::ReactionDiffusion { end_time, time_step, tolerance, .. } => {
-            let (end_time, integrator) = (*end_time, explicit(*tolerance, *time_step));
-            let time_step = time_step.unwrap_or(end_time / DEFAULT_STEPS);
-            let start = starts::reaction(site("/problem/manufactured"), &mut spec.problem, errors)?;
-            ProblemChoice::Evolution { start, end_time, time_step, integrator }
-        }
+        _ => return None,
     })
 }
 
@@ -323,20 +337,7 @@ impl ProblemChoice {
             Self::GeodesicDistance { from } => Box::new(distance(from.as_deref(), shape, cloud)),
             Self::Curvature { of_heights } => Box::new(Curvature::new(cloud.rows, *of_heights)),
             Self::Poisson { field, has_source, is_dirichlet, solver } => {
-                let values = values(field, cloud, if *has_source { "/problem/source" } else { FIELD })?;
-                let condition = if !cloud.held.is_empty() {
-                    Condition::Dirichlet(cloud.held.clone())
-                } else if *is_dirichlet {
-                    Condition::Dirichlet(held(shape, cloud).into_iter().map(|i| (i, values[i])).collect())
-                } else {
-                    Condition::ZeroMean { alpha: shape.least_eigenvalue() }
-                };
-                let operated = if *has_source { None } else { operated(field, shape, cloud) };
-                let (right, exact) = match operated {
-                    Some(operated) => (operated, Some(values)),
-                    None => (values, None),
-                };
-                Box::new(Poisson::new(right, exact, condition, *solver, cloud))
+                Box::new(poisson((field, *has_source, *is_dirichlet, *solver), shape, cloud)?)
             }
             Self::Evolution { start, integrator, .. } => {
                 let (initial, reaction, exact) = begin(start, shape, cloud, seed)?;
@@ -352,6 +353,28 @@ impl ProblemChoice {
             }
         })
     }
+}
+
+/// A Poisson equation: its field or source, the condition and the solver.
+fn poisson<const D: usize>(
+    (field, has_source, is_dirichlet, solver): (&ExactField, bool, bool, Solver),
+    shape: &Shape,
+    cloud: &SurfaceCloud<D>,
+) -> Result<Poisson, Vec<Violation>> {
+    let values = values(field, cloud, if has_source { "/problem/source" } else { FIELD })?;
+    let condition = if !cloud.held.is_empty() {
+        Condition::Dirichlet(cloud.held.clone())
+    } else if is_dirichlet {
+        Condition::Dirichlet(held(shape, cloud).into_iter().map(|i| (i, values[i])).collect())
+    } else {
+        Condition::ZeroMean { alpha: shape.least_eigenvalue() }
+    };
+    let operated = if has_source { None } else { operated(field, shape, cloud) };
+    let (right, exact) = match operated {
+        Some(operated) => (operated, Some(values)),
+        None => (values, None),
+    };
+    Ok(Poisson::new(right, exact, condition, solver, cloud))
 }
 
 /// Refuses a field that is zero at all points, as one that misses the surface.

@@ -159,6 +159,9 @@ impl<const D: usize> PatchSet<D> {
     }
 }
 
+/// Points that are closer to each other than this share of their distance are the same one.
+const SAME_POINT: f64 = 1e-5;
+
 /// The distance of `x` from the medial axis to first order, by its local closest points, the closest first.
 ///
 /// Between two of them the axis lies where the distances agree: (d₂ − d₁)/|∇d₂ − ∇d₁| away. It ends at centers of curvature,
@@ -171,8 +174,9 @@ pub(in crate::geometry::surfaces) fn medial_distance<const D: usize>(x: &Vector<
         if turn > 0.0 && turn.is_finite() { first.foot.stretch * first.distance / turn } else { f64::INFINITY };
     feet[1..].iter().fold(center.max(0.0), |least, other| {
         let apart = (direction(other) - direction(first)).norm();
-        // The same point, found from another patch.
-        if (other.foot.point - first.foot.point).norm() <= 1e-9 * (1.0 + first.distance) || apart <= 0.0 {
+        // The same point, found from another patch: by distances alone a point is told to half the digits.
+        let same = SAME_POINT * first.distance + 1e-12 * x.amax();
+        if (other.foot.point - first.foot.point).norm() <= same || apart <= 0.0 {
             return least;
         }
         least.min((other.distance - first.distance) / apart)
