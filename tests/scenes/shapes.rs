@@ -96,7 +96,7 @@ fn every_kind_of_scene_takes_a_mesh() {
         json!({"kind": "front", "spacing": 0.06, "end_time": 0.001, "law": "mean_curvature", "shape": mesh}),
         json!({
             "kind": "droplet", "case": "custom", "spacing": 0.1, "end_time": 0.002, "steps": 2, "shape": mesh,
-            "domain": {"low": [0, 0, 0], "high": [1, 1, 1]}, "allow_soft": true
+            "domain": {"low": [-0.2, -0.2, -0.2], "high": [1.2, 1.2, 1.2]}, "allow_soft": true
         }),
     ] {
         let report = finished(&body, &cloud);
