@@ -21,4 +21,4 @@ pub use expression::Graph;
 pub use functions::FUNCTIONS;
 pub use grammar::{MOST_BYTES, Names, check_syntax, why_not_a_name};
 pub use program::{BLOCK, Input, Program, Workspace};
-pub use spec::{Count, FormulaList, FormulaLists, FormulaText, NamedNumbers, constants};
+pub use spec::{FormulaList, FormulaLists, FormulaText, NamedNumbers, constants};

@@ -239,7 +239,7 @@ mod tests {
         (0..total).map(place).filter(|x| x.amax() <= 1.0).collect()
     }
 
-    /// Share of the crossed patches whose stretch lies within a factor of 1.5 of the expected one, in space 2, and whether
+    /// Share of the crossed patches whose stretch lies within a factor of 1.5 of the expected one, and whether
     /// the cloud is stretched. Small moves take pairs across corners out of the graph at random, which favors the stretch.
     fn share<const D: usize>(spacings: Vector<D>, angle: f64, jitter: f64) -> (f64, bool) {
         let points = lattice(spacings, angle, jitter);
@@ -253,8 +253,7 @@ mod tests {
         let expected = spacings.max() / spacings.min();
         let is_right = |patch: &&usize| {
             let ratio = metric.map(**patch).stretch() / expected;
-            let factor = if D == 2 { 1.5 } else { 2.0 };
-            (1.0 / factor..=factor).contains(&ratio)
+            (1.0 / 1.5..=1.5).contains(&ratio)
         };
         (metric.crossed.iter().filter(is_right).count() as f64 / metric.crossed.len() as f64, is_stretched)
     }

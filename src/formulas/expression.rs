@@ -64,7 +64,7 @@ impl Graph {
     }
 
     /// A function of two terms. Sums with 0, products with 0 and 1, and powers with whole exponents are simplified; so 0
-    /// times a term is 0 wherever the term is defined or not.
+    /// times a term is 0, also where the term has no value.
     pub fn binary(&mut self, op: BinaryOp, a: NodeId, b: NodeId) -> NodeId {
         match (op, self.constant_at(a), self.constant_at(b)) {
             (_, Some(x), Some(y)) => self.constant(op.apply(x, y)),

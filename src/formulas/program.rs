@@ -53,7 +53,7 @@ impl Program {
         for output in outputs {
             is_needed[*output] = true;
         }
-        for id in (0..nodes.len()).rev().filter(|id| *id < nodes.len()) {
+        for id in (0..nodes.len()).rev() {
             if is_needed[id] {
                 for argument in arguments(nodes[id]).into_iter().flatten() {
                     is_needed[argument] = true;

@@ -1,7 +1,7 @@
 //! Formulas and their named numbers as declared parameters.
 
 use super::grammar::{MOST_BYTES, check_syntax, why_not_a_parameter};
-use crate::spec::{Object, Parameter, Violation};
+use crate::spec::{Listed, Object, Parameter, Violation};
 use serde_json::{Value, json};
 
 /// The text of a formula; a number stands for itself.
@@ -131,12 +131,10 @@ impl Parameter for NamedNumbers {
 }
 
 /// A list of formulas: the components of a vector, or one for each of several quantities.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct FormulaList(pub Vec<FormulaText>);
+pub type FormulaList = Listed<FormulaText>;
 
-/// The least and the largest number of formulas in a list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Count(pub usize, pub usize);
+/// Lists of formulas: a vector for each of several things.
+pub type FormulaLists = Listed<FormulaList>;
 
 impl<const N: usize> From<[&str; N]> for FormulaList {
     fn from(texts: [&str; N]) -> Self {
@@ -166,85 +164,5 @@ impl FormulaList {
         }
         let detail = format!("a vector has {D} components in a scene of {D} dimensions, here are {found}");
         Err(Violation::new(format!("{pointer}/{name}"), "conflict", detail, found, json!(format!("{D} formulas"))))
-    }
-}
-
-impl Parameter for FormulaList {
-    type Domain = Count;
-
-    fn any() -> Count {
-        Count(1, usize::MAX)
-    }
-
-    fn parse(given: &Value, Count(least, most): Count, place: &str, errors: &mut Vec<Violation>) -> Option<Self> {
-        let Some(list) = given.as_array().filter(|list| (least..=most).contains(&list.len())) else {
-            let detail = "a list of formulas is needed";
-            errors.push(Violation::new(place, "type", detail, given.clone(), Self::allowed(Count(least, most))));
-            return None;
-        };
-        let formulas: Vec<Option<FormulaText>> = list
-            .iter()
-            .enumerate()
-            .map(|(k, item)| FormulaText::parse(item, (), &format!("{place}/{k}"), errors))
-            .collect();
-        formulas.into_iter().collect::<Option<_>>().map(Self)
-    }
-
-    fn allowed(Count(least, most): Count) -> Value {
-        let number = if least == most { format!("{least}") } else { format!("{least} to {most}") };
-        json!(format!("a list of {number} formulas"))
-    }
-
-    fn schema(Count(least, most): Count) -> Object {
-        let mut schema = Object::from_iter([("type".to_owned(), json!("array"))]);
-        schema.insert("items".into(), Value::Object(FormulaText::schema(())));
-        schema.insert("minItems".into(), json!(least));
-        if most != usize::MAX {
-            schema.insert("maxItems".into(), json!(most));
-        }
-        schema
-    }
-
-    fn to_json(&self) -> Value {
-        self.0.iter().map(Parameter::to_json).collect()
-    }
-}
-
-/// Lists of formulas: a vector for each of several things.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct FormulaLists(pub Vec<FormulaList>);
-
-impl Parameter for FormulaLists {
-    type Domain = ();
-
-    fn any() {}
-
-    fn parse(given: &Value, (): (), place: &str, errors: &mut Vec<Violation>) -> Option<Self> {
-        let Some(lists) = given.as_array().filter(|lists| !lists.is_empty()) else {
-            let detail = "a list of lists of formulas is needed";
-            errors.push(Violation::new(place, "type", detail, given.clone(), Self::allowed(())));
-            return None;
-        };
-        let lists: Vec<Option<FormulaList>> = lists
-            .iter()
-            .enumerate()
-            .map(|(k, list)| FormulaList::parse(list, FormulaList::any(), &format!("{place}/{k}"), errors))
-            .collect();
-        lists.into_iter().collect::<Option<_>>().map(Self)
-    }
-
-    fn allowed((): ()) -> Value {
-        json!("a list with a list of formulas for each")
-    }
-
-    fn schema((): ()) -> Object {
-        let mut schema = Object::from_iter([("type".to_owned(), json!("array"))]);
-        schema.insert("items".into(), Value::Object(FormulaList::schema(FormulaList::any())));
-        schema.insert("minItems".into(), json!(1));
-        schema
-    }
-
-    fn to_json(&self) -> Value {
-        self.0.iter().map(Parameter::to_json).collect()
     }
 }

@@ -16,8 +16,8 @@ pub use vortex_3d::Vortex3d;
 
 use super::Vector;
 use super::dimension::in_dimension;
-use crate::formulas::{Count, FormulaList, NamedNumbers, constants};
-use crate::spec::{Choice, Coordinates, POSITIVE, Parameter, Violation};
+use crate::formulas::{FormulaList, NamedNumbers, constants};
+use crate::spec::{Choice, Coordinates, Items, POSITIVE, Parameter, Violation};
 use serde_json::json;
 
 /// How many times longer (or larger) a flow makes a front, relative to the front at time 0.
@@ -69,8 +69,9 @@ pub trait Flow<const D: usize>: Send + Sync {
     /// steps.
     fn top_speed(&self, low: &Vector<D>, high: &Vector<D>) -> f64;
 
-    /// Whether the flow has no divergence, so that it keeps the area or volume inside a surface.
-    fn keeps_volume(&self) -> bool {
+    /// Whether the flow has no divergence where points from the box from `low` to `high` come, so that it keeps the area or volume
+    /// inside a surface there.
+    fn keeps_volume(&self, _low: &Vector<D>, _high: &Vector<D>) -> bool {
         false
     }
 
@@ -131,7 +132,7 @@ crate::choice! {
         /// a flow of one's own: formulas of x, y, z and t
         Formula = "formula" {
             /// the components of the velocity
-            velocity: FormulaList, in Count(2, 3);
+            velocity: FormulaList, in Items(2, 3, ());
             /// numbers that the formulas call by name
             parameters: NamedNumbers = constants();
             /// time after which every point is back at its start; null where none is

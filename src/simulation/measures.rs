@@ -119,6 +119,9 @@ pub struct Measures {
 
 /// Neighbors of a place that a probe looks at, in the plane and in space.
 const NEIGHBORS: [usize; 2] = [12, 24];
+/// Distance of a place from the nearest point, by that of the farthest neighbor, beyond which it lies outside: among points it is
+/// a third at most.
+const FARTHEST: f64 = 0.6;
 /// Singular values below this share of the largest stand for directions without points, as across a surface.
 const FLAT: f64 = 1e-6;
 
@@ -247,7 +250,7 @@ fn component(fields: &Fields<'_>, name: &str) -> Option<Vec<f64>> {
 }
 
 /// A linear fit, with weights that vanish at the farthest neighbor, to the values next to a place. The fit has the least slope
-/// that the points ask for, so that points of a surface need none across it.
+/// that the points ask for, so that points of a surface need none across it. NaN away from all points: there is no field.
 fn at_place(tree: &KdTree<3>, places: &[Vector<3>], values: &[f64], place: &[f64; 3], is_plane: bool) -> f64 {
     let x = Vector::<3>::from_column_slice(place);
     let mut found = Vec::new();
@@ -256,6 +259,9 @@ fn at_place(tree: &KdTree<3>, places: &[Vector<3>], values: &[f64], place: &[f64
     let distance = |i: usize| (places[i] - x).norm();
     let Some(&nearest) = near.first() else { return f64::NAN };
     let reach = near.iter().map(|i| distance(*i)).fold(0.0, f64::max) * 1.001;
+    if distance(nearest) > FARTHEST * reach {
+        return f64::NAN;
+    }
     if near.len() < 4 || reach == 0.0 {
         return values[nearest];
     }
@@ -302,6 +308,8 @@ mod tests {
         let values: Vec<f64> = plane.iter().map(|x| 2.0 - 3.0 * x[0] + x[1]).collect();
         let found = at_place(&KdTree::new(&plane), &plane, &values, &[0.43, 0.51, 0.0], true);
         assert!((found - (2.0 - 1.29 + 0.51)).abs() < 1e-12, "{found}");
+        let away = at_place(&KdTree::new(&plane), &plane, &values, &[3.0, 0.5, 0.0], true);
+        assert!(away.is_nan(), "{away}");
         let tilted: Vec<Vector<3>> = plane.iter().map(|x| Vector::<3>::new(x[0], x[1], x[0] + 0.5)).collect();
         let found = at_place(&KdTree::new(&tilted), &tilted, &values, &[0.43, 0.51, 0.93], false);
         assert!((found - (2.0 - 1.29 + 0.51)).abs() < 1e-9, "{found}");

@@ -191,6 +191,11 @@ fn everything_wrong_with_a_refinement_is_named_at_once() {
     ] {
         assert!(found.iter().any(|at| at == pointer), "{pointer}: {found:?}");
     }
+    assert_eq!(
+        meaning(json!({"until": {"tolerance": 1e-3, "relative": true}})),
+        ["/sweep/until/relative"],
+        "of phi.rms no size is known"
+    );
     assert_eq!(meaning(json!({"axis": "/scene/jitter", "from": 0.4})), ["/sweep/axis"], "it is no spacing");
     assert_eq!(
         meaning(json!({"alternatives": {"/scene/method/degree": [3, 99]}})),

@@ -31,15 +31,11 @@ pub fn read(
     let results = RunResults { report: &report, report_json: &report_json, series: &series };
     let value = quantity_reader::read(quantity, &results)?;
     let scale = if is_relative { quantity_reader::scale(quantity, &report)? } else { 1.0 };
-    let theory = match quantity {
-        Quantity::Error { quantity, norm, .. } => scene.order(quantity, norm),
-        Quantity::Series { .. } | Quantity::Report { .. } => None,
-    };
     let level = MeasuredLevel {
         spacing: scene.spacing().ok_or("the spacing of the scene is not known")?,
         value,
         scale,
-        theory,
+        theory: quantity.order(scene),
         cpu_s: report.cost.cpu_s,
         forecast_cpu_s: None,
         wall_s: report.cost.wall_s,

@@ -42,7 +42,9 @@ pub fn read(quantity: &Quantity, results: &RunResults) -> Result<f64, String> {
 pub fn scale(quantity: &Quantity, report: &RunReport) -> Result<f64, String> {
     match quantity {
         Quantity::Error { quantity: name, .. } if !quantity.is_share() => {
-            let mean = report.error(name, "mean", None).map(|entry| entry.value.abs()).filter(|size| *size > 0.0);
+            let has_mean = quantity.has_size();
+            let mean =
+                report.error(name, "mean", None).map(|entry| entry.value.abs()).filter(|size| has_mean && *size > 0.0);
             mean.ok_or_else(|| {
                 format!(
                     "the report has no mean of {name} by which its error could be divided; give an absolute tolerance"

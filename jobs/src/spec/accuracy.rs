@@ -52,7 +52,8 @@ impl Wanted {
             let detail = format!("accuracy lets the service choose {name}; give one of them");
             errors.push(Violation::new(format!("/scene{axis}"), "conflict", detail, value.clone(), Value::Null));
         }
-        spec.quantity.resolve(Some(kind), "/accuracy/quantity", errors);
+        let quantity = spec.quantity.resolve(Some(kind), "/accuracy/quantity", errors);
+        errors.extend(quantity.and_then(|quantity| quantity.check_relative(spec.relative, "/accuracy/relative")));
         Some(Self { spec, axis })
     }
 

@@ -13,6 +13,8 @@ use std::collections::BTreeSet;
 
 /// Probes and measures of a run at most.
 pub const MOST_MEASURES: usize = 64;
+/// Letters of a name at most.
+const LONGEST_NAME: usize = 64;
 /// Columns of probes at most.
 const MOST_PLACES: usize = 1000;
 
@@ -122,9 +124,10 @@ impl OwnMeasures<'_> {
         for (list, names) in lists {
             let mut seen = BTreeSet::new();
             for (k, name) in names.into_iter().enumerate() {
-                let is_plain = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') && name.len() <= 64;
+                let is_plain = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+                    && (1..=LONGEST_NAME).contains(&name.len());
                 let reason = match (is_plain, seen.insert(name.clone())) {
-                    (false, _) => "a name has letters, digits and _, 64 of them at most",
+                    (false, _) => "a name has letters, digits and _, at least one and 64 at most",
                     (true, false) => "the name is given twice",
                     (true, true) => continue,
                 };

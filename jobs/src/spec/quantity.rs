@@ -1,12 +1,15 @@
 //! The one number of a run that a study or an accuracy is about: an error of its report, a number of its series, or any number of
 //! its report.
 
-use meniscus::scene::SceneKind;
+use meniscus::scene::{Scene, SceneKind};
 use meniscus::spec::{Json, NOT_NEGATIVE, Violation, Word, suggest};
 use serde_json::{Value, json};
 
 /// Norms of errors that are shares of the exact answer already.
 const NORMS_OF_SHARES: [&str; 3] = ["relative", "max_relative", "of_measure"];
+
+/// Norms of errors of the quantity's own mean, by which they can be divided. The `mean` of other quantities is one of errors.
+const NORMS_OF_MEANS: [&str; 3] = ["mean_error", "std", "std_least"];
 
 /// Beginnings of the observables that a body declares itself (`output.probes`, `output.measures`).
 const OWN_OBSERVABLES: [&str; 2] = ["probe.", "measure."];
@@ -162,6 +165,35 @@ impl Quantity {
     #[must_use]
     pub fn is_share(&self) -> bool {
         matches!(self, Self::Error { norm, .. } if NORMS_OF_SHARES.contains(&norm.as_str()))
+    }
+
+    /// Whether a tolerance can be a share of it: values, shares, and errors of a mean.
+    #[must_use]
+    pub fn has_size(&self) -> bool {
+        match self {
+            Self::Error { norm, .. } => self.is_share() || NORMS_OF_MEANS.contains(&norm.as_str()),
+            Self::Series { .. } | Self::Report { .. } => true,
+        }
+    }
+
+    /// What is wrong with a tolerance that is a share of it.
+    #[must_use]
+    pub fn check_relative(&self, is_relative: bool, place: &str) -> Option<Violation> {
+        if !is_relative || self.has_size() {
+            return None;
+        }
+        let detail = format!(
+            "reports have no size of the exact answer that {} could be a share of; give an absolute tolerance, or a norm that is a share",
+            self.label()
+        );
+        Some(Violation::new(place, "conflict", detail, true, json!({"norms": NORMS_OF_SHARES})))
+    }
+
+    /// Order p of its error ~ spacingᵖ that theory gives for a scene; None where none is known.
+    #[must_use]
+    pub fn order(&self, scene: &dyn Scene) -> Option<f64> {
+        let Self::Error { quantity, norm, .. } = self else { return None };
+        scene.order(quantity, norm)
     }
 
     /// The quantity, as charts and messages name it.

@@ -41,9 +41,9 @@ group! {
         /// the operators that a scene makes, as files of this format
         operators: Option<OperatorFormat> => restart_safe;
         /// fields at places in the series
-        probes: Option<Listed<ProbeSpec>>, in Items(0, MOST_MEASURES) => restart_safe;
+        probes: Option<Listed<ProbeSpec>>, in Items(0, MOST_MEASURES, ()) => restart_safe;
         /// integrals, means and extremes of formulas of fields in the series
-        measures: Option<Listed<MeasureSpec>>, in Items(0, MOST_MEASURES) => restart_safe;
+        measures: Option<Listed<MeasureSpec>>, in Items(0, MOST_MEASURES, ()) => restart_safe;
         /// a series row every so many steps
         series_every_steps: u64 = 10, in whole(1, u64::MAX) => restart_safe;
     }

@@ -4,7 +4,6 @@ use crate::formats::quantity_reader::{self, RunResults};
 use crate::spec::accuracy::{ChosenAccuracy, KnownLevel, Reached};
 use crate::spec::attempt_files;
 use crate::spec::health::FindingLog;
-use crate::spec::quantity::Quantity;
 use crate::spec::report::RunReport;
 use crate::worker::observers::Observers;
 use meniscus::scene::Scene;
@@ -49,10 +48,7 @@ fn judge(chosen: &ChosenAccuracy, report: &RunReport, series: &str, scene: &dyn 
     let report_json = serde_json::to_value(report).map_err(|error| error.to_string())?;
     let value = quantity_reader::read(&quantity, &RunResults { report, report_json: &report_json, series })?;
     let scale = if chosen.relative { quantity_reader::scale(&quantity, report)? } else { 1.0 };
-    let theory = match &quantity {
-        Quantity::Error { quantity, norm, .. } => scene.order(quantity, norm),
-        Quantity::Series { .. } | Quantity::Report { .. } => None,
-    };
+    let theory = quantity.order(scene);
     let spacing = scene.spacing().ok_or("the spacing of the scene is not known")?;
     Ok(chosen.reached(KnownLevel { spacing, value, cpu_s: report.cost.cpu_s }, scale, theory))
 }

@@ -20,7 +20,7 @@ impl<const D: usize> Flow<D> for Rotation<D> {
         u
     }
 
-    fn keeps_volume(&self) -> bool {
+    fn keeps_volume(&self, _low: &Vector<D>, _high: &Vector<D>) -> bool {
         true
     }
 

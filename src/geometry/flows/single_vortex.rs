@@ -20,7 +20,7 @@ impl Flow<2> for SingleVortex {
         Vector::<2>::new(-0.5 * strength * (1.0 - cos_x) * sin_y, 0.5 * strength * (1.0 - cos_y) * sin_x)
     }
 
-    fn keeps_volume(&self) -> bool {
+    fn keeps_volume(&self, _low: &Vector<2>, _high: &Vector<2>) -> bool {
         true
     }
 

@@ -14,7 +14,7 @@ impl<const D: usize> Flow<D> for Translation<D> {
         self.velocity
     }
 
-    fn keeps_volume(&self) -> bool {
+    fn keeps_volume(&self, _low: &Vector<D>, _high: &Vector<D>) -> bool {
         true
     }
 

@@ -20,7 +20,7 @@ impl Flow<3> for Vortex3d {
         Vector::<3>::new((1.0 - cx) * sy * sz, -0.5 * sx * (1.0 - cy) * sz, -0.5 * sx * sy * (1.0 - cz)) * strength
     }
 
-    fn keeps_volume(&self) -> bool {
+    fn keeps_volume(&self, _low: &Vector<3>, _high: &Vector<3>) -> bool {
         true
     }
 

@@ -12,7 +12,8 @@ use super::distance_level::DistanceLevel;
 use super::sampled::line_volume::line_volume;
 use super::sampled::{Found, LocalFoot, Patch, PatchSet, local_foot, medial_distance, radius_in_ball};
 use super::{Solid, Surface, SurfacePoint, Vector};
-use crate::geometry::level::{LevelFunction, LevelJet};
+use crate::geometry::block::indices;
+use crate::geometry::level::{Hessian, LevelFunction, LevelJet};
 use std::sync::{Arc, OnceLock};
 use tree::Node;
 
@@ -105,12 +106,8 @@ impl<const D: usize> Composed<D> {
         let counts: [usize; D] = std::array::from_fn(|d| (sides[d] / edge + 0.5).ceil() as usize + 1);
         let all: Vec<u32> = (0..found.faces.len() as u32).collect();
         for k in 0..counts.iter().product::<usize>() {
-            let mut rest = k;
-            let center = Vector::<D>::from_fn(|d, _| {
-                let index = rest % counts[d];
-                rest /= counts[d];
-                corners.0[d] + (index as f64 + 0.5 - 0.339) * edge
-            });
+            let cell = indices(k, &counts);
+            let center = Vector::<D>::from_fn(|d, _| corners.0[d] + (cell[d] as f64 + 0.5 - 0.339) * edge);
             found.add_patches(&center, 0.5 * edge, 0, &all, &mut patches);
         }
         if !patches.iter().any(|patch| patch.is_on_surface) {
@@ -248,7 +245,7 @@ impl<const D: usize> Composed<D> {
 
     /// The closest point by patches, and other local ones at most `margin` farther away.
     fn feet(&self, x: &Vector<D>, margin: f64) -> Vec<Found<D>> {
-        let solve = |patch: &Patch<D>| {
+        let solve = |patch: &Patch<D>, _: bool| {
             if patch.count == D {
                 return Some(LocalFoot { point: patch.seed, stretch: f64::INFINITY, is_smooth: true });
             }
@@ -297,7 +294,7 @@ impl<const D: usize> Surface<D> for Composed<D> {
         };
         let feet = self.feet(x, 0.0);
         let Some(first) = feet.first() else {
-            return SurfacePoint { distance: level, point: *x, normal: None, curvature: None };
+            return SurfacePoint { distance: f64::NAN, point: *x, normal: None, curvature: None };
         };
         let nothing = SurfacePoint {
             distance: first.distance.copysign(level),
@@ -362,8 +359,8 @@ fn for_each_choice(most: usize, count: usize, mut visit: impl FnMut(&[usize])) {
 }
 
 /// Projection to the span of the normals of levels.
-fn projection<const D: usize>(jets: &[LevelJet<D>]) -> crate::geometry::level::Hessian<D> {
-    let mut whole = crate::geometry::level::Hessian::<D>::zeros();
+fn projection<const D: usize>(jets: &[LevelJet<D>]) -> Hessian<D> {
+    let mut whole = Hessian::<D>::zeros();
     for jet in jets {
         let normal = jet.normal();
         let rest = normal - whole * normal;

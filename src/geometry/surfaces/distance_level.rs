@@ -1,6 +1,6 @@
 //! The distance from a smooth surface as a level function, for closest points on parts of the surface.
 
-use super::{Surface, Vector};
+use super::{Surface, SurfacePoint, Vector};
 use crate::geometry::level::{Hessian, LevelFunction, LevelJet};
 use std::sync::Arc;
 
@@ -24,9 +24,12 @@ impl<const D: usize> DistanceLevel<D> {
 
     /// The gradient of the distance: the normal, or at an edge the way from it.
     fn gradient(&self, x: &Vector<D>) -> Vector<D> {
-        let answer = self.surface.nearest(x);
-        answer.normal.unwrap_or_else(|| (x - answer.point) / answer.distance)
+        gradient(x, &self.surface.nearest(x))
     }
+}
+
+fn gradient<const D: usize>(x: &Vector<D>, answer: &SurfacePoint<D>) -> Vector<D> {
+    answer.normal.unwrap_or_else(|| (x - answer.point) / answer.distance)
 }
 
 impl<const D: usize> LevelFunction<D> for DistanceLevel<D> {
@@ -36,7 +39,7 @@ impl<const D: usize> LevelFunction<D> for DistanceLevel<D> {
 
     fn jet(&self, x: &Vector<D>) -> LevelJet<D> {
         let answer = self.surface.nearest(x);
-        let gradient = answer.normal.unwrap_or_else(|| (x - answer.point) / answer.distance);
+        let gradient = gradient(x, &answer);
         let hessian = if D == 2 {
             // κ/(1 + κd) along the tangent.
             let curvature = answer.curvature.unwrap_or(0.0);

@@ -9,7 +9,9 @@ use super::sampled::trace::{bulges, polygon_area, trace};
 use super::sampled::volume::curved_volume;
 use super::sampled::{Found, LocalFoot, Patch, PatchSet, local_foot, medial_distance, radius_in_ball};
 use super::{Surface, SurfacePoint, Vector};
+use crate::geometry::block::indices;
 use crate::geometry::level::{LevelFunction, LevelJet};
+use crate::geometry::shown;
 use std::sync::{Arc, OnceLock};
 
 /// Tuning constants of the sampling, for the plane and for space.
@@ -99,12 +101,8 @@ impl<const D: usize> ImplicitSurface<D> {
         let edge = sides.max() / TUNING.first_cells[D - 2] as f64;
         let counts: [usize; D] = std::array::from_fn(|d| ((sides[d] / edge).ceil() as usize).max(1));
         for k in 0..counts.iter().product::<usize>() {
-            let mut rest = k;
-            let center = Vector::<D>::from_fn(|d, _| {
-                let index = rest % counts[d];
-                rest /= counts[d];
-                search.low[d] + (index as f64 + 0.5) * edge
-            });
+            let cell = indices(k, &counts);
+            let center = Vector::<D>::from_fn(|d, _| search.low[d] + (cell[d] as f64 + 0.5) * edge);
             sampler.add(&center, 0.5 * edge, 0);
         }
         // A kink may hide the zero of a cell; a zero without a slope hides it everywhere.
@@ -130,14 +128,23 @@ impl<const D: usize> ImplicitSurface<D> {
         if self.is_in_box(x) { self.level.value(x).signum() } else { self.outer_sign }
     }
 
-    /// The closest point, and other local ones at most `margin` farther away.
+    /// The closest point, and other local ones at most `margin` farther away that are not at kinks.
     fn feet(&self, x: &Vector<D>, margin: f64) -> Vec<Found<D>> {
-        let solve = |patch: &Patch<D>| -> Option<LocalFoot<D>> {
+        // Steps downhill are slow: they are taken where a kink may hold the closest point.
+        let downhill = |patch: &Patch<D>| descend(self.level.as_ref(), x, &patch.seed, patch.radius);
+        let solve = |patch: &Patch<D>, may_be_closest: bool| -> Option<LocalFoot<D>> {
             local_foot(&[self.level.as_ref()], x, &patch.seed, 2.0 * patch.radius)
-                .or_else(|| Some(descend(self.level.as_ref(), x, &patch.seed, patch.radius)))
+                .or_else(|| may_be_closest.then(|| downhill(patch)))
                 .filter(|foot| self.is_in_box(&foot.point))
         };
         self.patches.feet(x, margin, solve)
+    }
+
+    /// The outline; None where a curve of it does not close.
+    fn curves(&self, spacing: f64) -> Option<Vec<Vec<Vector<D>>>> {
+        let seeds: Vec<Vector<D>> = self.patches.patches().iter().map(|patch| patch.seed).collect();
+        let longest = self.patches.patches().iter().map(|patch| patch.radius).fold(f64::INFINITY, f64::min);
+        trace(self.level.as_ref(), &seeds, spacing, longest)
     }
 
     fn extent(&self) -> f64 {
@@ -172,7 +179,7 @@ impl<const D: usize> Surface<D> for ImplicitSurface<D> {
     fn area_or_volume(&self) -> f64 {
         *self.area_or_volume.get_or_init(|| {
             if D == 2 {
-                let chains = self.outline(TUNING.area_spacing * self.extent());
+                let Some(chains) = self.curves(TUNING.area_spacing * self.extent()) else { return f64::NAN };
                 let curved = |chain: &Vec<Vector<D>>| bulges(chain, |x| Some(self.level.jet(x).normal()));
                 (polygon_area(&chains) + chains.iter().map(curved).sum::<f64>()).abs()
             } else {
@@ -186,10 +193,9 @@ impl<const D: usize> Surface<D> for ImplicitSurface<D> {
         medial_distance(x, &self.feet(x, 2.0 * tolerance)) <= tolerance
     }
 
+    /// Empty where a curve of it does not close, as at a cusp: a part of an outline would pass for the whole.
     fn outline(&self, spacing: f64) -> Vec<Vec<Vector<D>>> {
-        let seeds: Vec<Vector<D>> = self.patches.patches().iter().map(|patch| patch.seed).collect();
-        let longest = self.patches.patches().iter().map(|patch| patch.radius).fold(f64::INFINITY, f64::min);
-        trace(self.level.as_ref(), &seeds, spacing, longest)
+        self.curves(spacing).unwrap_or_default()
     }
 
     fn signed_distance(&self, x: &Vector<D>) -> f64 {
@@ -202,12 +208,6 @@ struct Search<const D: usize> {
     low: Vector<D>,
     high: Vector<D>,
     outer_sign: f64,
-}
-
-/// A place as messages show it.
-fn shown<const D: usize>(x: &Vector<D>) -> String {
-    let numbers: Vec<String> = x.iter().map(|c| format!("{c:.4}")).collect();
-    format!("({})", numbers.join(", "))
 }
 
 /// Looks for the zero on the nodes of a lattice over the whole box.

@@ -32,6 +32,8 @@ pub struct TriangleMesh {
     point_normals: Vec<Vector<3>>,
     /// Whether no sharp edge meets at a point.
     is_smooth: Vec<bool>,
+    /// Mean of the curvatures of the triangles at each point, weighted by their areas.
+    point_curvatures: Vec<f64>,
     tree: BoxTree<3>,
 }
 
@@ -83,12 +85,14 @@ impl TriangleMesh {
             edge_normals: edge_normals(&triangles, &normals),
             point_normals: vec![Vector::<3>::zeros(); points.len()],
             is_smooth: vec![true; points.len()],
+            point_curvatures: vec![0.0; points.len()],
             points,
             triangles,
             normals,
             tree,
         };
         mesh.set_point_normals();
+        mesh.set_point_curvatures();
         Ok(mesh)
     }
 
@@ -116,6 +120,20 @@ impl TriangleMesh {
                 self.is_smooth[point] &=
                     *normal == Vector::<3>::zeros() || normal.dot(&self.point_normals[point]) > SMOOTH;
             }
+        }
+    }
+
+    fn set_point_curvatures(&mut self) {
+        let mut areas = vec![0.0; self.points.len()];
+        for (k, corners) in self.triangles.iter().enumerate() {
+            let (area, curvature) = (double_area(&self.corners(k)), self.curvature_of(k));
+            for point in corners {
+                areas[*point as usize] += area;
+                self.point_curvatures[*point as usize] += area * curvature;
+            }
+        }
+        for (curvature, area) in self.point_curvatures.iter_mut().zip(areas) {
+            *curvature = if area > 0.0 { *curvature / area } else { 0.0 };
         }
     }
 
@@ -157,18 +175,36 @@ impl TriangleMesh {
 
     /// ∇·n = Σ ∇λ_i · n_i of the normals at the corners, interpolated over a triangle. At a corner on a sharp edge the normal of the
     /// triangle counts.
-    fn curvature(&self, triangle: usize) -> f64 {
+    fn curvature_of(&self, triangle: usize) -> f64 {
         let x = self.corners(triangle);
         let normal = self.normals[triangle];
-        let double_area = (x[1] - x[0]).cross(&(x[2] - x[0])).norm();
         let at_corner = |k: usize| {
             let point = self.triangles[triangle][k] as usize;
             let own = if self.is_smooth[point] { self.point_normals[point] } else { normal };
             // ∇λ_k = n × (opposite edge)/(2 A).
             normal.cross(&(x[(k + 2) % 3] - x[(k + 1) % 3])).dot(&own)
         };
-        if double_area > 0.0 { (0..3).map(at_corner).sum::<f64>() / double_area } else { 0.0 }
+        let area = double_area(&x);
+        if area > 0.0 { (0..3).map(at_corner).sum::<f64>() / area } else { 0.0 }
     }
+
+    /// The curvature at a foot, interpolated between the corners: single triangles have that of their own shape, too. At a corner on
+    /// a sharp edge the curvature of the triangle counts.
+    fn curvature(&self, foot: &TriangleFoot) -> f64 {
+        let x = self.corners(foot.triangle);
+        let own = self.curvature_of(foot.triangle);
+        let at_corner = |k: usize| {
+            let point = self.triangles[foot.triangle][k] as usize;
+            let share = double_area(&[foot.point, x[(k + 1) % 3], x[(k + 2) % 3]]);
+            share * if self.is_smooth[point] { self.point_curvatures[point] } else { own }
+        };
+        let area = double_area(&x);
+        if area > 0.0 { (0..3).map(at_corner).sum::<f64>() / area } else { own }
+    }
+}
+
+fn double_area([a, b, c]: &[Vector<3>; 3]) -> f64 {
+    (b - a).cross(&(c - a)).norm()
 }
 
 impl Surface<3> for TriangleMesh {
@@ -179,7 +215,7 @@ impl Surface<3> for TriangleMesh {
             distance: if (x - foot.point).dot(&outward) < 0.0 { -foot.distance } else { foot.distance },
             point: foot.point,
             normal,
-            curvature: normal.map(|_| self.curvature(foot.triangle)),
+            curvature: normal.map(|_| self.curvature(&foot)),
         }
     }
 

@@ -4,6 +4,7 @@ use super::spec::{Droplet, ForceChoice, InitialVelocitySpec};
 use super::vectors::vector;
 use crate::formulas::{Bound, Context, FormulaList, Input, NamedNumbers};
 use crate::geometry::Vector;
+use crate::geometry::block::indices;
 use crate::schemes::weakly_compressible_sph::{BodyForce, FormulaForce};
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
@@ -90,13 +91,7 @@ impl StartMotion {
     /// The largest speed in a box, so far as formulas are finite there.
     pub fn top_speed<const D: usize>(&self, low: &Vector<D>, lengths: &Vector<D>) -> f64 {
         let lattice = lattice(low, lengths);
-        let speeds = |bound: &Bound| {
-            velocities(bound, &lattice)
-                .iter()
-                .map(Vector::<D>::norm)
-                .filter(|speed| speed.is_finite())
-                .fold(0.0, f64::max)
-        };
+        let speeds = |bound: &Bound| largest(&vectors(bound, &lattice, &[]));
         self.inside.iter().chain(&self.outside).map(speeds).fold(0.0, f64::max)
     }
 
@@ -111,8 +106,8 @@ impl StartMotion {
         part: impl Fn(usize) -> usize,
     ) -> Result<Vec<Vector<D>>, Violation> {
         let zero = vec![Vector::<D>::zeros(); positions.len()];
-        let outside = self.outside.as_ref().map_or_else(|| zero.clone(), |bound| velocities(bound, positions));
-        let inside: Vec<Vec<Vector<D>>> = self.inside.iter().map(|bound| velocities(bound, positions)).collect();
+        let outside = self.outside.as_ref().map_or_else(|| zero.clone(), |bound| vectors(bound, positions, &[]));
+        let inside: Vec<Vec<Vector<D>>> = self.inside.iter().map(|bound| vectors(bound, positions, &[])).collect();
         let mut found = zero;
         for (i, velocity) in found.iter_mut().enumerate() {
             let (chosen, bound) = if levels[i] > 0.0 {
@@ -142,22 +137,25 @@ impl StartMotion {
 
 /// Places of a lattice in a box.
 fn lattice<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Vec<Vector<D>> {
-    let place = |index: usize| {
-        let mut rest = index;
-        Vector::<D>::from_fn(|d, _| {
-            let share = ((rest % PLACES) as f64 + 0.5) / PLACES as f64;
-            rest /= PLACES;
-            low[d] + share * lengths[d]
-        })
+    let place = |k: usize| {
+        let cell = indices(k, &[PLACES; D]);
+        Vector::<D>::from_fn(|d, _| low[d] + (cell[d] as f64 + 0.5) / PLACES as f64 * lengths[d])
     };
     (0..PLACES.pow(D as u32)).map(place).collect()
 }
 
-fn velocities<const D: usize>(bound: &Bound, positions: &[Vector<D>]) -> Vec<Vector<D>> {
+/// The vectors that formulas have at places; `more` are the inputs beyond the coordinates.
+fn vectors<const D: usize>(bound: &Bound, positions: &[Vector<D>], more: &[Input<'_>]) -> Vec<Vector<D>> {
     let columns: Vec<Vec<f64>> = (0..D).map(|d| positions.iter().map(|x| x[d]).collect()).collect();
-    let inputs: Vec<Input<'_>> = columns.iter().map(|column| Input::Column(column)).collect();
+    let inputs: Vec<Input<'_>> =
+        columns.iter().map(|column| Input::Column(column)).chain(more.iter().copied()).collect();
     let values = bound.everywhere(&inputs, positions.len());
     (0..positions.len()).map(|i| Vector::<D>::from_fn(|d, _| values[d][i])).collect()
+}
+
+/// The largest size of vectors, those aside that are not finite.
+fn largest<const D: usize>(vectors: &[Vector<D>]) -> f64 {
+    vectors.iter().map(Vector::<D>::norm).filter(|size| size.is_finite()).fold(0.0, f64::max)
 }
 
 /// The body force of formulas in a box until `end_time`.
@@ -176,12 +174,9 @@ pub(super) fn formula_force<const D: usize>(
     let mut strength = 0.0_f64;
     for k in 0..=16 {
         let time = f64::from(k) / 16.0 * end_time;
-        for x in &lattice {
-            for inside in [0.0, 1.0] {
-                let at: Vec<f64> = x.iter().copied().chain([inside, time]).collect();
-                let size = bound.at(&at).iter().map(|a| a * a).sum::<f64>().sqrt();
-                strength = if size.is_finite() { strength.max(size) } else { strength };
-            }
+        for inside in [0.0, 1.0] {
+            let accelerations = vectors(&bound, &lattice, &[Input::Uniform(inside), Input::Uniform(time)]);
+            strength = strength.max(largest(&accelerations));
         }
     }
     Some(BodyForce::Formula(Arc::new(FormulaForce::new(bound, strength))))

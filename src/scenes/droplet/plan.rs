@@ -176,7 +176,13 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let geometry = geometry.map_err(|error| errors.push(error)).ok();
     let tension = *spec.surface_tension.get_or_insert(case.tension);
     let surface = shape.as_ref().and_then(|(_, surface, _)| surface.as_ref());
-    let parts = surface.map(|surface| surface.parts.len());
+    // A layer, and what points from outside tell, is one part.
+    let is_known = |shape: &Shape| !shape.is_from_outside() && !matches!(shape, Shape::Layer { .. });
+    let parts = match (surface, &shape) {
+        (Some(surface), _) => Some(surface.parts.len()),
+        (None, Some((shape, ..))) if !is_known(shape) => Some(1),
+        _ => None,
+    };
     let (velocity, motion, speeds) = motion_at_start::<D>(&spec, parts, (&low, &lengths), &mut errors);
     let start = StartBox { shape: shape.as_ref().map(|(shape, ..)| shape), surface, low, lengths };
     let tensions = [tension, tension * largest_tension(&spec, &start)];

@@ -1,10 +1,10 @@
 //! The parameters of a `droplet` scene.
 
-use crate::formulas::{Count, FormulaList, FormulaLists, NamedNumbers, constants};
+use crate::formulas::{FormulaList, FormulaLists, NamedNumbers, constants};
 use crate::scenes::pcp_spec::PcpSpec;
 use crate::scenes::shapes::Shape;
 use crate::spec::choice::with_defaults;
-use crate::spec::{Coordinates, Interval, NOT_NEGATIVE, POSITIVE, whole};
+use crate::spec::{Coordinates, Interval, Items, NOT_NEGATIVE, POSITIVE, whole};
 
 crate::words! {
     /// What starts.
@@ -279,7 +279,7 @@ crate::choice! {
         /// a force of one's own
         Formula = "formula" {
             /// components of the acceleration: formulas of x, y, z, `inside` (1 in the drop, 0 elsewhere) and t
-            acceleration: FormulaList, in Count(2, 3);
+            acceleration: FormulaList, in Items(2, 3, ());
             /// numbers that the formulas call by name
             parameters: NamedNumbers = constants();
         }
@@ -290,11 +290,11 @@ crate::group! {
     /// Velocities at the start, as formulas of x, y and z, or as numbers.
     pub struct InitialVelocitySpec {
         /// components in the fluid inside; 0 when not given
-        inside: Option<FormulaList>, in Count(2, 3);
+        inside: Option<FormulaList>, in Items(2, 3, ());
         /// components in each part of a union, instead of `inside`
-        parts: Option<FormulaLists>;
+        parts: Option<FormulaLists>, in Items(1, usize::MAX, Items(2, 3, ()));
         /// components in the fluid outside; 0 when not given
-        outside: Option<FormulaList>, in Count(2, 3);
+        outside: Option<FormulaList>, in Items(2, 3, ());
         /// numbers that the formulas call by name
         parameters: NamedNumbers = constants();
     }

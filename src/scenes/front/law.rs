@@ -11,6 +11,11 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 
 impl Law {
+    /// Whether the speed depends on where the front is.
+    pub fn depends_on_place(&self) -> bool {
+        matches!(self, Self::Flow { .. } | Self::Formula { .. })
+    }
+
     /// The speed of the rays, where the front is a wave front: a curve in (x, y, θ) instead of a surface.
     pub fn ray_speed(&self) -> Option<f64> {
         match self {

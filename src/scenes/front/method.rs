@@ -45,17 +45,16 @@ pub(super) fn plan_method<const D: usize, const M: usize>(
     let context = GbpmContext { pointer: choice.pointer, dimension, motion, topology };
     let planned = choice.method.clone().plan(context);
     check_steps(choice, front.law, &mut errors);
+    if front.extent.is_none() && choice.shape.is_from_outside() && choice.law.depends_on_place() {
+        errors.extend(check_step_of_mesh(choice));
+    }
     if !(front.is_within_grid)(choice.method.levels()) {
         let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
         errors.push(Violation::new("/spacing", "range", detail, choice.spacing, json!("a larger number")));
     }
-    let method = &choice.method;
-    let finest = Grid { spacing: choice.spacing }.spacing_at(method.levels() - 1);
-    let (degree, weight) = (method.degree_for(dimension, motion), method.weight_for(dimension, motion));
-    let stability = StabilityPlan { integrator: choice.integrator, dimension, degree, weight };
-    let steps = StepPlan { finest, cfl: method.cfl, extent: front.extent, stability };
-    errors.extend(check_stability(choice, front.law, &steps));
+    let steps = step_plan(choice, dimension, front.extent);
     let fixed = fixed_step(choice, front.law, &steps);
+    errors.extend(check_stability(choice, front.law, fixed, &steps));
     if !fixed.time_step.is_normal() || fixed.steps == 0 || fixed.steps > MOST_STEPS {
         let allowed = format!("a number from {} to {}", choice.end_time * 1e-9, choice.end_time);
         let detail = "the run would have too many steps or none";
@@ -71,6 +70,19 @@ pub(super) fn plan_method<const D: usize, const M: usize>(
     };
     let resolved = complete(Completed { dimension, time_step: fixed.time_step, method });
     Ok(FrontPlan { resolved, chosen, fixed })
+}
+
+/// What time steps of a front in a box depend on beside its law.
+pub(super) fn step_plan<const D: usize>(
+    choice: &FrontChoice,
+    dimension: usize,
+    extent: Option<(Vector<D>, Vector<D>)>,
+) -> StepPlan<D> {
+    let (method, motion) = (&choice.method, choice.law.motion());
+    let finest = Grid { spacing: choice.spacing }.spacing_at(method.levels() - 1);
+    let (degree, weight) = (method.degree_for(dimension, motion), method.weight_for(dimension, motion));
+    let stability = StabilityPlan { integrator: choice.integrator, dimension, degree, weight };
+    StepPlan { finest, cfl: method.cfl, extent, stability }
 }
 
 /// Violations where an integrator or a way to give the step does not go with the law, or where a step is given twice.
@@ -100,17 +112,27 @@ fn check_steps<const D: usize, const M: usize>(
     }
 }
 
-/// The violation of a given step that is longer than a stable one.
-fn check_stability<const D: usize, const M: usize>(
+/// The violation where a step is left open whose length would follow from the speeds about a mesh.
+fn check_step_of_mesh(choice: &FrontChoice) -> Option<Violation> {
+    let is_open = choice.time_step.is_none() && choice.steps.is_none();
+    let detail =
+        "where a mesh lies, and how fast it moves there, is not known before it is read; give time_step or steps";
+    is_open.then(|| Violation::new("/time_step", "required", detail, Value::Null, "a number > 0"))
+}
+
+/// The violation of a step that is longer than a stable one.
+pub(super) fn check_stability<const D: usize, const M: usize>(
     choice: &FrontChoice,
     law: Option<&dyn FrontLaw<D, M>>,
+    fixed: FixedStep,
     steps: &StepPlan<D>,
 ) -> Option<Violation> {
     let factor = law?.longest_step(&steps.stability)?;
     let longest = factor * steps.finest * steps.finest;
-    let step = choice.time_step.filter(|step| *step > longest)?;
+    let step = Some(choice.time_step.unwrap_or(fixed.time_step)).filter(|step| *step > longest)?;
+    let at = if choice.steps.is_some() { "/steps" } else { "/time_step" };
     let detail = format!("motion by curvature is unstable with steps longer than {factor:.3} h² (of the finest level)");
-    Some(Violation::new("/time_step", "range", detail, step, format!("a number ≤ {longest:e}")))
+    Some(Violation::new(at, "range", detail, step, format!("a time step ≤ {longest:e}")))
 }
 
 /// The time step, as given or by the default of the law.

@@ -1,7 +1,9 @@
 //! From the spec of a `front` scene to a front and the law that moves it.
 
 use super::choice::{Completed, FrontChoice, FrontPlan, Resolved};
-use super::method::{BYTES, FrontQuestion, REFINED_BYTES, is_within_grid, labels, plan_method};
+use super::method::{
+    BYTES, FrontQuestion, REFINED_BYTES, check_stability, is_within_grid, labels, plan_method, step_plan,
+};
 use super::spec::Front;
 use super::wavefront;
 use crate::geometry::flows::Stretch;
@@ -95,15 +97,9 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
     }
     let whole = surface.as_ref().map(|surface| surface.whole.as_ref());
     errors.extend(whole.and_then(|whole| check_extent(whole, BAND_H * choice.spacing, choice.spacing)));
-    // Where the motion of another scene is done as a front, its flow stands at the top.
-    let flow_pointer = if choice.pointer.is_empty() { "/law/flow" } else { "/flow" };
     let extent = whole.map(Surface::bounding_box);
-    let about = extent.unwrap_or((Vector::<D>::zeros(), Vector::<D>::repeat(1.0)));
-    let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about);
+    let law = law_about::<D, M>(&choice, whole);
     errors.extend(law.as_ref().err().into_iter().flatten().cloned());
-    if let (Ok(law), Some(whole)) = (&law, whole) {
-        errors.extend(law.flow().and_then(|flow| check_return(flow, whole, flow_pointer)));
-    }
     let question = FrontQuestion {
         law: law.as_deref().ok(),
         extent,
@@ -115,14 +111,47 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
     Ok(Box::new(FrontScene { choice, surface, clouds, law, plan }))
 }
 
+/// The law that moves a front about a surface; about the unit box where that is not known yet.
+fn law_about<const D: usize, const M: usize>(
+    choice: &FrontChoice,
+    surface: Option<&dyn Surface<D>>,
+) -> Result<Arc<dyn FrontLaw<D, M>>, Vec<Violation>> {
+    // Where the motion of another scene is done as a front, its flow stands at the top.
+    let flow_pointer = if choice.pointer.is_empty() { "/law/flow" } else { "/flow" };
+    let about = surface.map_or((Vector::<D>::zeros(), Vector::<D>::repeat(1.0)), Surface::bounding_box);
+    let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about)?;
+    match surface.and_then(|surface| check_return(law.flow()?, surface, flow_pointer)) {
+        Some(violation) => Err(vec![violation]),
+        None => Ok(law),
+    }
+}
+
 impl<const D: usize, const M: usize> FrontScene<D, M> {
+    /// The law at the start of a run: that about a mesh is known only then.
+    fn law_at_build(&self, surface: &ShapeSurface<D>) -> Result<Arc<dyn FrontLaw<D, M>>, Vec<Violation>> {
+        if self.surface.is_some() {
+            return Ok(Arc::clone(&self.law));
+        }
+        let law = law_about::<D, M>(&self.choice, Some(surface.whole.as_ref()))?;
+        let steps = step_plan(&self.choice, D, Some(surface.whole.bounding_box()));
+        match check_stability(&self.choice, Some(law.as_ref()), self.plan.fixed, &steps) {
+            Some(violation) => Err(vec![violation]),
+            None => Ok(law),
+        }
+    }
+
     /// The front at the start.
-    fn system(&self, surface: &ShapeSurface<D>, interrupt: Interrupt) -> FrontSystem<D, M> {
+    fn system(
+        &self,
+        law: &Arc<dyn FrontLaw<D, M>>,
+        surface: &ShapeSurface<D>,
+        interrupt: Interrupt,
+    ) -> FrontSystem<D, M> {
         let chosen = &self.plan.chosen;
         let config = FrontConfig {
             grid: Grid { spacing: self.choice.spacing },
             method: chosen.method,
-            law: Arc::clone(&self.law),
+            law: Arc::clone(law),
             integrator: self.choice.integrator,
             topology: chosen.topology,
             segments: chosen.segments,
@@ -183,7 +212,8 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
         let whole = known.map(|surface| surface.whole.as_ref());
         let about = shape_particles(whole, sizes.get("/shape"), reach, self.choice.spacing);
         // Corners without foot points matter where there are few.
-        let counted = known.filter(|_| about < COUNTED).map(|surface| self.system(surface, Interrupt::default()));
+        let counted =
+            known.filter(|_| about < COUNTED).map(|surface| self.system(&self.law, surface, Interrupt::default()));
         let at_start = counted.map_or(about, |system| system.particle_count() as u64);
         let most = (at_start as f64 * self.stretch(known).most) as u64;
         Estimate {
@@ -236,16 +266,17 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             let detail = "a front starts from a shape with a surface";
             return Err(vec![Violation::new("/shape", "conflict", detail, Value::Null, Value::Null)]);
         };
-        let system = self.system(&surface, context.interrupt);
+        let law = self.law_at_build(&surface)?;
+        let system = self.system(&law, &surface, context.interrupt);
         if system.particle_count() == 0 {
             let detail = "no grid point of this spacing has a foot-point on the shape";
             return Err(vec![Violation::new("/spacing", "range", detail, self.choice.spacing, Value::Null)]);
         }
         let FrontPlan { chosen, fixed, .. } = &self.plan;
-        let labels = labels(chosen, *fixed, self.law.particles_in_bends());
+        let labels = labels(chosen, *fixed, law.particles_in_bends());
         let start = self.start(&surface);
         let ball = start.ball.clone();
-        let exact = self.law.exact_motion(start);
+        let exact = law.exact_motion(start);
         let simulation = GridBasedParticles::new(system, exact, ball, *fixed, context.cpu_clock, labels);
         Ok(Box::new(simulation.with_stretch(self.stretch(Some(&surface)).most)))
     }

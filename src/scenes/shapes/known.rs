@@ -127,15 +127,15 @@ impl KnownShape {
     /// # Errors
     /// Everything that does not fit together, and shapes of which nothing is left.
     pub(super) fn surface<const D: usize>(&self, pointer: &str) -> Result<ShapeSurface<D>, Vec<Violation>> {
-        let mut errors = Vec::new();
-        let solid = self.solid::<D>(pointer, &mut errors);
-        let Some(solid) = solid.filter(|_| errors.is_empty()) else { return Err(errors) };
         let count = self.count();
         if count > MOST_SHAPES {
             let detail = "the shape is composed of too many shapes";
             let allowed = json!(format!("{MOST_SHAPES} at most"));
             return Err(vec![Violation::new(pointer, "range", detail, count, allowed)]);
         }
+        let mut errors = Vec::new();
+        let solid = self.solid::<D>(pointer, &mut errors);
+        let Some(solid) = solid.filter(|_| errors.is_empty()) else { return Err(errors) };
         let whole = solid.surface().map_err(|error| vec![self.refused(pointer, &error)])?;
         let parts = solid.parts().unwrap_or_default();
         Ok(if parts.len() > 1 { ShapeSurface { whole, parts } } else { ShapeSurface::single(whole) })

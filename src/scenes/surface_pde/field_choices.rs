@@ -81,7 +81,7 @@ impl Site<'_> {
             }
             FieldChoice::PlaneWave { k } => ExactField::PlaneWave { k: self.wave_vector(k, errors) },
             FieldChoice::Formula { value, parameters } => {
-                match FormulaField::new(value, parameters, self.pointer, "value") {
+                match FormulaField::at_rest(value, parameters, self.pointer, "value") {
                     Ok(field) => ExactField::Formula(Arc::new(field)),
                     Err(found) => {
                         errors.extend(found);

@@ -34,7 +34,6 @@ pub(super) fn operated<const D: usize>(field: &ExactField, shape: &Shape, cloud:
         let x = raised(x);
         Some(field.laplace_beltrami(&x, &shape.normal(&x)?, *curvature))
     };
-    let is_of_place = !matches!(field, ExactField::Formula(formula) if !formula.is_of_place());
-    let is_known = cloud.curvatures.len() == cloud.rows && is_of_place;
+    let is_known = cloud.curvatures.len() == cloud.rows && field.is_of_place();
     is_known.then(|| cloud.points.iter().zip(&cloud.curvatures).map(at).collect()).flatten()
 }

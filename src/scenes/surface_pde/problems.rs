@@ -107,7 +107,7 @@ pub(super) fn plan(
             ProblemChoice::Poisson { field, has_source, is_dirichlet, solver }
         }
         ProblemSpec::Diffusion { initial, source, parameters, end_time, time_step, integrator, .. } => {
-            let source = source.as_ref().map(|source| FormulaField::new(source, parameters, "/problem", "source"));
+            let source = source.as_ref().map(|source| FormulaField::in_time(source, parameters, "/problem", "source"));
             let source = source.and_then(|field| field.map(Arc::new).map_err(|found| errors.extend(found)).ok());
             let start = Start::Field(start(site("/problem/initial"), initial, errors), source);
             let integrator = match integrator.get_or_insert_with(|| default_integrator(shape)) {
@@ -267,10 +267,7 @@ impl ProblemChoice {
     pub fn fields(&self, shape: &Shape) -> Vec<&'static Quantity> {
         let is_exact = !matches!(shape, Shape::Points(_));
         match self {
-            Self::LaplaceBeltrami { field } => {
-                let is_of_place = !matches!(field, ExactField::Formula(formula) if !formula.is_of_place());
-                Pointwise::shown_fields(is_exact && is_of_place)
-            }
+            Self::LaplaceBeltrami { field } => Pointwise::shown_fields(is_exact && field.is_of_place()),
             Self::Gradient { .. } => surface_gradient::shown_fields(),
             Self::Poisson { has_source, .. } => Poisson::shown_fields(is_exact && !has_source),
             Self::Curvature { .. } => Curvature::shown_fields(shape.dimension()),

@@ -1,11 +1,11 @@
 //! The parameters of a `surface_pde` scene.
 
 use super::transport_spec::{MotionChoice, VelocityChoice};
-use crate::formulas::{Count, FormulaList, FormulaText, NamedNumbers, constants};
+use crate::formulas::{FormulaList, FormulaText, NamedNumbers, constants};
 use crate::scene::cloud::PointsSource;
 use crate::schemes::surface_equation::MOST_SPECIES;
 use crate::spec::choice::with_defaults;
-use crate::spec::{Coordinates, Interval, Items, NOT_NEGATIVE, POSITIVE, Places, Sign, whole};
+use crate::spec::{Coordinates, Interval, Items, Listed, NOT_NEGATIVE, POSITIVE, Places, Sign, whole};
 
 crate::words! {
     /// What happens to points that coincide with others, and to points far from all others.
@@ -216,13 +216,13 @@ crate::choice! {
         /// reaction terms of one's own, of one to six substances
         Formula = "formula" {
             /// names of the substances, which the rates call them by
-            species: Vec<String>, in Items(1, MOST_SPECIES);
+            species: Listed<String>, in Items(1, MOST_SPECIES, ());
             /// rate of each substance: a formula of the substances, x, y, z, the unit normal nx, ny, nz and t
-            rates: FormulaList, in Count(1, MOST_SPECIES);
+            rates: FormulaList, in Items(1, MOST_SPECIES, ());
             /// diffusivity of each substance
-            diffusivities: Vec<f64>, in Items(1, MOST_SPECIES);
+            diffusivities: Listed<f64>, in Items(1, MOST_SPECIES, NOT_NEGATIVE);
             /// each substance at the start: a formula of x, y, z, nx, ny, nz
-            initial: FormulaList, in Count(1, MOST_SPECIES);
+            initial: FormulaList, in Items(1, MOST_SPECIES, ());
             /// numbers that the formulas call by name
             parameters: NamedNumbers = constants();
         }
@@ -314,10 +314,10 @@ crate::choice! {
         ReactionDiffusion = "reaction_diffusion" {
             /// the reaction
             model: ModelChoice = with_defaults("brusselator");
-            /// diffusivity of the first substance; `diffusivities` of formulas take its place
-            diffusivity: f64 = 0.005, in POSITIVE;
-            /// diffusivity of the second substance; `diffusivities` of formulas take its place
-            second_diffusivity: f64 = 0.05, in POSITIVE;
+            /// diffusivity of the first substance; 0.005 when not given; formulas have `diffusivities` instead
+            diffusivity: Option<f64>, in POSITIVE;
+            /// diffusivity of the second substance; 0.05 when not given; formulas have `diffusivities` instead
+            second_diffusivity: Option<f64>, in POSITIVE;
             /// amplitude of the random disturbance at the start, by the values
             noise: f64 = 0.1, in NOT_NEGATIVE;
             /// a field f for which forcing makes u = u₀ (1 + f cos t/4), v = v₀ (1 − f cos t/4) exact

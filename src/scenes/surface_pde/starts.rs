@@ -39,6 +39,9 @@ impl Start {
     }
 }
 
+/// Diffusivities of the substances of a model that are not given.
+const DIFFUSIVITY: [f64; 2] = [0.005, 0.05];
+
 /// Plans a reaction.
 pub(super) fn reaction(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<Violation>) -> Option<Start> {
     let ProblemSpec::ReactionDiffusion { model, diffusivity, second_diffusivity, noise, manufactured, .. } = problem
@@ -50,7 +53,24 @@ pub(super) fn reaction(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<V
         let detail = "forcing takes the exact operator, which is not known on points from outside";
         errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
     }
-    let both = vec![*diffusivity, *second_diffusivity];
+    if let ModelChoice::Formula { .. } = model {
+        for (name, given) in [("diffusivity", &*diffusivity), ("second_diffusivity", &*second_diffusivity)] {
+            errors.extend(given.map(|given| {
+                let detail = "substances by formulas have their diffusivities in the model";
+                Violation::new(
+                    format!("/problem/{name}"),
+                    "conflict",
+                    detail,
+                    given,
+                    json!("/problem/model/diffusivities"),
+                )
+            }));
+        }
+    } else {
+        (*diffusivity, *second_diffusivity) =
+            (diffusivity.or(Some(DIFFUSIVITY[0])), second_diffusivity.or(Some(DIFFUSIVITY[1])));
+    }
+    let both = vec![diffusivity.unwrap_or(DIFFUSIVITY[0]), second_diffusivity.unwrap_or(DIFFUSIVITY[1])];
     let (terms, initial, diffusivity) = match model {
         ModelChoice::Formula { .. } => {
             if exact.is_some() {
@@ -78,24 +98,24 @@ fn formula_reaction(model: &ModelChoice, errors: &mut Vec<Violation>) -> Option<
     const POINTER: &str = "/problem/model";
     let ModelChoice::Formula { species, rates, diffusivities, initial, parameters } = model else { return None };
     let before = errors.len();
-    for (name, found) in [("diffusivities", diffusivities.len()), ("initial", initial.0.len())] {
-        if found != species.len() {
-            let detail = format!("there are {} substances, and {found} of these", species.len());
-            errors.push(Violation::new(format!("{POINTER}/{name}"), "conflict", detail, found, json!(species.len())));
+    for (name, found) in [("diffusivities", diffusivities.0.len()), ("initial", initial.0.len())] {
+        if found != species.0.len() {
+            let detail = format!("there are {} substances, and {found} of these", species.0.len());
+            errors.push(Violation::new(format!("{POINTER}/{name}"), "conflict", detail, found, json!(species.0.len())));
         }
     }
-    let terms = FormulaTerms::new(species, rates, parameters, POINTER);
+    let terms = FormulaTerms::new(&species.0, rates, parameters, POINTER);
     let terms = terms.map_err(|found| errors.extend(found)).ok();
     let starts: Vec<Option<Arc<FormulaField>>> = initial
         .at("initial")
         .iter()
         .map(|(place, text)| {
-            let field = FormulaField::new(text, parameters, POINTER, place);
+            let field = FormulaField::at_rest(text, parameters, POINTER, place);
             field.map(Arc::new).map_err(|found| errors.extend(found)).ok()
         })
         .collect();
     let starts: Option<Vec<_>> = starts.into_iter().collect();
-    (errors.len() == before).then_some((Terms::Formulas(Box::new(terms?)), starts?, diffusivities.clone()))
+    (errors.len() == before).then_some((Terms::Formulas(Box::new(terms?)), starts?, diffusivities.0.clone()))
 }
 
 /// Fields at the start, the reaction, and what is known of the course.

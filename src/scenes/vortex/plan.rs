@@ -12,7 +12,7 @@ use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
 use crate::scenes::particle_estimate::{check_extent, memory_bytes, shape_particles};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
-use crate::scenes::shapes::ShapeSurface;
+use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
 use crate::schemes::advected_level_set;
 use crate::schemes::advected_level_set::{
@@ -360,6 +360,11 @@ impl<const D: usize> Scene for VortexScene<D> {
         };
         let room = (self.reach(), parts.spacing);
         let surface = self.spec.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
+        if let (Shape::Mesh { .. }, Some(surface)) = (&self.spec.shape, &surface)
+            && let Some(violation) = check_return(flow.as_ref(), surface.whole.as_ref(), "/flow")
+        {
+            return Err(vec![violation]);
+        }
         let (start, surface) = if let Some(surface) = &surface {
             let start = Start::about(surface.whole.as_ref(), &self.lattice, self.reach(), &context.interrupt);
             (start, Some(surface.boxed()))

@@ -37,6 +37,8 @@ pub struct AdvectedLevelSet<const D: usize> {
     initial_measure: f64,
     /// Share of the particles inside at time 0.
     initial_inside_share: f64,
+    /// Whether the flow keeps the area or volume.
+    keeps_volume: bool,
     enclosed_watch: EnclosedWatch,
     reach_watch: ReachWatch,
     max_cfl: f64,
@@ -65,8 +67,10 @@ impl<const D: usize> AdvectedLevelSet<D> {
         );
         // What points from elsewhere bring is a level, and no distance yet.
         let redistanced = system.motion.surface().map(|_| 0);
+        let (low, high) = box_of(system.particles.positions());
         Self {
             initial_inside_share: system.inside_share(),
+            keeps_volume: system.motion.flow().keeps_volume(&low, &high),
             system,
             plan,
             redistanced,
@@ -154,7 +158,7 @@ impl<const D: usize> AdvectedLevelSet<D> {
 
     /// Looks at the enclosed area or volume that was just measured.
     fn watch_enclosed(&mut self, now: Clock) -> Result<(), StepError> {
-        if self.system.motion.flow().keeps_volume() {
+        if self.keeps_volume {
             let (enclosed, drift) = self.enclosed();
             self.course.findings.extend(self.enclosed_watch.look(&enclosed, drift, now)?);
         }
@@ -194,6 +198,12 @@ impl<const D: usize> AdvectedLevelSet<D> {
         self.course.phases.book("errors", spent);
         Ok(())
     }
+}
+
+/// Lower and upper corner of the box about points.
+fn box_of<const D: usize>(points: &[Vector<D>]) -> (Vector<D>, Vector<D>) {
+    let nothing = (Vector::<D>::repeat(f64::INFINITY), Vector::<D>::repeat(f64::NEG_INFINITY));
+    points.iter().fold(nothing, |(low, high), x| (low.inf(x), high.sup(x)))
 }
 
 /// Mean and largest of |distance|; a NaN is not hidden.
@@ -348,7 +358,7 @@ impl<const D: usize> Simulation for AdvectedLevelSet<D> {
     fn health(&self) -> Health {
         let volume_drift = Some(self.drift());
         let (enclosed, drift) = self.enclosed();
-        let mut checks = vec![enclosed.check(Some(drift), self.system.motion.flow().keeps_volume())];
+        let mut checks = vec![enclosed.check(Some(drift), self.keeps_volume)];
         checks.extend(self.reach_watch.checks());
         Health {
             finite: self.system.particles.positions().iter().all(is_finite),

@@ -10,6 +10,7 @@ use super::front_watch::FrontWatch;
 use super::quantities;
 use super::removals::Removals;
 use super::system::FrontSystem;
+use crate::geometry::shown;
 use crate::geometry::surfaces::Ball;
 use crate::schemes::flow_divergence::divergence_diagnostic;
 use crate::schemes::measured_errors::entry;
@@ -118,12 +119,11 @@ impl<const D: usize, const M: usize> GridBasedParticles<D, M> {
     fn tell_open_ends(&mut self, Clock { step, time }: Clock) {
         let ends = &self.ends;
         if let Some(first) = ends.first() {
-            let place: Vec<String> = self.system.feet.positions[*first].iter().map(|c| format!("{c:.4}")).collect();
             let message = format!(
-                "{} of {} foot-points are at open ends, the first at ({}): the front is finer there than its spacing",
+                "{} of {} foot-points are at open ends, the first at {}: the front is finer there than its spacing",
                 ends.len(),
                 self.system.particle_count(),
-                place.join(", ")
+                shown(&self.system.feet.positions[*first])
             );
             let finding = Finding::warning("front_open", message, (step, time)).about(ends);
             self.course.findings.push(finding.with_advice("a smaller spacing resolves the front"));

@@ -188,7 +188,8 @@ impl Component for Watched {
             lost: section.optional("lost")?,
             missed: section.optional("missed")?,
             one_sided: section.optional("one_sided")?,
-            lone: section.optional("lone")?,
+            // Checkpoints of earlier versions have none.
+            lone: if section.has("lone") { section.optional("lone")? } else { None },
         })
     }
 }

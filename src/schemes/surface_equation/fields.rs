@@ -39,6 +39,12 @@ pub enum ExactField {
 }
 
 impl ExactField {
+    /// Whether the field is one of the place alone; formulas may name the normal.
+    #[must_use]
+    pub fn is_of_place(&self) -> bool {
+        !matches!(self, Self::Formula(field) if !field.is_of_place())
+    }
+
     /// The field at a point.
     #[must_use]
     pub fn value(&self, x: &Vector<3>) -> f64 {

@@ -20,17 +20,33 @@ pub struct FormulaField {
 }
 
 impl FormulaField {
-    /// A field. `place` is that of the formula below `pointer`.
+    /// A field that does not change in time. `place` is that of the formula below `pointer`.
     ///
     /// # Errors
     /// All that is wrong with the formula.
-    pub fn new(
+    pub fn at_rest(
         value: &FormulaText,
         parameters: &NamedNumbers,
         pointer: &str,
         place: &str,
     ) -> Result<Self, Vec<Violation>> {
-        let context = Context { pointer, variables: &VARIABLES, parameters };
+        Self::new(value, Context { pointer, variables: &VARIABLES[..TIME], parameters }, place)
+    }
+
+    /// A field that may change in time.
+    ///
+    /// # Errors
+    /// As [`Self::at_rest`].
+    pub fn in_time(
+        value: &FormulaText,
+        parameters: &NamedNumbers,
+        pointer: &str,
+        place: &str,
+    ) -> Result<Self, Vec<Violation>> {
+        Self::new(value, Context { pointer, variables: &VARIABLES, parameters }, place)
+    }
+
+    fn new(value: &FormulaText, context: Context<'_>, place: &str) -> Result<Self, Vec<Violation>> {
         let value = Bound::new(&[(place.to_owned(), value)], context)?;
         let gradient = value.derivatives(&[vec![0, 1, 2]]);
         let hessian = gradient.derivatives(&[vec![0, 1, 2], vec![0, 1, 2], vec![0, 1, 2]]);
@@ -47,12 +63,6 @@ impl FormulaField {
     #[must_use]
     pub fn is_of_place(&self) -> bool {
         (3..VARIABLES.len()).all(|variable| !self.value.depends_on(variable))
-    }
-
-    /// Whether the field changes in time.
-    #[must_use]
-    pub fn changes(&self) -> bool {
-        self.value.depends_on(TIME)
     }
 
     fn numbers(x: &Vector<3>) -> [f64; 7] {
@@ -154,7 +164,7 @@ mod tests {
     fn derivatives_are_those_of_the_plane_wave() {
         let k = Vector::<3>::new(2.0, -1.0, 3.0);
         let numbers = NamedNumbers(vec![("a".to_owned(), 2.0)]);
-        let field = FormulaField::new(&"sin(a*x - y + 3*z)".into(), &numbers, "/field", "value").unwrap();
+        let field = FormulaField::at_rest(&"sin(a*x - y + 3*z)".into(), &numbers, "/field", "value").unwrap();
         let wave = ExactField::PlaneWave { k };
         let (x, n) = (Vector::<3>::new(0.3, 0.5, -0.2), Vector::<3>::new(0.48, 0.6, 0.64));
         assert!(field.is_of_place());
@@ -164,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_point_without_a_value_is_named() {
-        let field = FormulaField::new(&"1/(x - 0.5)".into(), &NamedNumbers::default(), "/field", "value").unwrap();
+        let field = FormulaField::at_rest(&"1/(x - 0.5)".into(), &NamedNumbers::default(), "/field", "value").unwrap();
         let points = [Vector::<3>::new(0.0, 0.0, 1.0), Vector::<3>::new(0.5, 0.0, 0.0)];
         let told = field.values(&Sites::new(&points, &points), 0.0).unwrap_err();
         assert!(told.contains("\"1/(x - 0.5)\" is inf at x = 0.5") && told.contains("point 1"), "{told}");

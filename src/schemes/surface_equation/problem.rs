@@ -1,6 +1,7 @@
 //! What a problem on a surface is to the simulation that runs it.
 
 use super::cloud::SurfaceCloud;
+use super::formula_terms::MOST_SPECIES;
 use super::method::{Operators, Use, Wanted};
 use crate::geometry::Vector;
 use crate::parallel::Interrupt;
@@ -26,8 +27,8 @@ pub struct Tools<'a, const D: usize> {
     pub to: Clock,
 }
 
-/// Fields by name, no more than six and without an allocation; an unused place has no values.
-pub type Watched<'a> = [(&'static str, &'a [f64]); 6];
+/// Fields by name, as many as there may be substances and without an allocation; an unused place has no values.
+pub type Watched<'a> = [(&'static str, &'a [f64]); MOST_SPECIES];
 
 /// Fields to be watched.
 pub fn watch<'a, const N: usize>(fields: [(&'static str, &'a [f64]); N]) -> Watched<'a> {

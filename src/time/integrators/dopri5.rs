@@ -21,6 +21,8 @@ pub(in crate::time) const E: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
 /// Largest number of inner steps. After it the position is NaN, so that a wild field cannot hang a run.
 const MAX_STEPS: u32 = 100_000;
+/// Inner steps below this share of the whole end at a NaN: the path has come to a place without a velocity.
+const LEAST_STEP: f64 = 1e-12;
 
 /// Inner steps of up to `N` paths. Each path has its own step size and ends by itself.
 struct Paths<const D: usize, const N: usize> {
@@ -37,7 +39,8 @@ struct Paths<const D: usize, const N: usize> {
     found: [Vector<D>; N],
 }
 
-/// Moves up to `N` points from `t` to `t + dt`; a point is NaN after [`MAX_STEPS`] inner steps.
+/// Moves up to `N` points from `t` to `t + dt`; a point is NaN after [`MAX_STEPS`] inner steps, and where its path meets a place
+/// without a velocity.
 pub(super) fn advance<const D: usize, const N: usize>(
     flow: &dyn Flow<D>,
     points: &mut [Vector<D>],
@@ -120,7 +123,13 @@ impl<const D: usize, const N: usize> Paths<D, N> {
                 self.done[i] += step.abs();
                 self.k[0][i] = self.k[6][i];
             }
-            self.size[i] = step.abs() * (0.9 * (tolerance / error.max(1e-300)).powf(0.2)).clamp(0.2, 5.0);
+            // Beyond a place without a velocity the error is no number: a shorter step may end before it.
+            let change = if error.is_nan() { 0.2 } else { 0.9 * (tolerance / error.max(1e-300)).powf(0.2) };
+            self.size[i] = step.abs() * change.clamp(0.2, 5.0);
+            if self.size[i] < LEAST_STEP * whole && !is_accepted {
+                points[i] = Vector::<D>::repeat(f64::NAN);
+                continue;
+            }
             self.active[next] = i;
             next += 1;
         }

@@ -141,7 +141,8 @@ impl RefineSpec {
                 errors.push(Violation::new(at, "required", detail, got, "a number in base"));
             }
         }
-        self.judged(base, errors);
+        let judged = self.judged(base, errors);
+        errors.extend(judged.and_then(|judged| judged.check_relative(self.until.relative, "/sweep/until/relative")));
         if base.as_object().is_some_and(|body| Given::new(body).has(JobSpec::restart())) {
             let detail = "levels have spacings of their own, so none of them can begin with a checkpoint";
             errors.push(Violation::new("/base/restart", "conflict", detail, Value::Null, "a scene"));

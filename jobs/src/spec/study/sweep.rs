@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 
 /// Points of a study at most.
 pub const MOST_POINTS: usize = 10_000;
+
 meniscus::choice! {
     /// How the points of a study come about.
     pub enum Sweep by "mode" {

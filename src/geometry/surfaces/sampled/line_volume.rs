@@ -1,6 +1,7 @@
 //! The volume where a level is negative, by lengths along lines through small cells.
 
 use super::Vector;
+use crate::geometry::block::indices;
 
 /// Least edge of a cell, relative to the longest side of the box.
 const FINEST: f64 = 1.0 / 64.0;
@@ -26,12 +27,8 @@ pub(in crate::geometry::surfaces) fn line_volume<const D: usize>(
     let edges = Vector::<D>::from_fn(|d, _| sides[d] / cells[d] as f64);
     let mut volume = 0.0;
     for k in 0..cells.iter().product::<usize>() {
-        let mut rest = k;
-        let center = Vector::<D>::from_fn(|d, _| {
-            let index = rest % cells[d];
-            rest /= cells[d];
-            low[d] + (index as f64 + 0.5) * edges[d]
-        });
+        let cell = indices(k, &cells);
+        let center = Vector::<D>::from_fn(|d, _| low[d] + (cell[d] as f64 + 0.5) * edges[d]);
         volume += in_cell(level, &center, &(edges * 0.5), finest);
     }
     volume

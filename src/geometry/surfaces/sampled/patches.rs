@@ -110,8 +110,13 @@ impl<const D: usize> PatchSet<D> {
     }
 
     /// The closest point of all patches, and other local ones at most `margin` farther away. `solve` finds the closest point
-    /// of one patch, and none where that is not on the surface.
-    pub fn feet(&self, x: &Vector<D>, margin: f64, solve: impl Fn(&Patch<D>) -> Option<LocalFoot<D>>) -> Vec<Found<D>> {
+    /// of one patch, and none where that is not on the surface; it is told whether that may be the closest of all.
+    pub fn feet(
+        &self,
+        x: &Vector<D>,
+        margin: f64,
+        solve: impl Fn(&Patch<D>, bool) -> Option<LocalFoot<D>>,
+    ) -> Vec<Found<D>> {
         let mut bound = f64::INFINITY;
         self.tree.for_each_near(x, bound, |item| {
             let patch = &self.patches[item];
@@ -147,7 +152,7 @@ impl<const D: usize> PatchSet<D> {
             if found.iter().any(is_known) {
                 continue;
             }
-            if let Some(foot) = solve(patch) {
+            if let Some(foot) = solve(patch, least <= best) {
                 let distance = (x - foot.point).norm();
                 best = best.min(distance);
                 found.push(Found { foot, distance, patch: item });

@@ -15,6 +15,7 @@ const MOST_POINTS: usize = 5_000_000;
 const MOST_HALVINGS: i32 = 12;
 
 /// The curves through the seeds as closed chains of points at most `spacing` apart, with the inside on the left; none in space.
+/// None where one of them does not close: then a part of the outline would be missing.
 ///
 /// `longest` is a step within which no other branch of the same direction lies.
 pub(in crate::geometry::surfaces) fn trace<const D: usize>(
@@ -22,9 +23,9 @@ pub(in crate::geometry::surfaces) fn trace<const D: usize>(
     seeds: &[Vector<D>],
     spacing: f64,
     longest: f64,
-) -> Vec<Vec<Vector<D>>> {
+) -> Option<Vec<Vec<Vector<D>>>> {
     if D != 2 {
-        return Vec::new();
+        return Some(Vec::new());
     }
     let boxes: Vec<_> = seeds.iter().map(|x| (*x, *x)).collect();
     let tree = BoxTree::new(&boxes);
@@ -36,7 +37,7 @@ pub(in crate::geometry::surfaces) fn trace<const D: usize>(
         if is_traced[k] {
             continue;
         }
-        let chain = trace_from(level, &seeds[k], step);
+        let chain = trace_from(level, &seeds[k], step)?;
         for pair in chain.windows(2) {
             let (middle, half) = ((pair[0] + pair[1]) * 0.5, 0.6 * (pair[1] - pair[0]).norm().max(1e-3 * longest));
             let normal = right_of(&(pair[1] - pair[0]));
@@ -47,15 +48,13 @@ pub(in crate::geometry::surfaces) fn trace<const D: usize>(
             });
         }
         is_traced[k] = true;
-        if chain.len() > 2 {
-            chains.push(chain);
-        }
+        chains.push(chain);
     }
-    chains
+    Some(chains)
 }
 
-/// The closed curve through a point.
-fn trace_from<const D: usize>(level: &dyn LevelFunction<D>, start: &Vector<D>, step: f64) -> Vec<Vector<D>> {
+/// The closed curve through a point; None where it does not close.
+fn trace_from<const D: usize>(level: &dyn LevelFunction<D>, start: &Vector<D>, step: f64) -> Option<Vec<Vector<D>>> {
     let mut chain = vec![*start];
     let mut y = *start;
     let mut length = 0.0;
@@ -67,17 +66,16 @@ fn trace_from<const D: usize>(level: &dyn LevelFunction<D>, start: &Vector<D>, s
         let back = start - y;
         if length > 2.0 * step && back.norm() <= step && back.dot(&tangent) >= 0.0 {
             chain.push(*start);
-            return chain;
+            return Some(chain);
         }
         // Beyond a kink the curve goes on along the tangent there.
         let beyond = left_of(&level.jet(&(y + tangent * step)).normal());
-        let Some(z) = advance(level, &y, &tangent, step).or_else(|| advance(level, &y, &beyond, step)) else { break };
+        let z = advance(level, &y, &tangent, step).or_else(|| advance(level, &y, &beyond, step))?;
         length += (z - y).norm();
         y = z;
         chain.push(y);
     }
-    // A curve that does not close is no outline of a shape.
-    Vec::new()
+    None
 }
 
 /// The next point of a curve along a tangent, at most a step away.

@@ -6,7 +6,9 @@
 
 use super::Vector;
 use super::newton::{local_foot, project};
+use crate::geometry::block::indices;
 use crate::geometry::level::{Hessian, LevelFunction};
+use nalgebra::{Matrix3, Vector3};
 
 /// Cells along the longest side of the box.
 const CELLS: f64 = 20.0;
@@ -44,12 +46,7 @@ pub(in crate::geometry::surfaces) fn curved_volume<const D: usize>(
     let origin = (low + high) * 0.5;
     let mut volume = 0.0;
     for k in 0..counts.iter().product::<usize>() {
-        let mut rest = k;
-        let at: [usize; D] = std::array::from_fn(|d| {
-            let index = rest % counts[d];
-            rest /= counts[d];
-            index
-        });
+        let at = indices(k, &counts);
         let corner = |c: usize| (0..D).map(|d| (at[d] + (c >> d & 1)) * strides[d]).sum::<usize>();
         for tetrahedron in &TETRAHEDRA {
             let corners = tetrahedron.map(|c| (points[corner(c)], values[corner(c)]));
@@ -83,19 +80,11 @@ fn triangles<const D: usize>(corners: &[(Vector<D>, f64); 4]) -> Vec<[Vector<D>;
     let mean = |of: &[usize]| of.iter().map(|k| corners[*k].0).sum::<Vector<D>>() / of.len() as f64;
     let outward = mean(&outer) - mean(&inner);
     for triangle in &mut found {
-        if cross(&(triangle[1] - triangle[0]), &(triangle[2] - triangle[0])).dot(&outward) < 0.0 {
+        if (triangle[1] - triangle[0]).cross(&(triangle[2] - triangle[0])).dot(&outward) < 0.0 {
             triangle.swap(1, 2);
         }
     }
     found
-}
-
-/// The cross product in space.
-fn cross<const D: usize>(a: &Vector<D>, b: &Vector<D>) -> Vector<D> {
-    Vector::<D>::from_fn(|d, _| {
-        let (e, f) = ((d + 1) % D, (d + 2) % D);
-        a[e] * b[f] - a[f] * b[e]
-    })
 }
 
 /// ⅓ ∫ P · n dS over the part of the zero that a triangle stands for, with P from `origin`.
@@ -112,7 +101,7 @@ fn patch_volume<const D: usize>(
             // Duffy's coordinates: (s, (1 − s) t) with the area 1 − s.
             let y = triangle[0] + u * s + v * ((1.0 - s) * t);
             let (p, p_u, p_v) = image(level, &y, [&u, &v], reach);
-            sum += weight * other * (1.0 - s) * (p - origin).dot(&cross(&p_u, &p_v));
+            sum += weight * other * (1.0 - s) * (p - origin).dot(&p_u.cross(&p_v));
         }
     }
     sum / 3.0
@@ -139,27 +128,9 @@ fn image<const D: usize>(
     (foot.point, along(u), along(v))
 }
 
-/// The solution of a small system by Gauss's elimination with pivots; the right side where it is singular.
+/// The solution of a system in space; the right side where it is singular.
 fn solve<const D: usize>(matrix: &Hessian<D>, right: &Vector<D>) -> Vector<D> {
-    let (mut a, mut b) = (*matrix, *right);
-    for k in 0..D {
-        let pivot = (k..D).fold(k, |best, i| if a[(i, k)].abs() > a[(best, k)].abs() { i } else { best });
-        if a[(pivot, k)] == 0.0 {
-            return *right;
-        }
-        a.swap_rows(k, pivot);
-        b.swap_rows(k, pivot);
-        for i in k + 1..D {
-            let factor = a[(i, k)] / a[(k, k)];
-            for j in k..D {
-                a[(i, j)] -= factor * a[(k, j)];
-            }
-            b[i] -= factor * b[k];
-        }
-    }
-    for k in (0..D).rev() {
-        let known: f64 = (k + 1..D).map(|j| a[(k, j)] * b[j]).sum();
-        b[k] = (b[k] - known) / a[(k, k)];
-    }
-    b
+    let (matrix, right) = (Matrix3::from_fn(|i, j| matrix[(i, j)]), Vector3::from_fn(|i, _| right[i]));
+    let found = matrix.lu().solve(&right).unwrap_or(right);
+    Vector::<D>::from_fn(|d, _| found[d])
 }

@@ -92,6 +92,19 @@ impl<L: LevelFunction<2>> LevelFunction<2> for Power<L> {
     }
 }
 
+/// A level with a pole at the origin.
+struct Pole;
+
+impl LevelFunction<2> for Pole {
+    fn value(&self, x: &Vector<2>) -> f64 {
+        1.0 - 0.01 / x.norm()
+    }
+
+    fn jet(&self, x: &Vector<2>) -> LevelJet<2> {
+        LevelJet { value: self.value(x), gradient: Vector::<2>::zeros(), hessian: Hessian::<2>::zeros() }
+    }
+}
+
 fn surface<const D: usize>(level: impl LevelFunction<D> + 'static) -> ImplicitSurface<D> {
     within(level, 2.0).unwrap()
 }
@@ -183,17 +196,6 @@ fn corners_of_a_level_are_found() {
         }
     }
     assert!((square.area_or_volume() - 1.0).abs() < 1e-3, "{}", square.area_or_volume());
-}
-/// A level with a pole at the origin.
-struct Pole;
-impl LevelFunction<2> for Pole {
-    fn value(&self, x: &Vector<2>) -> f64 {
-        1.0 - 0.01 / x.norm()
-    }
-
-    fn jet(&self, x: &Vector<2>) -> LevelJet<2> {
-        LevelJet { value: self.value(x), gradient: Vector::<2>::zeros(), hessian: Hessian::<2>::zeros() }
-    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::Vector;
 use crate::geometry::box_tree::BoxTree;
+use crate::geometry::shown;
 use std::collections::BTreeMap;
 
 /// Faults of one kind that are named.
@@ -64,10 +65,6 @@ pub enum MeshFault {
         /// How many more there are.
         more: String,
     },
-}
-
-fn shown(x: &Vector<3>) -> String {
-    format!("({:.4}, {:.4}, {:.4})", x[0], x[1], x[2])
 }
 
 /// Names the first few of a list; the last one says how many more there are.

@@ -80,12 +80,12 @@ fn an_icosphere_is_a_sphere_to_its_own_error() {
         let expected = found.point.normalize();
         assert!((normal - expected).norm() < longest, "{normal:?} for {expected:?}");
         let curvature = found.curvature.unwrap();
-        // A mesh has no curvature of its own; that of its normals is rough next to the corners of the icosahedron, where five
-        // triangles meet (3.6 % and more).
-        assert!((curvature - 2.0 / 0.7).abs() < 0.25 * 2.0 / 0.7, "{curvature}");
+        // Normals at points whose triangles differ in size are a little off.
+        assert!((curvature - 2.0 / 0.7).abs() < 0.03 * 2.0 / 0.7, "{curvature} at {expected:?}");
     }
-    let exact = mesh.points.len() as f64;
-    assert!(exact > 0.0 && (mesh.area_or_volume() / ball.area_or_volume() - 1.0).abs() < 2e-3);
+    assert!((mesh.area_or_volume() / ball.area_or_volume() - 1.0).abs() < 2e-3);
+    assert!(mesh.near_medial_axis(&Vector::<3>::new(1e-4, 0.0, 0.0), 1e-3));
+    assert!(!mesh.near_medial_axis(&Vector::<3>::new(0.3, 0.1, 0.2), 1e-3));
 }
 
 #[test]

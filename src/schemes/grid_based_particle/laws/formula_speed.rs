@@ -2,8 +2,9 @@
 
 use super::{FrontAtStart, FrontLaw, MotionStep, MovingFront, StepPlan, staged_motion};
 use crate::formulas::{BLOCK, Bound, Context, FormulaText, Input, NamedNumbers};
-use crate::geometry::Vector;
+use crate::geometry::block::indices;
 use crate::geometry::flows::Stretch;
+use crate::geometry::{Vector, shown};
 use crate::schemes::grid_based_particle::curvature_stability::{StabilityPlan, longest_step};
 use crate::schemes::grid_based_particle::foot_points::FootPoints;
 use crate::spec::Violation;
@@ -140,12 +141,11 @@ impl<const D: usize> FormulaSpeed<D> {
         if most <= MORE_SMOOTHING * self.found.diffusivity {
             return Ok(());
         }
-        let x: Vec<String> = feet.positions[place].iter().map(|c| format!("{c:.4}")).collect();
         Err(PathError::Undefined(format!(
-            "the speed \"{}\" changes with the curvature by {:.3e} at ({}), where the steps were made for −{:.3e} to 0",
+            "the speed \"{}\" changes with the curvature by {:.3e} at {}, where the steps were made for −{:.3e} to 0",
             self.speed.texts()[0],
             Self::slope_at(&self.by_curvature, feet, place, time),
-            x.join(", "),
+            shown(&feet.positions[place]),
             self.found.diffusivity
         )))
     }
@@ -161,19 +161,12 @@ fn samples<const D: usize>(low: &Vector<D>, high: &Vector<D>, end_time: f64) -> 
     let extent = (high - low).max().max(f64::MIN_POSITIVE);
     let mut all = Vec::new();
     for place in 0..PLACES.pow(D as u32) {
-        let mut rest = place;
-        let x = Vector::<D>::from_fn(|d, _| {
-            let share = 2.0 * (rest % PLACES) as f64 / (PLACES - 1) as f64 - 1.0;
-            rest /= PLACES;
-            middle[d] + share * half[d]
-        });
+        let node = indices(place, &[PLACES; D]);
+        let share = |d: usize| 2.0 * node[d] as f64 / (PLACES - 1) as f64 - 1.0;
+        let x = Vector::<D>::from_fn(|d, _| middle[d] + share(d) * half[d]);
         for direction in 0..3_usize.pow(D as u32) {
-            let mut rest = direction;
-            let n = Vector::<D>::from_fn(|_, _| {
-                let component = (rest % 3) as f64 - 1.0;
-                rest /= 3;
-                component
-            });
+            let signs = indices(direction, &[3; D]);
+            let n = Vector::<D>::from_fn(|d, _| signs[d] as f64 - 1.0);
             let Some(n) = n.try_normalize(0.0) else { continue };
             for bend in [-4.0, 0.0, 4.0] {
                 for share in [0.0, 0.37, 1.0] {
