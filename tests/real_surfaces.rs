@@ -335,13 +335,10 @@ fn reactions_by_formula_run_on_the_bunny() {
     let Some(mesh) = model("bunny") else { return };
     let unit = mesh.masses().iter().sum::<f64>() / mesh.corners.len() as f64;
     let (slow, fast) = (0.2 * unit, 8.0 * unit);
-    let problem = |model: Value| {
-        json!({"problem": {
-            "type": "reaction_diffusion", "model": model, "diffusivity": slow, "second_diffusivity": fast, "end_time": 5,
-            "tolerance": 1e-6
-        }})
-    };
-    let built = finished(&mesh, &problem(json!({"type": "schnakenberg", "a": 0.1, "b": 0.9, "gamma": 1.0})));
+    let problem = |model: Value| json!({"problem": {"type": "reaction_diffusion", "model": model, "end_time": 5, "tolerance": 1e-6}});
+    let mut body = problem(json!({"type": "schnakenberg", "a": 0.1, "b": 0.9, "gamma": 1.0}));
+    (body["problem"]["diffusivity"], body["problem"]["second_diffusivity"]) = (json!(slow), json!(fast));
+    let built = finished(&mesh, &body);
     let written = finished(
         &mesh,
         &problem(json!({

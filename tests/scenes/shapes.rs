@@ -22,7 +22,7 @@ pub fn bodies() -> Vec<Value> {
     let arrow = json!({"type": "polygon", "points": [[0.2, 0.3], [0.8, 0.3], [0.75, 0.8], [0.5, 0.5], [0.25, 0.75]]});
     vec![
         json!({"kind": "vortex", "spacing": 0.04, "band_h": 10, "end_time": 0.5, "steps": 6, "shape": slotted}),
-        json!({"kind": "redistance", "spacing": 0.125, "repeat": 1, "method": {"type": "pcp", "degree": 2}, "shape": cut}),
+        json!({"kind": "redistance", "spacing": 0.125, "repeat": 2, "method": {"type": "pcp", "degree": 2}, "shape": cut}),
         json!({"kind": "front", "spacing": 0.03, "end_time": 0.05, "time_step": 0.01, "shape": arrow}),
         json!({
             "kind": "droplet", "case": "custom", "spacing": 0.1, "end_time": 0.008, "allow_soft": true, "shape": lens,
