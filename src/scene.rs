@@ -8,7 +8,7 @@ pub mod mesh;
 pub mod view;
 pub mod work;
 
-pub use cloud::{Cloud, CloudReference, CloudRole, CloudSize, CloudSizes, CloudSource, Clouds};
+pub use cloud::{Cloud, CloudReference, CloudRole, CloudSize, CloudSizes, CloudSource, Clouds, Column};
 pub use mesh::{MeshSize, mesh_size};
 pub use view::View;
 pub use work::PhaseWork;

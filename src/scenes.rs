@@ -2,6 +2,7 @@
 //! come from [`SCENES`].
 
 pub mod droplet;
+mod flow_data;
 mod flow_return;
 mod flow_work;
 pub mod integrators;

@@ -3,8 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "support/mod.rs"]
-#[expect(dead_code, reason = "each test target uses a part")]
 mod support;
+#[path = "scenes/data_inputs.rs"]
+mod data_inputs;
 #[path = "scenes/droplets.rs"]
 mod droplets;
 #[path = "scenes/fronts.rs"]

@@ -1,6 +1,7 @@
 //! Prescribed velocity fields u(x, t), one file per flow, and the parameter that chooses one.
 
 pub mod formula_flow;
+pub mod grid_flow;
 pub mod rays;
 pub mod rotation;
 pub mod single_vortex;
@@ -8,6 +9,7 @@ pub mod translation;
 pub mod vortex_3d;
 
 pub use formula_flow::FormulaFlow;
+pub use grid_flow::{GridFlow, GridNodes};
 pub use rays::Rays;
 pub use rotation::Rotation;
 pub use single_vortex::SingleVortex;
@@ -18,7 +20,8 @@ use super::Vector;
 use super::dimension::in_dimension;
 use crate::formulas::{FormulaList, NamedNumbers, constants};
 use crate::spec::{Choice, Coordinates, Items, POSITIVE, Parameter, Violation};
-use serde_json::json;
+use grid_flow::UnreadFlow;
+use serde_json::{Value, json};
 
 /// How many times longer (or larger) a flow makes a front, relative to the front at time 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,19 +141,51 @@ crate::choice! {
             /// time after which every point is back at its start; null where none is
             period: Option<f64>, in POSITIVE;
         }
+        /// a flow from data: velocities on a regular grid, cubic in space and linear in time
+        Grid = "grid" {
+            /// id of an upload `as=flow` that is ready
+            upload: Option<String>;
+            /// path of a file (valid for `meniscus run` alone)
+            file: Option<String>;
+            /// time after which every point is back at its start; null where none is
+            period: Option<f64>, in POSITIVE;
+        }
     }
 }
 
 /// Names of the flows that exist in the plane, and in space.
-const EXISTING: [&[&str]; 2] =
-    [&["single_vortex", "rotation", "translation", "formula"], &["vortex_3d", "rotation", "translation", "formula"]];
+const EXISTING: [&[&str]; 2] = [
+    &["single_vortex", "rotation", "translation", "formula", "grid"],
+    &["vortex_3d", "rotation", "translation", "formula", "grid"],
+];
+
+/// Velocities on a grid: its nodes, and the components at all of them, time after time.
+#[derive(Debug, Clone, Copy)]
+pub struct GridData<'a> {
+    /// Where and when.
+    pub nodes: &'a GridNodes,
+    /// x, y and z of the velocity.
+    pub components: [&'a [f64]; 3],
+}
 
 impl FlowChoice {
-    /// The velocity field in `D` dimensions, for a run until `end_time`. Pointers of errors begin with `pointer`.
+    /// Whether the flow comes from data that are read when a run begins.
+    #[must_use]
+    pub fn is_from_outside(&self) -> bool {
+        matches!(self, Self::Grid { .. })
+    }
+
+    /// The velocity field in `D` dimensions, for a run until `end_time`. Pointers of errors begin with `pointer`. A flow from data
+    /// rests where these are not read yet.
     ///
     /// # Errors
     /// Where it does not exist in this dimension, and all that is wrong with formulas.
-    pub fn flow<const D: usize>(&self, end_time: f64, pointer: &str) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
+    pub fn flow<const D: usize>(
+        &self,
+        end_time: f64,
+        pointer: &str,
+        data: Option<GridData<'_>>,
+    ) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
         let choice = Chosen { choice: self, pointer };
         match self {
             Self::SingleVortex { period } => choice.in_plane(SingleVortex { period: *period }),
@@ -164,6 +199,15 @@ impl FlowChoice {
             }
             Self::Formula { velocity, parameters, period } => {
                 Ok(Box::new(FormulaFlow::<D>::new(velocity, parameters, *period, end_time, pointer)?))
+            }
+            Self::Grid { period, .. } => {
+                let Some(GridData { nodes, components }) = data else {
+                    return Ok(Box::new(UnreadFlow { period: *period }));
+                };
+                let components = std::array::from_fn(|d| components[d]);
+                let flow = GridFlow::<D>::new(nodes, components, *period, end_time);
+                flow.map(|flow| -> Box<dyn Flow<D>> { Box::new(flow) })
+                    .map_err(|why| vec![Violation::new(pointer, "data", why.to_string(), self.to_json(), Value::Null)])
             }
         }
     }
@@ -244,11 +288,11 @@ mod tests {
     #[test]
     fn a_flow_exists_in_its_dimension_alone() {
         let vortex = FlowChoice::SingleVortex { period: None };
-        assert!(vortex.flow::<2>(1.0, "/flow").is_ok());
-        let found = vortex.flow::<3>(1.0, "/law/flow").err().unwrap().remove(0);
+        assert!(vortex.flow::<2>(1.0, "/flow", None).is_ok());
+        let found = vortex.flow::<3>(1.0, "/law/flow", None).err().unwrap().remove(0);
         assert_eq!((found.pointer.as_str(), found.got.as_str()), ("/law/flow/type", Some("single_vortex")));
         let rotation = FlowChoice::Rotation { center: [0.5, 0.5].into(), angular_velocity: 2.0 };
-        assert!(rotation.flow::<2>(1.0, "/flow").is_ok() && rotation.flow::<3>(1.0, "/flow").is_err());
+        assert!(rotation.flow::<2>(1.0, "/flow", None).is_ok() && rotation.flow::<3>(1.0, "/flow", None).is_err());
     }
 
     #[test]

@@ -1,15 +1,25 @@
-//! Points that a scene takes from outside: a shape made of particles with their level, a closed mesh, a surface with its
-//! normals, or places to ask about.
+//! What a scene takes from outside: a shape made of particles with their level, a closed mesh, a surface with its normals,
+//! places to ask about, values at points, or the velocities of a flow.
 //!
 //! The engine opens no file. A scene says by pointer what it needs; the caller that builds it hands over the arrays.
 
+use crate::geometry::flows::GridNodes;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::spec::Violation;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Points, with a level, normals or triangles where they have some.
+/// Values with a name, one a point.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Column {
+    /// The name.
+    pub name: String,
+    /// The values.
+    pub values: Vec<f64>,
+}
+
+/// Points, with a level, normals, triangles or other values where they have some; or values alone.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Cloud {
     /// x, y, z; z is 0 for points of the plane.
@@ -22,6 +32,44 @@ pub struct Cloud {
     pub triangles: Vec<[u32; 3]>,
     /// Points of the file that are not here because no face has them.
     pub left_out: u64,
+    /// Index in the file of each point, where points were left out; else empty.
+    pub kept: Vec<u32>,
+    /// Further values at the points.
+    pub columns: Vec<Column>,
+    /// Where the values of the columns lie, if at the nodes of a grid and not at `positions`: all of one time before the next.
+    pub grid: Option<GridNodes>,
+}
+
+impl Cloud {
+    /// Index in the file of a point.
+    #[must_use]
+    pub fn place_in_file(&self, point: usize) -> usize {
+        self.kept.get(point).map_or(point, |place| *place as usize)
+    }
+
+    /// Number of points of the file.
+    #[must_use]
+    pub fn points_in_file(&self) -> usize {
+        self.positions.len() + self.left_out as usize
+    }
+
+    /// The values of a name; those of the only column where no name is given.
+    ///
+    /// # Errors
+    /// A sentence that lists the names there are.
+    pub fn column(&self, name: Option<&str>) -> Result<&[f64], String> {
+        let names = || self.columns.iter().map(|column| format!("{:?}", column.name)).collect::<Vec<_>>().join(", ");
+        match (name, self.columns.as_slice()) {
+            (_, []) => Err("the file has no values beside its points".to_owned()),
+            (None, [only]) => Ok(&only.values),
+            (None, _) => Err(format!("the file has several columns; name one of {}", names())),
+            (Some(name), columns) => columns
+                .iter()
+                .find(|column| column.name == name)
+                .map(|column| column.values.as_slice())
+                .ok_or_else(|| format!("the file has no column {name:?}; it has {}", names())),
+        }
+    }
 }
 
 /// What stands at a pointer of a scene.
@@ -46,6 +94,22 @@ pub enum CloudRole {
     Queries,
     /// A closed mesh of triangles, or in the plane the corners of a polygon in order.
     Mesh,
+    /// Values in the order of the points of a surface.
+    Values,
+    /// The velocities of a flow on a grid.
+    Flow,
+}
+
+impl CloudRole {
+    /// The `type` that names it in a scene, and what comes from a file then.
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Mesh => ("mesh", "a mesh comes"),
+            Self::Values => ("data", "values come"),
+            Self::Flow => ("grid", "a flow comes"),
+            Self::Points | Self::Surface | Self::Queries => ("points", "points come"),
+        }
+    }
 }
 
 /// Where points come from.
@@ -96,13 +160,12 @@ impl PointsSource {
         role: CloudRole,
         errors: &mut Vec<Violation>,
     ) -> Option<CloudReference> {
-        let name = if role == CloudRole::Mesh { "mesh" } else { "points" };
+        let (name, come) = role.words();
         let source = match (&self.file, &self.upload) {
             (Some(file), None) => CloudSource::File(file.clone()),
             (None, Some(upload)) => CloudSource::Upload(upload.clone()),
             (given, upload) => {
                 let code = if given.is_some() { "conflict" } else { "required" };
-                let come = if role == CloudRole::Mesh { "a mesh comes" } else { "points come" };
                 let detail = format!("{come} from an upload, or in `meniscus run` from a file; name one of them");
                 let got = json!({"type": name, "upload": upload, "file": given});
                 errors.push(Violation::new(pointer, code, detail, got, json!({"type": name, "upload": "upl_…"})));

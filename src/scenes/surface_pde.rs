@@ -1,7 +1,9 @@
 //! `surface_pde`: operators and equations on surfaces (Surface DC-PSE paper).
 
+mod data_fields;
 mod edges;
 mod field_choices;
+mod field_spec;
 mod field_values;
 mod methods;
 mod motions;

@@ -14,6 +14,7 @@ mod clients;
 mod connections;
 mod contract;
 mod data_directory;
+mod data_uploads;
 mod estimates;
 mod examples;
 mod http;

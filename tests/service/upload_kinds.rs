@@ -172,7 +172,7 @@ fn hdf5_kinds(directory: &Path) -> Option<Vec<Value>> {
 }
 
 /// What the inspection of a file hands over: its line, and positions, level and normals of the points.
-fn inspected(path: &Path, purpose: &str) -> (Value, Option<meniscus::scene::Cloud>) {
+pub(crate) fn inspected(path: &Path, purpose: &str) -> (Value, Option<meniscus::scene::Cloud>) {
     let output = Command::new(program()).args(["inspect", "--as", purpose]).arg(path).output().unwrap();
     let line = output.stdout.split(|b| *b == b'\n').next().unwrap_or_default();
     let said: Value = serde_json::from_slice(line).unwrap_or_default();

@@ -4,6 +4,7 @@ use meniscus::parallel::Interrupt;
 use meniscus::scene::{BuildContext, Clouds, Scene, parse};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, FieldValues, OutputPlan, Report, Selection, Simulation};
+use meniscus::spec::Violation;
 use serde_json::Value;
 
 pub const PLAN: OutputPlan = OutputPlan { every_time: None, series_every_steps: 10 };
@@ -13,9 +14,13 @@ pub fn scene(value: &Value) -> Box<dyn Scene> {
 }
 
 pub fn build(value: &Value, plan: OutputPlan) -> Box<dyn Simulation> {
-    let context =
-        BuildContext { plan, interrupt: Interrupt::default(), cpu_clock: CpuClock::still(), clouds: Clouds::new() };
-    scene(value).build(context).unwrap()
+    build_with(value, plan, &Clouds::new()).unwrap()
+}
+
+/// The simulation of a scene that takes points or values from outside.
+pub fn build_with(value: &Value, plan: OutputPlan, clouds: &Clouds) -> Result<Box<dyn Simulation>, Vec<Violation>> {
+    let (interrupt, cpu_clock) = (Interrupt::default(), CpuClock::still());
+    scene(value).build(BuildContext { plan, interrupt, cpu_clock, clouds: clouds.clone() })
 }
 
 pub fn pool(threads: usize) -> rayon::ThreadPool {

@@ -38,7 +38,7 @@ const LONGEST_NAME: usize = 200;
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct UploadQuery {
-    /// What the file is used as: `checkpoint`, `points`, `surface`, `queries` or `mesh`.
+    /// What the file is used as: `checkpoint`, `points`, `surface`, `queries`, `mesh`, `values` or `flow`.
     #[param(value_type = String)]
     r#as: Purpose,
     /// Name of the upload.
@@ -48,7 +48,7 @@ pub struct UploadQuery {
 /// Receives a file. It is `quarantined` until a separate process has examined it, then `ready` or `rejected`.
 #[utoipa::path(post, path = "/v1/uploads", operation_id = "submit_upload", tag = "uploads",
     params(UploadQuery, ("Idempotency-Key" = Option<String>, Header)),
-    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "the file: HDF5; surfaces, meshes and queries also PLY, OBJ, STL or XYZ"),
+    request_body(content = Vec<u8>, content_type = "application/octet-stream", description = "the file: HDF5; surfaces, meshes and queries also PLY, OBJ, STL or XYZ; values also text, CSV or .npy; flows also VTI"),
     responses((status = 201, body = UploadView, headers(("Location" = String))), (status = 413, body = Problem),
         (status = 415, body = Problem), (status = 422, body = Problem), (status = 429, body = Problem), (status = 507, body = Problem)))]
 pub async fn submit(

@@ -5,10 +5,11 @@ mod foreign;
 mod obj;
 mod ply;
 mod stl;
-mod text;
+pub(super) mod text;
 mod xyz;
 
 use crate::spec::uploads::MOST_POINTS;
+use meniscus::scene::Column;
 use std::collections::HashMap;
 
 /// Points, normals where every point has one, triangles or polygons by their points.
@@ -22,6 +23,10 @@ pub struct Mesh {
     pub faces: Vec<Vec<u32>>,
     /// Whether points belong to the surface though no face has them.
     pub has_loose_points: bool,
+    /// Further values at the points.
+    pub columns: Vec<Column>,
+    /// Index in the file of each point, where some were left out; else empty.
+    pub kept: Vec<u32>,
 }
 
 /// Most corners of a face.
@@ -88,6 +93,11 @@ impl Mesh {
             let is_kept = |k: usize| places.get(k).is_some_and(Option::is_some);
             let keep = |list: &[[f64; 3]]| (0..).zip(list).filter(|(k, _)| is_kept(*k)).map(|(_, x)| *x).collect();
             (self.points, self.normals) = (keep(&self.points), keep(&self.normals));
+            self.kept = (0..all as u32).filter(|k| is_kept(*k as usize)).collect();
+            for column in &mut self.columns {
+                let values = std::mem::take(&mut column.values).into_iter().enumerate();
+                column.values = values.filter(|(k, _)| is_kept(*k)).map(|(_, value)| value).collect();
+            }
             for corner in self.faces.iter_mut().flatten() {
                 *corner = places.get(*corner as usize).copied().flatten().unwrap_or(u32::MAX);
             }

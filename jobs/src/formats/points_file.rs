@@ -52,6 +52,9 @@ fn finish(
         // Places have neither normals nor faces.
         mesh = Mesh { points: mesh.points, ..Mesh::default() };
     }
+    if !is_surface {
+        mesh.columns.clear();
+    }
     let left_out = mesh.leave_out_loose_points()?;
     mesh.check()?;
     // What is used as a closed mesh is closed, or refused below; its points may repeat.
@@ -62,7 +65,8 @@ fn finish(
         return Err(format!("{} triangles; at most {} are read", triangles.len(), cloud_file::MOST_TRIANGLES));
     }
     let normals = (!mesh.normals.is_empty()).then_some(mesh.normals);
-    let cloud = Cloud { positions: mesh.points, level, normals, triangles, left_out };
+    let Mesh { points, columns, kept, .. } = mesh;
+    let cloud = Cloud { positions: points, level, normals, triangles, left_out, kept, columns, grid: None };
     let size = if is_closed_mesh { Some(mesh_size(&cloud).map_err(|faults| faults.join("; "))?) } else { None };
     let contents = PointContents {
         area: size.map(|size| size.area),
@@ -84,7 +88,7 @@ fn contents_of(cloud: &Cloud) -> PointContents {
     let normal = cloud.normals.as_ref().map(|_| "normal".to_owned());
     PointContents {
         points: cloud.positions.len() as u64,
-        fields: phi.into_iter().chain(normal).collect(),
+        fields: phi.into_iter().chain(normal).chain(cloud.columns.iter().map(|column| column.name.clone())).collect(),
         low: bound(f64::min, f64::INFINITY),
         high: bound(f64::max, f64::NEG_INFINITY),
         normals: None,

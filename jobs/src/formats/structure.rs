@@ -7,7 +7,8 @@
 //! newest format. It may hang or end the process over a damaged file, and a gate before it must understand each file exactly
 //! as it does, or something passes that the gate has not seen. So the numbers are read here, too: the one reading is the
 //! gate. The service's inspection, `meniscus run` and checkpoints use it alike. What is not needed is passed over: soft
-//! links are not followed, attributes are not read, data sets of texts and compounds stay as they are.
+//! links are not followed, attributes are read where they are numbers in the header of a group, data sets of texts and
+//! compounds stay as they are.
 //!
 //! After the HDF5 File Format Specification, version 3.0, and the layout version 5 of HDF5 2.0. Accepted are superblocks 0 to
 //! 3, object headers 1 and 2, groups as symbol tables, compact links and dense links (fractal heap and version 2 tree), and
@@ -15,6 +16,7 @@
 //! compared, of metadata and of chunks.
 
 mod array_index;
+mod attributes;
 mod checksum;
 mod chunk_index;
 mod contents;
@@ -143,6 +145,12 @@ impl DataSet {
         self.extent.iter().fold(1, |product, n| product.saturating_mul(*n))
     }
 
+    /// Whether its elements are numbers.
+    #[must_use]
+    pub fn is_number(&self) -> bool {
+        self.is_float() || matches!(self.element, Element::Integer { .. })
+    }
+
     /// Whether its elements are floating-point numbers.
     #[must_use]
     pub fn is_float(&self) -> bool {
@@ -151,12 +159,14 @@ impl DataSet {
 }
 
 /// Everything in a file, by path.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Structure {
     /// Data sets by path.
     pub data_sets: BTreeMap<String, DataSet>,
     /// Groups, the root as the empty path.
     pub groups: BTreeSet<String>,
+    /// Numbers of attributes, by the path of their group and, behind an @, their name.
+    pub attributes: BTreeMap<String, Vec<f64>>,
 }
 
 /// What HDF5 files begin with.
@@ -366,6 +376,11 @@ impl<'a, B: Bytes + ?Sized> Reader<'a, B> {
             return Ok(());
         }
         self.structure.groups.insert(place.to_owned());
+        for message in messages.iter().filter(|message| message.kind == 0x0C) {
+            if let Some((name, values)) = self.attribute(message) {
+                self.structure.attributes.insert(format!("{place}@{name}"), values);
+            }
+        }
         self.members(place, &messages, depth)
     }
 

@@ -4,9 +4,11 @@
 //! order. Normals are called `normal` as in frames, or `Normals` as by VTK's filters. Files of several pieces are read as one,
 //! files of several time steps are refused.
 
+use super::cloud_file::MOST_VALUES;
 use super::mesh::{Mesh, strip_faces};
 use super::structure::{self, DataSet, Refusal, Structure};
 use crate::spec::uploads::{MOST_POINTS, Purpose};
+use meniscus::scene::Column;
 use std::fs::File;
 
 /// Corners of all faces at most.
@@ -44,11 +46,25 @@ pub fn read(file: &File, purpose: Purpose) -> Result<VtkPoints, String> {
     if let Some(normals) = normals {
         mesh.normals = found.triples(&normals)?;
     }
+    if purpose == Purpose::Surface {
+        mesh.columns = found.columns(count)?;
+    }
     if matches!(purpose, Purpose::Surface | Purpose::Mesh) {
         (mesh.faces, mesh.has_loose_points) = found.faces(count)?;
     }
     let level = level.map(|place| found.reals(place)).transpose()?;
     Ok(VtkPoints { mesh, level })
+}
+
+/// Reads the values at the points of a file.
+///
+/// # Errors
+/// A sentence that names the data set and what is wrong with it.
+pub fn columns(file: &File) -> Result<Vec<Column>, String> {
+    let structure = structure::read(file).map_err(|refusal| refusal.to_string())?;
+    let found = Found { file, structure };
+    let (_, count) = found.check_points()?;
+    found.columns(count)
 }
 
 /// An open file and its structure.
@@ -128,6 +144,34 @@ impl Found<'_> {
             }
             _ => Ok(Some(place)),
         }
+    }
+
+    /// Scalars at the points, and the components of vectors; normals are none.
+    fn columns(&self, count: u64) -> Result<Vec<Column>, String> {
+        let mut columns = Vec::new();
+        let mut numbers = 0;
+        for (place, data_set) in &self.structure.data_sets {
+            let Some(name) = place.strip_prefix(POINT_DATA).and_then(|rest| rest.strip_prefix('/')) else { continue };
+            let components = match data_set.extent.as_slice() {
+                [n] | [n, 1] if *n == count => 1,
+                [n, 3] if *n == count => 3,
+                _ => continue,
+            };
+            numbers += components * count;
+            if NORMALS.contains(&name) || !data_set.is_number() || numbers > MOST_VALUES {
+                continue;
+            }
+            let values = self.reals(place)?;
+            if components == 1 {
+                columns.push(Column { name: name.to_owned(), values });
+            } else {
+                columns.extend(["x", "y", "z"].into_iter().enumerate().map(|(d, axis)| Column {
+                    name: format!("{name}_{axis}"),
+                    values: values.iter().skip(d).step_by(3).copied().collect(),
+                }));
+            }
+        }
+        Ok(columns)
     }
 
     /// Polygons and strips, and whether points belong to the surface without a face: those that are vertices, or all where

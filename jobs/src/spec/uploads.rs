@@ -21,11 +21,16 @@ pub enum Purpose {
     Queries,
     /// A closed mesh of triangles, or the corners of a polygon in order.
     Mesh,
+    /// Values in the order of the points of a surface.
+    Values,
+    /// Velocities on a regular grid.
+    Flow,
 }
 
 impl Purpose {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Checkpoint, Self::Points, Self::Surface, Self::Queries, Self::Mesh];
+    pub const ALL: [Self; 7] =
+        [Self::Checkpoint, Self::Points, Self::Surface, Self::Queries, Self::Mesh, Self::Values, Self::Flow];
 
     /// The word that stands for it.
     #[must_use]
@@ -36,6 +41,8 @@ impl Purpose {
             Self::Surface => "surface",
             Self::Queries => "queries",
             Self::Mesh => "mesh",
+            Self::Values => "values",
+            Self::Flow => "flow",
         }
     }
 
@@ -64,6 +71,10 @@ pub enum Contents {
     Checkpoint(CheckpointContents),
     /// Points, with or without a surface.
     Points(PointContents),
+    /// Values at points.
+    Values(ValueContents),
+    /// Velocities on a grid.
+    Flow(FlowContents),
 }
 
 /// A checkpoint that was uploaded.
@@ -122,6 +133,45 @@ pub struct PointContents {
     pub volume: Option<f64>,
 }
 
+/// Values that were uploaded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ValueContents {
+    /// Number of values in a column.
+    pub values: u64,
+    /// The columns.
+    pub columns: Vec<ColumnContents>,
+}
+
+/// Velocities on a grid that were uploaded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FlowContents {
+    /// Nodes along x, y and z.
+    pub nodes: [usize; 3],
+    /// The first node.
+    pub low: [f64; 3],
+    /// The last node.
+    pub high: [f64; 3],
+    /// Number of times.
+    pub times: u64,
+    /// The first of them.
+    pub first_time: f64,
+    /// The last of them.
+    pub last_time: f64,
+    /// The largest speed at a node.
+    pub fastest: f64,
+}
+
+/// A column of values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ColumnContents {
+    /// Its name.
+    pub name: String,
+    /// The least value; None where no value is finite.
+    pub least: Option<f64>,
+    /// The greatest value.
+    pub greatest: Option<f64>,
+}
+
 /// Faces of a mesh.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FaceContents {
@@ -138,11 +188,13 @@ impl Contents {
         self.size().map(|size| size.points)
     }
 
-    /// Number of points, and the area of a mesh; None for a checkpoint.
+    /// Number of points or values, and the area of a mesh; None for a checkpoint.
     #[must_use]
     pub fn size(&self) -> Option<CloudSize> {
         match self {
             Self::Checkpoint(_) => None,
+            Self::Values(found) => Some(found.values.into()),
+            Self::Flow(found) => Some((found.nodes.iter().product::<usize>() as u64).into()),
             Self::Points(found) => Some(CloudSize { points: found.points, area: found.area }),
         }
     }

@@ -1,7 +1,7 @@
 //! Points that a scene takes from files, as its worker reads them: uploads in the plain format that their inspection
 //! wrote, local files of `meniscus run` as they are.
 
-use crate::formats::{cloud_file, points_file};
+use crate::formats::{cloud_file, flow_file, points_file, values_file};
 use crate::spec::attempt_spec::AttemptSpec;
 use crate::spec::uploads::Purpose;
 use meniscus::scene::{Cloud, CloudReference, CloudRole, CloudSource, Clouds, Scene};
@@ -35,7 +35,13 @@ fn read_local(path: &Path, role: CloudRole) -> Result<Cloud, String> {
         CloudRole::Queries => Purpose::Queries,
         CloudRole::Points => Purpose::Points,
         CloudRole::Mesh => Purpose::Mesh,
+        CloudRole::Values => Purpose::Values,
+        CloudRole::Flow => Purpose::Flow,
     };
     let mut file = File::open(path).map_err(|error| error.to_string())?;
-    points_file::read(&mut file, purpose).map(|(_, cloud)| cloud)
+    match purpose {
+        Purpose::Values => values_file::read(&mut file).map(|(_, values)| values),
+        Purpose::Flow => flow_file::read(&mut file).map(|(_, flow)| flow),
+        _ => points_file::read(&mut file, purpose).map(|(_, cloud)| cloud),
+    }
 }

@@ -22,6 +22,13 @@ pub(in crate::scenes) struct FrontChoice {
     pub pointer: &'static str,
 }
 
+impl FrontChoice {
+    /// Where its flow stands: where the motion of another scene is done as a front, at the top.
+    pub fn flow_pointer(&self) -> &'static str {
+        if self.pointer.is_empty() { "/law/flow" } else { "/flow" }
+    }
+}
+
 /// What was left open in a [`FrontChoice`].
 pub(in crate::scenes) struct Completed {
     pub dimension: usize,

@@ -3,6 +3,7 @@
 use super::spec::Law;
 use crate::formulas::FormulaText;
 use crate::geometry::Vector;
+use crate::geometry::flows::GridData;
 use crate::scenes::gbpm_spec::Motion;
 use crate::schemes::grid_based_particle::FrontLaw;
 use crate::schemes::grid_based_particle::laws::{FormulaSpeed, MeanCurvature, NormalSpeed, PrescribedFlow};
@@ -35,7 +36,12 @@ impl Law {
         }
     }
 
-    /// The law that moves a surface.
+    /// Whether it takes data that are read when a run begins.
+    pub fn is_from_outside(&self) -> bool {
+        matches!(self, Self::Flow { flow } if flow.is_from_outside())
+    }
+
+    /// The law that moves a surface; a flow from data rests before these are read.
     ///
     /// # Errors
     /// Where the law does not exist in this dimension.
@@ -44,6 +50,7 @@ impl Law {
         end_time: f64,
         flow_pointer: &str,
         extent: (Vector<D>, Vector<D>),
+        data: Option<GridData<'_>>,
     ) -> Result<Arc<dyn FrontLaw<D, M>>, Vec<Violation>> {
         Ok(match self {
             Self::Normal { speed } => Arc::new(NormalSpeed { speed: *speed }),
@@ -51,7 +58,9 @@ impl Law {
             Self::Formula { speed, parameters } => {
                 Arc::new(FormulaSpeed::<D>::new(speed, parameters, extent, end_time, "/law")?)
             }
-            Self::Flow { flow } => Arc::new(PrescribedFlow::<D>::new(flow.flow::<D>(end_time, flow_pointer)?.into())),
+            Self::Flow { flow } => {
+                Arc::new(PrescribedFlow::<D>::new(flow.flow::<D>(end_time, flow_pointer, data)?.into()))
+            }
             Self::GeometricalOptics { .. } => {
                 let detail = "a wave front is a curve, not a surface of this dimension";
                 let allowed = json!(["normal", "mean_curvature", "flow", "formula"]);

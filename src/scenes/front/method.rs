@@ -45,8 +45,9 @@ pub(super) fn plan_method<const D: usize, const M: usize>(
     let context = GbpmContext { pointer: choice.pointer, dimension, motion, topology };
     let planned = choice.method.clone().plan(context);
     check_steps(choice, front.law, &mut errors);
-    if front.extent.is_none() && choice.shape.is_from_outside() && choice.law.depends_on_place() {
-        errors.extend(check_step_of_mesh(choice));
+    let is_unread = front.extent.is_none() && choice.shape.is_from_outside();
+    if is_unread && choice.law.depends_on_place() || choice.law.is_from_outside() {
+        errors.extend(check_step_of_data(choice));
     }
     if !(front.is_within_grid)(choice.method.levels()) {
         let detail = "the grid ends before the shape does: its finest level counts so many cells from the origin alone";
@@ -112,11 +113,10 @@ fn check_steps<const D: usize, const M: usize>(
     }
 }
 
-/// The violation where a step is left open whose length would follow from the speeds about a mesh.
-fn check_step_of_mesh(choice: &FrontChoice) -> Option<Violation> {
+/// The violation where a step is left open whose length would follow from what is in a file.
+fn check_step_of_data(choice: &FrontChoice) -> Option<Violation> {
     let is_open = choice.time_step.is_none() && choice.steps.is_none();
-    let detail =
-        "where a mesh lies, and how fast it moves there, is not known before it is read; give time_step or steps";
+    let detail = "how fast a front moves is not known before its mesh or flow is read; give time_step or steps";
     is_open.then(|| Violation::new("/time_step", "required", detail, Value::Null, "a number > 0"))
 }
 

@@ -4,14 +4,15 @@ use super::choice::{Completed, FrontChoice, FrontPlan, Resolved};
 use super::method::{
     BYTES, FrontQuestion, REFINED_BYTES, check_stability, is_within_grid, labels, plan_method, step_plan,
 };
-use super::spec::Front;
+use super::spec::{Front, Law};
 use super::wavefront;
-use crate::geometry::flows::Stretch;
+use crate::geometry::flows::{GridData, Stretch};
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
-use crate::scene::cloud::{CloudReference, CloudSizes};
+use crate::scene::cloud::{CloudReference, CloudSizes, Clouds};
 use crate::scene::work::PhaseWork;
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
+use crate::scenes::flow_data;
 use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::{error_units, path_units};
 use crate::scenes::particle_estimate::{check_extent, shape_particles};
@@ -90,7 +91,10 @@ pub(in crate::scenes) fn plan_front(
 /// 1. Shape. 2. Law. 3. Method, grid and time step.
 fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOnce(Completed) -> Resolved) -> Planned {
     let mut errors = Vec::new();
-    let clouds: Vec<CloudReference> = choice.shape.points_reference("/shape", &mut errors).into_iter().collect();
+    let mut clouds: Vec<CloudReference> = choice.shape.points_reference("/shape", &mut errors).into_iter().collect();
+    if let Law::Flow { flow } = &choice.law {
+        clouds.extend(flow_data::reference(flow, choice.flow_pointer(), &mut errors));
+    }
     let mut surface = None;
     if !choice.shape.is_from_outside() {
         surface = choice.shape.surface::<D>("/shape").map_err(|found| errors.extend(found)).ok();
@@ -98,7 +102,7 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
     let whole = surface.as_ref().map(|surface| surface.whole.as_ref());
     errors.extend(whole.and_then(|whole| check_extent(whole, BAND_H * choice.spacing, choice.spacing)));
     let extent = whole.map(Surface::bounding_box);
-    let law = law_about::<D, M>(&choice, whole);
+    let law = law_about::<D, M>(&choice, whole, None);
     errors.extend(law.as_ref().err().into_iter().flatten().cloned());
     let question = FrontQuestion {
         law: law.as_deref().ok(),
@@ -115,11 +119,11 @@ fn plan<const D: usize, const M: usize>(choice: FrontChoice, complete: impl FnOn
 fn law_about<const D: usize, const M: usize>(
     choice: &FrontChoice,
     surface: Option<&dyn Surface<D>>,
+    data: Option<GridData<'_>>,
 ) -> Result<Arc<dyn FrontLaw<D, M>>, Vec<Violation>> {
-    // Where the motion of another scene is done as a front, its flow stands at the top.
-    let flow_pointer = if choice.pointer.is_empty() { "/law/flow" } else { "/flow" };
+    let flow_pointer = choice.flow_pointer();
     let about = surface.map_or((Vector::<D>::zeros(), Vector::<D>::repeat(1.0)), Surface::bounding_box);
-    let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about)?;
+    let law = choice.law.for_surface::<D, M>(choice.end_time, flow_pointer, about, data)?;
     match surface.and_then(|surface| check_return(law.flow()?, surface, flow_pointer)) {
         Some(violation) => Err(vec![violation]),
         None => Ok(law),
@@ -127,12 +131,17 @@ fn law_about<const D: usize, const M: usize>(
 }
 
 impl<const D: usize, const M: usize> FrontScene<D, M> {
-    /// The law at the start of a run: that about a mesh is known only then.
-    fn law_at_build(&self, surface: &ShapeSurface<D>) -> Result<Arc<dyn FrontLaw<D, M>>, Vec<Violation>> {
-        if self.surface.is_some() {
+    /// The law at the start of a run: that about a mesh, and that by data, are known only then.
+    fn law_at_build(
+        &self,
+        surface: &ShapeSurface<D>,
+        clouds: &Clouds,
+    ) -> Result<Arc<dyn FrontLaw<D, M>>, Vec<Violation>> {
+        if self.surface.is_some() && !self.choice.law.is_from_outside() {
             return Ok(Arc::clone(&self.law));
         }
-        let law = law_about::<D, M>(&self.choice, Some(surface.whole.as_ref()))?;
+        let data = flow_data::data(clouds, self.choice.flow_pointer());
+        let law = law_about::<D, M>(&self.choice, Some(surface.whole.as_ref()), data)?;
         let steps = step_plan(&self.choice, D, Some(surface.whole.bounding_box()));
         match check_stability(&self.choice, Some(law.as_ref()), self.plan.fixed, &steps) {
             Some(violation) => Err(vec![violation]),
@@ -266,7 +275,7 @@ impl<const D: usize, const M: usize> Scene for FrontScene<D, M> {
             let detail = "a front starts from a shape with a surface";
             return Err(vec![Violation::new("/shape", "conflict", detail, Value::Null, Value::Null)]);
         };
-        let law = self.law_at_build(&surface)?;
+        let law = self.law_at_build(&surface, &context.clouds)?;
         let system = self.system(&law, &surface, context.interrupt);
         if system.particle_count() == 0 {
             let detail = "no grid point of this spacing has a foot-point on the shape";

@@ -1,11 +1,16 @@
 //! What equations keep to at the edges of points from outside.
 
+use super::data_fields;
+use super::field_choices::{Course, Site};
+use super::field_spec::FieldValue;
+use super::field_values::values;
 use super::problems::ProblemChoice;
 use super::spec::{EdgesChoice, ProblemSpec, SolverChoice, SurfacePde};
 use super::surfaces::Shape;
+use crate::formulas::constants;
 use crate::geometry::Vector;
 use crate::point_clouds::{PreparedCloud, edges};
-use crate::schemes::surface_equation::{Form, SurfaceCloud};
+use crate::schemes::surface_equation::{ExactField, Form, SurfaceCloud};
 use crate::simulation::Diagnostic;
 use crate::spec::{Choice, Coordinates, Parameter, Violation};
 use serde_json::{Value, json};
@@ -24,7 +29,11 @@ pub(super) fn check(
             check_periods((period, second_period.as_ref()), (given, shape, form), problem, errors);
             return;
         }
-        EdgesChoice::Dirichlet { normal, offset, .. } => (normal, offset),
+        EdgesChoice::Dirichlet { value, normal, offset } => {
+            let site = Site { pointer: data_fields::HELD, shape, count: 0 };
+            held_field(value, site, errors);
+            (normal, offset)
+        }
     };
     let conflict =
         |at: &str, detail: &str, given: Value, allowed: Value| Violation::new(at, "conflict", detail, given, allowed);
@@ -68,6 +77,29 @@ pub(super) fn check(
         }
         _ => {}
     }
+}
+
+/// The field that edges hold the values of.
+fn held_field(value: &FieldValue, site: Site, errors: &mut Vec<Violation>) -> ExactField {
+    site.value(value, ("/edges", &constants()), Course::AtRest, errors)
+}
+
+/// The values that the edges of a cloud would hold, at all points.
+///
+/// # Errors
+/// One [`Violation`] where a formula has no value.
+pub(super) fn held_values<const D: usize>(
+    choice: &EdgesChoice,
+    shape: &Shape,
+    cloud: &SurfaceCloud<D>,
+) -> Result<Vec<f64>, Vec<Violation>> {
+    let EdgesChoice::Dirichlet { value, .. } = choice else { return Ok(Vec::new()) };
+    if let Some(number) = value.number() {
+        return Ok(vec![number; cloud.rows]);
+    }
+    let mut errors = Vec::new();
+    let field = held_field(value, Site { pointer: data_fields::HELD, shape, count: 0 }, &mut errors);
+    if errors.is_empty() { values(&field, cloud, data_fields::HELD) } else { Err(errors) }
 }
 
 /// Refuses periods where the points are not from outside, or a problem takes the chords between neighbors.
@@ -115,7 +147,7 @@ pub(super) fn periods<const D: usize>(choice: &EdgesChoice) -> Vec<Vector<D>> {
 /// Conormals where nothing flows, and points that hold a value.
 pub(super) struct Edges<const D: usize> {
     conormals: Vec<Option<Vector<D>>>,
-    held: Vec<(usize, f64)>,
+    held: Vec<usize>,
     /// Number of points with open stars that are in no row, and so of no edge.
     single: usize,
 }
@@ -127,11 +159,11 @@ impl<const D: usize> Edges<D> {
         let is_edge = edges::in_rows(&conormals, &cloud.graph);
         let single = (0..rows).filter(|i| cloud.graph.is_open(*i) && !is_edge[*i]).count();
         let mut found = Self { conormals, held: Vec::new(), single };
-        if let EdgesChoice::Dirichlet { value, normal, offset } = choice {
+        if let EdgesChoice::Dirichlet { normal, offset, .. } = choice {
             for (i, x) in cloud.points.iter().enumerate().filter(|(i, _)| is_edge[*i]) {
                 let is_in = |normal: &[f64]| x.iter().zip(normal).map(|(x, n)| x * n).sum::<f64>() >= *offset;
                 if normal.as_ref().is_none_or(|normal| is_in(normal)) {
-                    found.held.push((i, *value));
+                    found.held.push(i);
                     found.conormals[i] = None;
                 }
             }
@@ -153,7 +185,7 @@ impl<const D: usize> Edges<D> {
             return Ok(());
         }
         let mut has_held = vec![false; cloud.graph.part_count];
-        self.held.iter().for_each(|(i, _)| has_held[cloud.graph.parts[*i] as usize] = true);
+        self.held.iter().for_each(|i| has_held[cloud.graph.parts[*i] as usize] = true);
         let without = has_held.iter().filter(|held| !**held).count();
         if without == 0 {
             return Ok(());
@@ -178,13 +210,13 @@ impl<const D: usize> Edges<D> {
         ]
     }
 
-    /// Puts the edges into the cloud of a simulation, those of copies into theirs.
-    pub fn put_into(self, cloud: &mut SurfaceCloud<D>) {
+    /// Puts the edges into the cloud of a simulation, those of copies into theirs; held points hold their value of `values`.
+    pub fn put_into(self, cloud: &mut SurfaceCloud<D>, values: &[f64]) {
         cloud.conormals = self.conormals[..cloud.rows].to_vec();
         if let Some(copies) = &mut cloud.copies {
             copies.conormals = self.conormals;
         }
-        cloud.held = self.held;
+        cloud.held = self.held.into_iter().map(|i| (i, values[i])).collect();
     }
 }
 

@@ -1,7 +1,8 @@
 //! The exact field of a choice of fields, and what belongs to which surface.
 
-use super::spec::{FieldChoice, InitialChoice};
+use super::field_spec::{AxisWord, FieldChoice, FieldValue, InitialChoice, OwnField};
 use super::surfaces::Shape;
+use crate::formulas::{FormulaText, NamedNumbers};
 use crate::geometry::Vector;
 use crate::schemes::surface_equation::{ExactField, FormulaField};
 use crate::spec::{Coordinates, Parameter, Violation};
@@ -28,7 +29,6 @@ fn is_sphere(shape: &Shape) -> bool {
 
 /// The field that is taken where none is given: an eigenfunction where the surface has known ones.
 pub(super) fn default_field(shape: &Shape) -> FieldChoice {
-    use super::spec::AxisWord;
     match shape {
         Shape::Circle { .. } => FieldChoice::SinPlusCos { m: 1 },
         shape if is_sphere(shape) => FieldChoice::SphericalHarmonic { l: 4, m: 0.0, axis: AxisWord::Z },
@@ -41,10 +41,17 @@ pub(super) fn raised<const D: usize>(x: &Vector<D>) -> Vector<3> {
     Vector::<3>::from_fn(|d, _| if d < D { x[d] } else { 0.0 })
 }
 
+/// Whether a formula may name the time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Course {
+    AtRest,
+    InTime,
+}
+
 /// Where a field stands, and on what.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
-    pub pointer: &'a str,
+    pub pointer: &'static str,
     pub shape: &'a Shape,
     /// Number of points.
     pub count: u64,
@@ -80,14 +87,51 @@ impl Site<'_> {
                 ExactField::SinPlusCos { m: *m as u32 }
             }
             FieldChoice::PlaneWave { k } => ExactField::PlaneWave { k: self.wave_vector(k, errors) },
-            FieldChoice::Formula { value, parameters } => {
-                match FormulaField::at_rest(value, parameters, self.pointer, "value") {
-                    Ok(field) => ExactField::Formula(Arc::new(field)),
-                    Err(found) => {
-                        errors.extend(found);
-                        ExactField::PlaneWave { k: Vector::<3>::from(DEFAULT_WAVE) }
-                    }
-                }
+            FieldChoice::Own(field) => self.own(field, Course::AtRest, errors),
+        }
+    }
+
+    /// A field of one's own.
+    fn own(self, field: &OwnField, course: Course, errors: &mut Vec<Violation>) -> ExactField {
+        match field {
+            OwnField::Formula { value, parameters } => self.formula(value, (self.pointer, parameters), course, errors),
+            OwnField::Data { .. } => ExactField::Data(self.pointer),
+        }
+    }
+
+    /// A number, a formula or data. `owner` is the object around the value, whose `parameters` its formulas call by name.
+    pub fn value(
+        self,
+        value: &FieldValue,
+        owner: (&str, &NamedNumbers),
+        course: Course,
+        errors: &mut Vec<Violation>,
+    ) -> ExactField {
+        match value {
+            FieldValue::Text(text) => self.formula(text, owner, course, errors),
+            FieldValue::Own(field) => self.own(field, course, errors),
+        }
+    }
+
+    fn formula(
+        self,
+        text: &FormulaText,
+        (owner, parameters): (&str, &NamedNumbers),
+        course: Course,
+        errors: &mut Vec<Violation>,
+    ) -> ExactField {
+        // A field that says more has its formula in a member.
+        let place = self.pointer.strip_prefix(owner).filter(|rest| !rest.is_empty());
+        let place = place.map_or("value", |rest| rest.trim_start_matches('/'));
+        let field = match course {
+            Course::AtRest => FormulaField::at_rest(text, parameters, owner, place),
+            Course::InTime => FormulaField::in_time(text, parameters, owner, place),
+        };
+        match field {
+            Ok(field) => ExactField::Formula(Arc::new(field)),
+            Err(found) => {
+                errors.extend(found);
+                ExactField::PlaneWave { k: Vector::<3>::from(DEFAULT_WAVE) }
             }
         }
     }

@@ -4,13 +4,13 @@ use super::field_choices::vector_in_space;
 use super::surfaces::Shape;
 use super::transport_spec::MotionChoice;
 use crate::geometry::Vector;
-use crate::geometry::flows::FlowChoice;
+use crate::geometry::flows::{FlowChoice, GridData};
 use crate::schemes::surface_equation::{Course, ExactField, Motion, MovingParts};
 use crate::spec::{Coordinates, Parameter, Violation};
 use serde_json::json;
 
 /// Where the motion stands in the scene.
-const POINTER: &str = "/problem/motion";
+pub(super) const POINTER: &str = "/problem/motion";
 
 /// A planned motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,9 +43,9 @@ pub(super) fn plan(choice: &MotionChoice, shape: &Shape, end_time: f64, errors: 
     match choice {
         MotionChoice::Flow(flow) => {
             let refused = if shape.is_curve() {
-                flow.flow::<2>(end_time, POINTER).err()
+                flow.flow::<2>(end_time, POINTER, None).err()
             } else {
-                flow.flow::<3>(end_time, POINTER).err()
+                flow.flow::<3>(end_time, POINTER, None).err()
             };
             errors.extend(refused.into_iter().flatten());
             MotionPlan::Flow(flow.clone(), end_time)
@@ -114,9 +114,10 @@ impl MotionPlan {
         diffusivity: f64,
         shape: &Shape,
         values: &[f64],
+        data: Option<GridData<'_>>,
     ) -> Result<MovingParts<D>, Vec<Violation>> {
         let motion = match self {
-            Self::Flow(flow, end_time) => Motion::Flow(flow.flow::<D>(*end_time, POINTER)?),
+            Self::Flow(flow, end_time) => Motion::Flow(flow.flow::<D>(*end_time, POINTER, data)?),
             Self::Expansion { rate, center } => {
                 Motion::Expansion { rate: *rate, center: Vector::<D>::from_fn(|d, _| center[d]) }
             }

@@ -1,9 +1,11 @@
 //! From the spec of a `surface_pde` scene to points, a method and a problem. Points from outside are unknown until a run is
 //! built (`points`).
 
+use super::data_fields;
 use super::edges;
 use super::field_choices::vector_in_space;
 use super::methods::{self, Points, Scheme};
+use super::motions;
 use super::problems::{self, ProblemChoice};
 use super::solvers;
 use super::spec::{
@@ -11,16 +13,18 @@ use super::spec::{
     SupportsWord, SurfaceChoice, SurfacePde,
 };
 use super::surfaces::{self, DEFAULT_COUNT, Extent, Sampling, Shape};
+use super::transport_spec::MotionChoice;
 use crate::geometry::Vector;
 use crate::geometry::surfaces::{Ellipsoid, Torus};
 use crate::operators::charts::tangent::Metric;
 use crate::point_clouds::Bump;
 use crate::scene::cloud::{CloudReference, CloudRole};
 use crate::scene::{Planned, SceneSpec};
+use crate::scenes::flow_data;
 use crate::schemes::surface_equation::{EvolutionIntegrator, Form, Method};
 use crate::spec::{Choice, Given, Parameter, Preset, Violation};
 use crate::time::FixedStep;
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// Where normals come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +52,10 @@ pub(super) struct SurfaceScene {
     pub scheme: Scheme,
     pub problem: ProblemChoice,
     pub fixed: FixedStep,
+    /// The points of a surface from outside.
     pub points: Option<CloudReference>,
+    /// All that comes from outside.
+    pub clouds: Vec<CloudReference>,
 }
 
 /// Distances of points whose squares are numbers.
@@ -67,6 +74,14 @@ fn plan(mut spec: SurfacePde) -> Planned {
         SurfaceChoice::Points { source, .. } => source.reference("/surface", CloudRole::Surface, &mut errors),
         _ => None,
     };
+    let data = data_fields::references(&spec, &mut errors);
+    let motion = match &spec.problem {
+        ProblemSpec::MovingDiffusion { motion: MotionChoice::Flow(flow), .. } => {
+            flow_data::reference(flow, motions::POINTER, &mut errors)
+        }
+        _ => None,
+    };
+    let clouds = points.iter().cloned().chain(data).chain(motion).collect();
     let shape = shape(&spec, &mut errors);
     let dimension = shape.dimension();
     if let Some(given) = spec.dimension.filter(|given| *given != dimension) {
@@ -107,7 +122,7 @@ fn plan(mut spec: SurfacePde) -> Planned {
         | ProblemChoice::Moving { end_time, time_step, .. } => FixedStep::from_limit(*end_time, *time_step),
     };
     fill_in_steps(&mut spec.problem, &problem, fixed);
-    Ok(Box::new(SurfaceScene { given, spec, shape, count, sampling, normals, scheme, problem, fixed, points }))
+    Ok(Box::new(SurfaceScene { given, spec, shape, count, sampling, normals, scheme, problem, fixed, points, clouds }))
 }
 
 /// What method, problem, solver and repetition do not go together with.
@@ -122,6 +137,12 @@ fn check_together(
         if shape.in_space().is_none() {
             let detail = "the embedding method is for spheres, ellipsoids and tori";
             errors.push(Violation::new("/method", "conflict", detail, "closest_point", json!(["surface_dcpse"])));
+        }
+        if let ProblemChoice::LaplaceBeltrami { field } = problem
+            && !field.is_of_place()
+        {
+            let detail = "the embedding method takes a field in space, so neither normals nor data";
+            errors.push(Violation::new("/problem/field", "conflict", detail, Value::Null, json!(["surface_dcpse"])));
         }
         if !matches!(problem, ProblemChoice::LaplaceBeltrami { .. }) {
             let detail = "the embedding method is for the operator applied to a field";

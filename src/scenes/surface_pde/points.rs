@@ -2,6 +2,7 @@
 //! them. No exact answer is known on such a surface. Its report has no errors, and the plan refuses problems that need an
 //! exact answer.
 
+use super::data_fields;
 use super::edges::{self, Edges};
 use super::methods::Scheme;
 use super::plan::{Normals, SurfaceScene, choices};
@@ -40,14 +41,14 @@ pub(super) fn build<const D: usize, const M: usize>(
     let given = given_normals::<D>(&clouds, scene.normals)?;
     let is_ball = matches!(scene.scheme, Scheme::Dcpse(Method { form: Form::Intrinsic { .. }, .. }));
     let found = if is_ball {
-        Found::within_radius(scene, points, given)?
+        Found::within_radius(scene, (&clouds, points), given)?
     } else {
         Found::with_stars(scene, (&clouds, &points), given.as_deref(), &interrupt)?
     };
     let Found { cloud, measure, outside } = found;
     let shape = Shape::Points(Extent::of(&cloud.points, measure));
     let (method, problem) = planned(scene, &shape, cloud.rows)?;
-    let run = Run { seed: scene.given.seed, fixed: scene.fixed, interrupt, cpu_clock };
+    let run = Run { seed: scene.given.seed, fixed: scene.fixed, interrupt, cpu_clock, clouds };
     simulations::build::<D, M>(&problem, (&shape, cloud, method), run, Some(outside))
 }
 
@@ -74,7 +75,7 @@ impl<const D: usize> Found<D> {
     /// Examines points for supports of one radius. Flaws of points and normals are reported.
     fn within_radius(
         scene: &SurfaceScene,
-        points: Vec<Vector<D>>,
+        (clouds, points): (&Clouds, Vec<Vector<D>>),
         given: Option<Vec<Vector<D>>>,
     ) -> Result<Self, Vec<Violation>> {
         let examined = Examined::new(&points).map_err(|reason| refuse(reason.to_string()))?;
@@ -100,9 +101,11 @@ impl<const D: usize> Found<D> {
             named(source),
             flaws.iter().map(|flaw| format!("; {flaw}")).collect::<String>()
         );
+        let rows: Vec<usize> = (0..points.len()).collect();
+        let data = data_fields::values(&scene.spec, clouds, clouds.get(PLACE), &rows)?;
         let findings = flaws.iter().map(finding).collect();
         let marks = flaws.iter().map(|flaw| Mark { code: flaw.name(), points: flaw.points().all.clone() }).collect();
-        let cloud = SurfaceCloud { rows: points.len(), points, normals, ..SurfaceCloud::default() };
+        let cloud = SurfaceCloud { rows: points.len(), points, normals, data, ..SurfaceCloud::default() };
         Ok(Self { cloud, measure, outside: Outside { origin, findings, marks, counted: Vec::new() } })
     }
 
@@ -149,6 +152,7 @@ impl<const D: usize> Found<D> {
             if D == 2 { "a length" } else { "an area" },
         );
         let triangles = shown_triangles(clouds, &prepared, whole.as_ref())?;
+        let data = data_fields::values(&scene.spec, clouds, clouds.get(PLACE), &prepared.kept)?;
         let PreparedCloud { points, normals, spacings, graph, .. } = prepared;
         let areas = Some(graph.areas.clone());
         let copies = whole.map(|PreparedCloud { points, normals, spacings, graph, .. }| Copies {
@@ -160,9 +164,10 @@ impl<const D: usize> Found<D> {
             source,
         });
         let mut cloud =
-            SurfaceCloud { rows, copies, points, normals, areas, spacings, graph, ..SurfaceCloud::default() };
+            SurfaceCloud { rows, copies, points, normals, areas, spacings, graph, data, ..SurfaceCloud::default() };
         cloud.triangles = triangles;
-        edges.put_into(&mut cloud);
+        let held = edges::held_values(&scene.spec.edges, &scene.shape, &cloud)?;
+        edges.put_into(&mut cloud, &held);
         Ok(Self { cloud, measure, outside: Outside { origin, findings, marks, counted } })
     }
 }

@@ -1,7 +1,7 @@
 //! What a problem costs: operators, work and memory.
 
 use super::problems::ProblemChoice;
-use super::starts::Start;
+use super::starts::{Spread, Start};
 use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{EvolutionIntegrator, Solver};
 
@@ -24,6 +24,11 @@ impl ProblemChoice {
             | Self::GeodesicDistance { .. }
             | Self::Poisson { .. }
             | Self::Evolution { integrator: EvolutionIntegrator::Bdf2(_), .. } => 3.0,
+            // Substances whose diffusivity varies have rows of their own.
+            Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => {
+                1.0 + diffusivity.iter().filter(|spread| matches!(spread, Spread::Field(_))).count() as f64
+            }
+            Self::Evolution { start: Start::Field { diffusivity: Spread::Field(_), .. }, .. } => 2.0,
             _ => 1.0,
         }
     }
@@ -86,7 +91,11 @@ impl ProblemChoice {
     pub fn inner_steps(&self, time_step: f64, spacing: f64, reach: f64) -> f64 {
         let rate = match self {
             Self::Evolution { start: Start::Reaction { diffusivity, .. }, .. } => {
-                diffusivity.iter().copied().fold(0.0, f64::max) / (2.0 * spacing * spacing)
+                let largest = diffusivity.iter().map(|spread| spread.largest(reach)).fold(0.0, f64::max);
+                largest / (2.0 * spacing * spacing)
+            }
+            Self::Evolution { start: Start::Field { diffusivity, .. }, .. } => {
+                diffusivity.largest(reach) / (2.0 * spacing * spacing)
             }
             Self::Advection { velocity, diffusivity, .. } => {
                 2.0 * velocity.top_speed(reach) / spacing + 4.0 * diffusivity / (spacing * spacing)

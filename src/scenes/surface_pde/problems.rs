@@ -1,19 +1,21 @@
 //! The problem of a scene: what it is made of, what it costs.
 
-use super::field_choices::{Site, default_field, raised};
+use super::data_fields;
+use super::field_choices::{Course, Site, default_field, raised};
+use super::field_spec::{FieldChoice, InitialChoice};
 use super::field_values::{operated, sites, values};
 use super::motions::{self, MotionPlan, place};
 use super::solvers::explicit;
-use super::spec::{ConditionWord, EdgesChoice, EvolutionChoice, FieldChoice, InitialChoice, ProblemSpec, SurfacePde};
-use super::starts::{self, Start, begin};
+use super::spec::{ConditionWord, EdgesChoice, EvolutionChoice, ProblemSpec, SurfacePde};
+use super::starts::{self, Spread, Start, begin};
 use super::surfaces::Shape;
 use super::velocities::{self, Velocity};
 use crate::geometry::Vector;
 use crate::operators::charts::tangent::Metric;
 use crate::schemes::surface_equation::{
     Advection, Condition, Curvature, Eigenmodes, Evolution, EvolutionIntegrator, EvolutionParts, ExactField,
-    FormulaField, GeodesicDistance, MovingSurface, Pointwise, Poisson, Problem, Solver, Source, SurfaceCloud,
-    SurfaceGradient, surface_gradient,
+    GeodesicDistance, MovingSurface, Pointwise, Poisson, Problem, Solver, Source, SurfaceCloud, SurfaceGradient,
+    surface_gradient,
 };
 use crate::simulation::Quantity;
 use crate::spec::{Choice, Parameter, Places, Violation};
@@ -106,10 +108,14 @@ pub(super) fn plan(
             };
             ProblemChoice::Poisson { field, has_source, is_dirichlet, solver }
         }
-        ProblemSpec::Diffusion { initial, source, parameters, end_time, time_step, integrator, .. } => {
-            let source = source.as_ref().map(|source| FormulaField::in_time(source, parameters, "/problem", "source"));
-            let source = source.and_then(|field| field.map(Arc::new).map_err(|found| errors.extend(found)).ok());
-            let start = Start::Field(start(site("/problem/initial"), initial, errors), source);
+        ProblemSpec::Diffusion {
+            initial, diffusivity, source, parameters, end_time, time_step, integrator, ..
+        } => {
+            let owner = ("/problem", &*parameters);
+            let source = source.as_ref();
+            let source = source.map(|source| site(data_fields::SOURCE).value(source, owner, Course::InTime, errors));
+            let diffusivity = starts::spread(site(data_fields::DIFFUSIVITY), diffusivity, owner, errors);
+            let start = Start::Field { initial: start(site("/problem/initial"), initial, errors), diffusivity, source };
             let integrator = match integrator.get_or_insert_with(|| default_integrator(shape)) {
                 EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
                 EvolutionChoice::Bdf2 => EvolutionIntegrator::Bdf2(solver),
@@ -181,10 +187,10 @@ fn check_eigenvalues(edges: &EdgesChoice, (modes, points, shape): (u64, u64, &Sh
         errors.push(Violation::new("/problem/count", "range", detail, modes, json!({"most": points})));
     }
     if let EdgesChoice::Dirichlet { value, .. } = edges
-        && *value != 0.0
+        && value.number() != Some(0.0)
     {
         let detail = "the modes of an operator are zero at edges that hold a value";
-        errors.push(Violation::new("/edges/value", "conflict", detail, *value, 0));
+        errors.push(Violation::new("/edges/value", "conflict", detail, value.to_json(), 0));
     }
 }
 
@@ -279,9 +285,10 @@ impl ProblemChoice {
             Self::Advection { velocity, initial, diffusivity, .. } => {
                 Advection::<3>::shown_fields(velocity.has_course(initial, *diffusivity, shape))
             }
-            Self::Evolution { start: Start::Field(field, source), .. } => {
-                let is_mode = matches!(field, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. });
-                Evolution::shown_fields(1, is_mode && source.is_none())
+            Self::Evolution { start: Start::Field { initial, diffusivity, source }, .. } => {
+                let is_mode = matches!(initial, ExactField::SphericalHarmonic { .. } | ExactField::SinPlusCos { .. });
+                let is_uniform = matches!(diffusivity, Spread::Uniform(_));
+                Evolution::shown_fields(1, is_mode && is_uniform && source.is_none())
             }
             Self::Evolution { start: Start::Reaction { diffusivity, manufactured, .. }, .. } => {
                 Evolution::shown_fields(diffusivity.len(), manufactured.is_some())
@@ -337,15 +344,21 @@ impl ProblemChoice {
                 Box::new(poisson((field, *has_source, *is_dirichlet, *solver), shape, cloud)?)
             }
             Self::Evolution { start, integrator, .. } => {
-                let (initial, reaction, exact) = begin(start, shape, cloud, seed)?;
+                let (initial, reaction, diffusivities, exact) = begin(start, shape, cloud, seed)?;
                 let source = match start {
-                    Start::Field(_, Some(field)) => Some(Source { field: Arc::clone(field), sites: sites(cloud) }),
+                    Start::Field { source: Some(ExactField::Formula(field)), .. } => {
+                        Some(Source::Formula { field: Arc::clone(field), sites: sites(cloud) })
+                    }
+                    Start::Field { source: Some(field), .. } => {
+                        Some(Source::Values(values(field, cloud, data_fields::SOURCE)?))
+                    }
                     _ => None,
                 };
                 if source.is_none() {
                     check_not_zero(&initial[..cloud.rows])?;
                 }
-                let parts = EvolutionParts { initial, reaction, source, time_step, integrator: *integrator, exact };
+                let integrator = *integrator;
+                let parts = EvolutionParts { initial, reaction, diffusivities, source, time_step, integrator, exact };
                 Box::new(Evolution::new(parts, cloud))
             }
         })

@@ -1,9 +1,12 @@
 //! The simulation of a planned problem on a cloud.
 
+use super::motions;
 use super::problems::{ProblemChoice, start_values};
 use super::surfaces::Shape;
 use crate::parallel::Interrupt;
-use crate::schemes::surface_equation::{Method, MovingSurface, SurfaceCloud, SurfaceEquation};
+use crate::scene::cloud::Clouds;
+use crate::scenes::flow_data;
+use crate::schemes::surface_equation::{Method, Motion, MovingSurface, SurfaceCloud, SurfaceEquation};
 use crate::simulation::{CpuClock, Diagnostic, Finding, Mark, Simulation};
 use crate::spec::Violation;
 use crate::time::FixedStep;
@@ -14,6 +17,8 @@ pub(super) struct Run {
     pub fixed: FixedStep,
     pub interrupt: Interrupt,
     pub cpu_clock: CpuClock,
+    /// What came from outside.
+    pub clouds: Clouds,
 }
 
 /// What was found about points from outside.
@@ -32,12 +37,18 @@ pub(super) struct Outside {
 pub(super) fn build<const D: usize, const M: usize>(
     problem: &ProblemChoice,
     (shape, cloud, method): (&Shape, SurfaceCloud<D>, Method),
-    Run { seed, fixed, interrupt, cpu_clock }: Run,
+    Run { seed, fixed, interrupt, cpu_clock, clouds }: Run,
     outside: Option<Outside>,
 ) -> Result<Box<dyn Simulation>, Vec<Violation>> {
     if let ProblemChoice::Moving { initial, motion, diffusivity, .. } = problem {
         let values = start_values(initial, &cloud)?;
-        let parts = motion.parts::<D>(initial, *diffusivity, shape, &values)?;
+        let velocities = flow_data::data(&clouds, motions::POINTER);
+        let parts = motion.parts::<D>(initial, *diffusivity, shape, &values, velocities)?;
+        if let Motion::Flow(flow) = &parts.motion
+            && let Some(violation) = flow_data::check_places(flow.as_ref(), &cloud.points, motions::POINTER)
+        {
+            return Err(vec![violation]);
+        }
         let moving = MovingSurface::new(cloud, values, parts, fixed, interrupt, cpu_clock);
         return Ok(Box::new(match outside {
             Some(Outside { origin, findings, marks, counted }) => moving.on_points(origin, (findings, marks), counted),

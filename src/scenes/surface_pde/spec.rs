@@ -1,7 +1,8 @@
 //! The parameters of a `surface_pde` scene.
 
+use super::field_spec::{FieldChoice, FieldValue, InitialChoice, everywhere};
 use super::transport_spec::{MotionChoice, VelocityChoice};
-use crate::formulas::{FormulaList, FormulaText, NamedNumbers, constants};
+use crate::formulas::{FormulaList, NamedNumbers, constants};
 use crate::scene::cloud::PointsSource;
 use crate::schemes::surface_equation::MOST_SPECIES;
 use crate::spec::choice::with_defaults;
@@ -74,64 +75,6 @@ crate::words! {
 }
 
 crate::words! {
-    /// An axis of coordinates.
-    pub enum AxisWord {
-        /// x
-        X = "x",
-        /// y
-        Y = "y",
-        /// z
-        Z = "z",
-    }
-}
-
-crate::choice! {
-    /// A field on a surface.
-    pub enum FieldChoice {
-        /// real orthonormal Y_lm, on a sphere: m > 0 ∝ cos mφ, m < 0 ∝ sin |m|φ
-        SphericalHarmonic = "spherical_harmonic" {
-            /// degree
-            l: u32 = 4, in whole(1, 64);
-            /// order, a whole number from −l to l
-            m: f64 = 0.0, in Interval::at_least(-64.0).and_at_most(64.0);
-            /// the axis that angles are measured about
-            axis: AxisWord = AxisWord::Z;
-        }
-        /// sin(k·x), on any surface
-        PlaneWave = "plane_wave" {
-            /// wave vector; when not given, (2, −1, 3) by the extent of the surface
-            k: Option<Coordinates>;
-        }
-        /// sin mθ + cos mθ, on a circle
-        SinPlusCos = "sin_plus_cos" {
-            /// wave number, half the number of points at most
-            m: u64 = 1, in whole(1, 100_000_000);
-        }
-        /// a field of one's own: a formula of x, y, z and of the unit normal nx, ny, nz
-        Formula = "formula" {
-            /// the value
-            value: FormulaText;
-            /// numbers that the formula calls by name
-            parameters: NamedNumbers = constants();
-        }
-    }
-}
-
-crate::choice! {
-    /// A field at the start.
-    pub enum InitialChoice {
-        ..Field(FieldChoice)
-        /// ζ(|x − c|/σ)/σ² with ζ(d) = exp(−1/(1 − d²)) below d = 0.975 (Surface DC-PSE paper, section 4.4)
-        TruncatedGaussian = "truncated_gaussian" {
-            /// center c
-            center: Coordinates = [0.0, 0.0, 0.0].into();
-            /// width σ
-            sigma: f64 = 0.2, in POSITIVE;
-        }
-    }
-}
-
-crate::words! {
     /// What makes the solution of a Poisson equation unique.
     pub enum ConditionWord {
         /// points next to the plane x = 0 (on a circle the one at (R, 0)) hold their value
@@ -156,8 +99,8 @@ crate::choice! {
         Neumann = "neumann",
         /// points of the edges hold a value
         Dirichlet = "dirichlet" {
-            /// the value
-            value: f64 = 0.0;
+            /// the value: a number, a formula of x, y, z, nx, ny, nz, or data at the points
+            value: FieldValue = everywhere(0.0);
             /// with it, points x of edges with normal·x ≥ offset hold the value, and nothing flows through the other ones
             normal: Option<Coordinates>;
             /// offset of the half-space of `normal`
@@ -219,10 +162,10 @@ crate::choice! {
             species: Listed<String>, in Items(1, MOST_SPECIES, ());
             /// rate of each substance: a formula of the substances, x, y, z, the unit normal nx, ny, nz and t
             rates: FormulaList, in Items(1, MOST_SPECIES, ());
-            /// diffusivity of each substance
-            diffusivities: Listed<f64>, in Items(1, MOST_SPECIES, NOT_NEGATIVE);
-            /// each substance at the start: a formula of x, y, z, nx, ny, nz
-            initial: FormulaList, in Items(1, MOST_SPECIES, ());
+            /// diffusivity d of each substance: a number, a formula of x, y, z, nx, ny, nz, or data; then ∇ₛ·(d ∇ₛ u)
+            diffusivities: Listed<FieldValue>, in Items(1, MOST_SPECIES, ());
+            /// each substance at the start: a formula of x, y, z, nx, ny, nz, or data at the points
+            initial: Listed<FieldValue>, in Items(1, MOST_SPECIES, ());
             /// numbers that the formulas call by name
             parameters: NamedNumbers = constants();
         }
@@ -254,13 +197,15 @@ crate::choice! {
             /// points next to the plane x = 0 (on a circle the one at (R, 0)) hold their value, or u has no mean
             condition: ConditionWord = ConditionWord::ZeroMean;
         }
-        /// ∂u/∂t = Δₛ u + s
+        /// ∂u/∂t = ∇ₛ·(d ∇ₛ u) + s
         Diffusion = "diffusion" {
             /// u at the start; `truncated_gaussian` on bumps, else an eigenfunction, when not given
             initial: Option<InitialChoice>;
-            /// a source s: a formula of x, y, z, the unit normal nx, ny, nz and t
-            source: Option<FormulaText>;
-            /// numbers that the source calls by name
+            /// diffusivity d: a number, a formula of x, y, z, the unit normal nx, ny, nz, or data at the points
+            diffusivity: FieldValue = everywhere(1.0);
+            /// a source s: a formula of x, y, z, nx, ny, nz and t, or data at the points
+            source: Option<FieldValue>;
+            /// numbers that these formulas call by name
             parameters: NamedNumbers = constants();
             /// end time T
             end_time: f64 = 1.0, in POSITIVE;

@@ -1,35 +1,85 @@
 //! What evolves on a surface: how it is planned, and how it begins.
 
-use super::field_choices::{Site, raised};
-use super::field_values::{operated, sites, values};
+use super::data_fields;
+use super::field_choices::{Course, Site, raised};
+use super::field_spec::FieldValue;
+use super::field_values::{diffusivity, operated, sites, values};
 use super::spec::{ModelChoice, ProblemSpec};
 use super::surfaces::Shape;
+use crate::formulas::NamedNumbers;
+use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::schemes::surface_equation::{
-    ExactCourse, ExactField, FormulaField, FormulaTerms, Model, Reaction, SurfaceCloud, Terms,
+    Diffusivity, ExactCourse, ExactField, FormulaTerms, Model, Reaction, SurfaceCloud, Terms,
 };
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
-use std::sync::Arc;
 
 /// What evolves from where.
 #[derive(Debug, Clone)]
 pub(super) enum Start {
-    Field(ExactField, Option<Arc<FormulaField>>),
+    Field {
+        initial: ExactField,
+        diffusivity: Spread,
+        source: Option<ExactField>,
+    },
     Reaction {
         terms: Terms,
-        initial: Vec<Arc<FormulaField>>,
-        diffusivity: Vec<f64>,
+        initial: Vec<ExactField>,
+        diffusivity: Vec<Spread>,
         noise: f64,
         manufactured: Option<ExactField>,
     },
+}
+
+/// How fast a substance diffuses.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Spread {
+    /// As fast everywhere.
+    Uniform(f64),
+    /// By the place.
+    Field(ExactField),
+}
+
+/// The diffusivity that stands at a site.
+pub(super) fn spread(
+    site: Site,
+    value: &FieldValue,
+    owner: (&str, &NamedNumbers),
+    errors: &mut Vec<Violation>,
+) -> Spread {
+    let Some(number) = value.number() else { return Spread::Field(site.value(value, owner, Course::AtRest, errors)) };
+    if number < 0.0 {
+        let detail = "a diffusivity is not negative";
+        errors.push(Violation::new(site.pointer, "range", detail, number, json!({"least": 0})));
+    }
+    Spread::Uniform(number)
+}
+
+impl Spread {
+    /// The largest diffusivity, for estimates: that at places about the origin where it is a formula of the place, and 1 where
+    /// nothing is known of it.
+    pub fn largest(&self, reach: f64) -> f64 {
+        match self {
+            Self::Uniform(number) => *number,
+            Self::Field(ExactField::Formula(field)) if field.is_of_place() => {
+                let place = |k: usize| {
+                    let side = if k.is_multiple_of(2) { reach } else { -reach };
+                    Vector::<3>::from_fn(|d, _| if d == k / 2 { side } else { 0.0 })
+                };
+                let values = (0..6).map(|k| field.value(&place(k))).filter(|value| value.is_finite());
+                values.fold(0.0, f64::max)
+            }
+            Self::Field(_) => 1.0,
+        }
+    }
 }
 
 impl Start {
     /// Number of fields that evolve, those weighed more whose terms are long formulas.
     pub fn fields(&self) -> f64 {
         match self {
-            Self::Field(..) => 1.0,
+            Self::Field { .. } => 1.0,
             // Twenty operations cost about as much as a row of the operator.
             Self::Reaction { terms: Terms::Formulas(terms), diffusivity, .. } => {
                 diffusivity.len() as f64 + terms.operations() as f64 / 20.0
@@ -53,6 +103,10 @@ pub(super) fn reaction(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<V
         let detail = "forcing takes the exact operator, which is not known on points from outside";
         errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
     }
+    if let Some(ExactField::Data(_)) = &exact {
+        let detail = "forcing takes the exact operator, which data do not have";
+        errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
+    }
     if let ModelChoice::Formula { .. } = model {
         for (name, given) in [("diffusivity", &*diffusivity), ("second_diffusivity", &*second_diffusivity)] {
             errors.extend(given.map(|given| {
@@ -70,14 +124,15 @@ pub(super) fn reaction(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<V
         (*diffusivity, *second_diffusivity) =
             (diffusivity.or(Some(DIFFUSIVITY[0])), second_diffusivity.or(Some(DIFFUSIVITY[1])));
     }
-    let both = vec![diffusivity.unwrap_or(DIFFUSIVITY[0]), second_diffusivity.unwrap_or(DIFFUSIVITY[1])];
+    let both = [diffusivity.unwrap_or(DIFFUSIVITY[0]), second_diffusivity.unwrap_or(DIFFUSIVITY[1])];
+    let both = both.map(Spread::Uniform).to_vec();
     let (terms, initial, diffusivity) = match model {
         ModelChoice::Formula { .. } => {
             if exact.is_some() {
                 let detail = "forcing belongs to the models; formulas can have their own";
                 errors.push(Violation::new(site.pointer, "conflict", detail, manufactured.to_json(), Value::Null));
             }
-            formula_reaction(model, errors)?
+            formula_reaction(site, model, errors)?
         }
         ModelChoice::GrayScott { feed, kill } => {
             (Terms::Model(Model::GrayScott { feed: *feed, kill: *kill }), Vec::new(), both)
@@ -91,35 +146,34 @@ pub(super) fn reaction(site: Site, problem: &mut ProblemSpec, errors: &mut Vec<V
 }
 
 /// Terms, fields at the start and diffusivities of a reaction.
-type ReactionParts = (Terms, Vec<Arc<FormulaField>>, Vec<f64>);
+type ReactionParts = (Terms, Vec<ExactField>, Vec<Spread>);
+
+/// Where the formulas of a reaction stand.
+const MODEL: &str = "/problem/model";
 
 /// A reaction by formulas; None, with errors, where something is wrong with it.
-fn formula_reaction(model: &ModelChoice, errors: &mut Vec<Violation>) -> Option<ReactionParts> {
-    const POINTER: &str = "/problem/model";
+fn formula_reaction(site: Site, model: &ModelChoice, errors: &mut Vec<Violation>) -> Option<ReactionParts> {
     let ModelChoice::Formula { species, rates, diffusivities, initial, parameters } = model else { return None };
     let before = errors.len();
     for (name, found) in [("diffusivities", diffusivities.0.len()), ("initial", initial.0.len())] {
         if found != species.0.len() {
             let detail = format!("there are {} substances, and {found} of these", species.0.len());
-            errors.push(Violation::new(format!("{POINTER}/{name}"), "conflict", detail, found, json!(species.0.len())));
+            errors.push(Violation::new(format!("{MODEL}/{name}"), "conflict", detail, found, json!(species.0.len())));
         }
     }
-    let terms = FormulaTerms::new(&species.0, rates, parameters, POINTER);
+    let terms = FormulaTerms::new(&species.0, rates, parameters, MODEL);
     let terms = terms.map_err(|found| errors.extend(found)).ok();
-    let starts: Vec<Option<Arc<FormulaField>>> = initial
-        .at("initial")
-        .iter()
-        .map(|(place, text)| {
-            let field = FormulaField::at_rest(text, parameters, POINTER, place);
-            field.map(Arc::new).map_err(|found| errors.extend(found)).ok()
-        })
-        .collect();
-    let starts: Option<Vec<_>> = starts.into_iter().collect();
-    (errors.len() == before).then_some((Terms::Formulas(Box::new(terms?)), starts?, diffusivities.0.clone()))
+    let at = |pointer| Site { pointer, ..site };
+    let starts = initial.0.iter().zip(data_fields::STARTS);
+    let starts = starts.map(|(value, pointer)| at(pointer).value(value, (MODEL, parameters), Course::AtRest, errors));
+    let starts: Vec<ExactField> = starts.collect();
+    let spreads = diffusivities.0.iter().zip(data_fields::DIFFUSIVITIES);
+    let spreads = spreads.map(|(value, pointer)| spread(at(pointer), value, (MODEL, parameters), errors)).collect();
+    (errors.len() == before).then_some((Terms::Formulas(Box::new(terms?)), starts, spreads))
 }
 
-/// Fields at the start, the reaction, and what is known of the course.
-pub(super) type Beginning = (Vec<f64>, Option<Reaction>, ExactCourse);
+/// Fields at the start, the reaction, diffusivities, and what is known of the course.
+pub(super) type Beginning = (Vec<f64>, Option<Reaction>, Vec<Diffusivity>, ExactCourse);
 
 /// How an evolution begins.
 pub(super) fn begin<const D: usize>(
@@ -129,12 +183,16 @@ pub(super) fn begin<const D: usize>(
     seed: u64,
 ) -> Result<Beginning, Vec<Violation>> {
     match start {
-        Start::Field(field, source) => {
-            let decay = field.decay(shape.reach()).filter(|_| source.is_none());
+        Start::Field { initial, diffusivity: spread, source } => {
+            let found = diffusivity(spread, cloud, data_fields::DIFFUSIVITY)?;
+            let decay = match (&found, source) {
+                (Diffusivity::Uniform(factor), None) => initial.decay(shape.reach()).map(|rate| factor * rate),
+                _ => None,
+            };
             let exact = decay.map_or(ExactCourse::Unknown, ExactCourse::Decay);
-            Ok((values(field, cloud, "/problem/initial")?, None, exact))
+            Ok((values(initial, cloud, "/problem/initial")?, None, vec![found], exact))
         }
-        Start::Reaction { terms, initial, diffusivity, noise, manufactured } => {
+        Start::Reaction { terms, initial, diffusivity: spreads, noise, manufactured } => {
             let known = match manufactured {
                 Some(field) => {
                     let values = values(field, cloud, "/problem/manufactured")?;
@@ -155,31 +213,31 @@ pub(super) fn begin<const D: usize>(
                     (Terms::Model(*model), disturbed.values(known.as_ref().map(|(field, _)| &field[..]), shape, cloud))
                 }
             };
-            let reaction = Reaction { terms, diffusivity: diffusivity.clone(), manufactured: known };
-            Ok((values, Some(reaction), exact))
+            let places = data_fields::DIFFUSIVITIES;
+            let found = spreads.iter().zip(places).map(|(spread, place)| diffusivity(spread, cloud, place));
+            let found = found.collect::<Result<Vec<_>, _>>()?;
+            let factors = found.iter().map(Diffusivity::factor).collect();
+            let reaction = Reaction { terms, diffusivity: factors, manufactured: known };
+            Ok((values, Some(reaction), found, exact))
         }
     }
 }
 
-/// Substances by formulas at the start, with a random disturbance by their values.
+/// Substances at the start, with a random disturbance by their values.
 fn starts_of_formulas<const D: usize>(
-    initial: &[Arc<FormulaField>],
+    initial: &[ExactField],
     cloud: &SurfaceCloud<D>,
     noise: impl Fn(usize, usize) -> f64,
 ) -> Result<Vec<f64>, Vec<Violation>> {
-    let sites = sites(cloud);
-    let mut values = Vec::with_capacity(initial.len() * cloud.rows);
+    let mut all = Vec::with_capacity(initial.len() * cloud.rows);
     let mut errors = Vec::new();
-    for (k, field) in initial.iter().enumerate() {
-        match field.values(&sites, 0.0) {
-            Ok(found) => values.extend(found.iter().enumerate().map(|(i, value)| value * (1.0 + noise(i, k)))),
-            Err(fault) => {
-                let at = format!("/problem/model/initial/{k}");
-                errors.push(Violation::new(at, "data", fault, field.text(), Value::Null));
-            }
+    for (k, (field, place)) in initial.iter().zip(data_fields::STARTS).enumerate() {
+        match values(field, cloud, place) {
+            Ok(found) => all.extend(found.iter().enumerate().map(|(i, value)| value * (1.0 + noise(i, k)))),
+            Err(found) => errors.extend(found),
         }
     }
-    if errors.is_empty() { Ok(values) } else { Err(errors) }
+    if errors.is_empty() { Ok(all) } else { Err(errors) }
 }
 
 /// The state of a model without a pattern, disturbed.

@@ -1,5 +1,6 @@
 //! A planned `surface_pde` scene: its estimates, and the simulation that it builds.
 
+use super::data_fields;
 use super::methods::Scheme;
 use super::plan::{Normals, SurfaceScene};
 use super::points;
@@ -12,7 +13,7 @@ use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
 use crate::point_clouds::normals;
 use crate::point_clouds::preparation::spacings_and_graph;
-use crate::scene::cloud::{CloudReference, CloudSizes};
+use crate::scene::cloud::{CloudReference, CloudSizes, Clouds};
 use crate::scene::work::PhaseWork;
 use crate::scene::{self, BuildContext, Estimate, Scene, View};
 use crate::scenes::work_estimate;
@@ -61,16 +62,19 @@ impl SurfaceScene {
         }
     }
 
-    fn run(&self, interrupt: Interrupt, cpu_clock: CpuClock) -> Run {
-        Run { seed: self.spec.seed, fixed: self.fixed, interrupt, cpu_clock }
+    fn run(&self, interrupt: Interrupt, cpu_clock: CpuClock, clouds: Clouds) -> Run {
+        Run { seed: self.spec.seed, fixed: self.fixed, interrupt, cpu_clock, clouds }
     }
 
-    /// The cloud with the normals that operators are made with.
+    /// The cloud with the normals that operators are made with, and with data.
     fn cloud<const D: usize>(
         &self,
         mut cloud: SurfaceCloud<D>,
         radius: f64,
+        clouds: &Clouds,
     ) -> Result<SurfaceCloud<D>, Vec<Violation>> {
+        let rows: Vec<usize> = (0..cloud.rows).collect();
+        cloud.data = data_fields::values(&self.spec, clouds, None, &rows)?;
         match self.normals {
             Normals::Exact | Normals::Given { .. } => {}
             Normals::Perturbed { sigma } => {
@@ -172,7 +176,7 @@ impl Scene for SurfaceScene {
     }
 
     fn clouds(&self) -> Vec<CloudReference> {
-        self.points.iter().cloned().collect()
+        self.clouds.clone()
     }
 
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
@@ -258,23 +262,28 @@ impl Scene for SurfaceScene {
                 points::build::<3, 2>(self, context)
             };
         }
-        let BuildContext { interrupt, cpu_clock, .. } = context;
+        let BuildContext { interrupt, cpu_clock, clouds, .. } = context;
         match (&self.scheme, &self.shape) {
             (Scheme::Dcpse(method), Shape::Circle { radius }) => {
                 let cloud = surfaces::circle(*radius, self.count as usize, self.sampling, self.spec.seed);
-                let cloud = self.cloud(cloud, method.support.radius)?;
+                let cloud = self.cloud(cloud, method.support.radius, &clouds)?;
                 simulations::build::<2, 1>(
                     &self.problem,
                     (&self.shape, cloud, *method),
-                    self.run(interrupt, cpu_clock),
+                    self.run(interrupt, cpu_clock, clouds),
                     None,
                 )
             }
             (Scheme::Dcpse(method), shape) => {
                 let reach = method.support.radius;
                 let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, reach, &interrupt);
-                let cloud = self.cloud(cloud, reach)?;
-                simulations::build::<3, 2>(&self.problem, (shape, cloud, *method), self.run(interrupt, cpu_clock), None)
+                let cloud = self.cloud(cloud, reach, &clouds)?;
+                simulations::build::<3, 2>(
+                    &self.problem,
+                    (shape, cloud, *method),
+                    self.run(interrupt, cpu_clock, clouds),
+                    None,
+                )
             }
             (Scheme::Embedding { order, spacing }, shape) => {
                 let cloud = surfaces::in_space(shape, self.count, self.sampling, self.spec.seed, 0.0, &interrupt);

@@ -1,8 +1,8 @@
 //! The tangential velocity of a choice, and the exact course of what it carries where that is known.
 
 use super::field_choices::{Site, raised, vector_in_space};
+use super::field_spec::FieldChoice;
 use super::motions::place;
-use super::spec::FieldChoice;
 use super::surfaces::Shape;
 use super::transport_spec::VelocityChoice;
 use crate::geometry::Vector;

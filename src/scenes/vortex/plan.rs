@@ -3,10 +3,12 @@
 use super::spec::{Field, Method, Redistancing, Vortex};
 use crate::closest_point::PcpMethod;
 use crate::geometry::Flow;
+use crate::geometry::flows::GridData;
 use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
+use crate::scenes::flow_data;
 use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
@@ -112,8 +114,9 @@ fn plan_as_front(spec: Vortex) -> Planned {
 fn plan<const D: usize>(mut spec: Vortex) -> Planned {
     let mut errors = Vec::new();
     let points = spec.shape.points_reference("/shape", &mut errors);
+    let velocities = flow_data::reference(&spec.flow, "/flow", &mut errors);
     let surface = surface_of::<D>(&spec, &mut errors);
-    let flow = flow::<D>(&spec).map_err(|found| errors.extend(found)).ok();
+    let flow = flow::<D>(&spec, None).map_err(|found| errors.extend(found)).ok();
     if let (Some(flow), Some(surface)) = (&flow, &surface) {
         errors.extend(check_return(flow.as_ref(), surface.whole.as_ref(), "/flow"));
     }
@@ -145,15 +148,15 @@ fn plan<const D: usize>(mut spec: Vortex) -> Planned {
             Field::Overwrite => FieldChoice::Overwrite,
         },
         when,
-        clouds: points.into_iter().collect(),
+        clouds: points.into_iter().chain(velocities).collect(),
         surface,
         spec,
     }))
 }
 
-/// The flow of a scene.
-fn flow<const D: usize>(spec: &Vortex) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
-    spec.flow.flow::<D>(spec.end_time, "/flow")
+/// The flow of a scene; one from data rests before these are read.
+fn flow<const D: usize>(spec: &Vortex, data: Option<GridData<'_>>) -> Result<Box<dyn Flow<D>>, Vec<Violation>> {
+    spec.flow.flow::<D>(spec.end_time, "/flow", data)
 }
 
 /// The surface of the shape, where that is known before the run.
@@ -307,7 +310,7 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn family(&self) -> String {
         // A rigid motion is known without sines of every place.
-        let motion = if flow::<D>(&self.spec).is_ok_and(|flow| flow.is_rigid()) { "/rigid" } else { "" };
+        let motion = if flow::<D>(&self.spec, None).is_ok_and(|flow| flow.is_rigid()) { "/rigid" } else { "" };
         format!("vortex/{D}/{}{motion}", work_estimate::method_name(&self.method))
     }
 
@@ -319,7 +322,7 @@ impl<const D: usize> Scene for VortexScene<D> {
             PathIntegrator::TvdRk2 => 2.0,
             PathIntegrator::Dopri5 { .. } => 14.0,
         };
-        let flow = flow::<D>(&self.spec).ok();
+        let flow = flow::<D>(&self.spec, None).ok();
         let cost = flow.as_ref().map_or(1.0, |flow| flow.relative_cost());
         let turn = flow.as_ref().and_then(|flow| flow.return_time());
         let halfway = turn.map(|turn| 0.5 * turn).filter(|half| *half <= end_time);
@@ -349,7 +352,7 @@ impl<const D: usize> Scene for VortexScene<D> {
     }
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
-        let flow = flow::<D>(&self.spec)?;
+        let flow = flow::<D>(&self.spec, flow_data::data(&context.clouds, "/flow"))?;
         let parts = AdvectedParts {
             spacing: self.lattice.spacing,
             half_band: self.half_band,
@@ -360,7 +363,8 @@ impl<const D: usize> Scene for VortexScene<D> {
         };
         let room = (self.reach(), parts.spacing);
         let surface = self.spec.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
-        if let (Shape::Mesh { .. }, Some(surface)) = (&self.spec.shape, &surface)
+        let is_read_now = matches!(self.spec.shape, Shape::Mesh { .. }) || self.spec.flow.is_from_outside();
+        if let Some(surface) = surface.as_ref().filter(|_| is_read_now)
             && let Some(violation) = check_return(flow.as_ref(), surface.whole.as_ref(), "/flow")
         {
             return Err(vec![violation]);
@@ -376,6 +380,10 @@ impl<const D: usize> Scene for VortexScene<D> {
             }
             (Start { positions, level }, None)
         };
+        let beyond = flow_data::check_places(flow.as_ref(), &start.positions, "/flow");
+        if let Some(violation) = beyond.filter(|_| self.spec.flow.is_from_outside()) {
+            return Err(vec![violation]);
+        }
         let system = AdvectedSystem::new(ExactMotion::new(surface, flow.into()), start, parts, context.interrupt);
         Ok(Box::new(AdvectedLevelSet::new(system, self.fixed, context.plan, context.cpu_clock, self.chosen.clone())))
     }

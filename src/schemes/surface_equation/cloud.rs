@@ -5,6 +5,7 @@ use crate::linear_algebra::mean_term::MeanTerm;
 use crate::point_clouds::StarGraph;
 
 use super::conservative;
+use std::collections::BTreeMap;
 
 /// Points with unit normals. The first [`Self::rows`] are unknowns; those behind are images of them across an edge.
 #[derive(Debug, Clone, Default)]
@@ -39,6 +40,8 @@ pub struct SurfaceCloud<const D: usize> {
     pub copies: Option<Copies<D>>,
     /// Points of an edge that hold a value in equations, with the value.
     pub held: Vec<(usize, f64)>,
+    /// Values at the unknowns that came from outside, by the place in the scene that takes them.
+    pub data: BTreeMap<&'static str, Vec<f64>>,
 }
 
 /// Points of a surface that repeats with their copies beyond opposite edges.

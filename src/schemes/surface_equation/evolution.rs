@@ -1,9 +1,10 @@
-//! du/dt = d Δ_S u, with reactions of two substances or without: explicit by Dormand and Prince's pair in fixed or
+//! du/dt = ∇_S·(d ∇_S u), with reactions of two substances or without: explicit by Dormand and Prince's pair in fixed or
 //! controlled steps, or implicit by the second backward differentiation formula. What leaves the bounds of a solution is a mode of
 //! the operator, and ends the run.
 
 use super::cloud::SurfaceCloud;
 use super::conservative;
+use super::diffusivity::Diffusivity;
 use super::evolution_parts::{EvolutionIntegrator, EvolutionParts, ExactCourse};
 use super::field_bounds::FieldBounds;
 use super::format_1;
@@ -32,6 +33,8 @@ pub struct Evolution {
     /// Step of the controlled integrator.
     inner_step: f64,
     pair: EmbeddedPair,
+    /// Rows of substances whose diffusivity varies; empty before the first step.
+    varying: Vec<Option<SparseRows>>,
     /// The system of the implicit formula, for its factor of Δt.
     implicit: Option<(f64, LinearSystem)>,
     storage: Workspace,
@@ -67,6 +70,7 @@ impl Evolution {
             previous: values.clone(),
             inner_step: 0.0,
             pair: EmbeddedPair::default(),
+            varying: Vec::new(),
             implicit: None,
             storage: Workspace::default(),
             right: Vec::new(),
@@ -92,9 +96,9 @@ impl Evolution {
         from: Clock,
         to: Clock,
     ) -> Result<(), StepError> {
-        let Self { parts, values, pair, inner_step, attempts, .. } = self;
-        let parts = &*parts;
-        let mut slope = |u: &[f64], time: f64, out: &mut [f64]| slopes(operator, parts, u, time, out);
+        let Self { parts, values, pair, inner_step, attempts, varying, .. } = self;
+        let (parts, varying) = (&*parts, &varying[..]);
+        let mut slope = |u: &[f64], time: f64, out: &mut [f64]| slopes((operator, varying), parts, u, time, out);
         let EvolutionIntegrator::Controlled { tolerance } = parts.integrator else {
             pair.try_step(values, from.time, to.time, &mut slope);
             pair.accept(values);
@@ -162,10 +166,12 @@ impl Evolution {
         let area = |i: usize| if is_symmetric { cloud.graph.areas[i] } else { 1.0 };
         let unsolved = |reason: String| StepError::Unsolved { reason, step: to.step, time: to.time };
         if self.implicit.as_ref().is_none_or(|(known, _)| *known != share) {
-            let mut rows = operators.rows[0].sorted();
+            let varying = self.varying.first().and_then(Option::as_ref);
+            let mut rows = varying.unwrap_or(&operators.rows[0]).sorted();
+            let reach = share * whole * self.parts.diffusivities.first().map_or(1.0, Diffusivity::factor);
             rows.change_rows(|i, columns, weights| {
                 for (j, w) in columns.iter().zip(weights.iter_mut()) {
-                    *w = area(i) * (f64::from(u8::from(*j as usize == i)) - share * whole * *w);
+                    *w = area(i) * (f64::from(u8::from(*j as usize == i)) - reach * *w);
                 }
             });
             let system = LinearSystem::new(rows, None, solver, is_symmetric).map_err(unsolved)?;
@@ -180,9 +186,9 @@ impl Evolution {
         }
         previous.copy_from_slice(values);
         if let Some(source) = &parts.source {
-            let rates = source.field.values(&source.sites, to.time);
+            let rates = source.rates(to.time);
             let rates = rates.map_err(|reason| StepError::Undefined { reason, step: to.step, time: to.time })?;
-            for (i, (right, rate)) in right.iter_mut().zip(&rates).enumerate() {
+            for (i, (right, rate)) in right.iter_mut().zip(rates.iter()).enumerate() {
                 *right += area(i) * share * whole * rate;
             }
         }
@@ -257,18 +263,27 @@ const FIRST_STEP: f64 = 1e-3;
 /// Inner steps below this share of a step end the run.
 const LEAST_STEP: f64 = 1e-9;
 const SAFETY: f64 = 0.9;
-/// d Δ_S u, the terms of a reaction and what a source makes.
-fn slopes(operator: &SparseRows, parts: &EvolutionParts, u: &[f64], time: f64, out: &mut [f64]) {
+
+/// ∇_S·(d ∇_S u), the terms of a reaction and what a source makes.
+fn slopes(
+    (operator, varying): (&SparseRows, &[Option<SparseRows>]),
+    parts: &EvolutionParts,
+    u: &[f64],
+    time: f64,
+    out: &mut [f64],
+) {
     let rows = operator.rows();
-    for (u, out) in u.chunks(rows).zip(out.chunks_mut(rows)) {
-        operator.apply(u, out);
+    for (k, (u, out)) in u.chunks(rows).zip(out.chunks_mut(rows)).enumerate() {
+        varying.get(k).and_then(Option::as_ref).unwrap_or(operator).apply(u, out);
     }
     if let Some(reaction) = &parts.reaction {
         reaction.add(u, time, out);
+    } else if let Some(Diffusivity::Uniform(factor)) = parts.diffusivities.first().filter(|d| d.factor() != 1.0) {
+        out.iter_mut().for_each(|out| *out *= factor);
     }
     if let Some(source) = &parts.source {
-        match source.field.values(&source.sites, time) {
-            Ok(rates) => out.iter_mut().zip(rates).for_each(|(out, rate)| *out += rate),
+        match source.rates(time) {
+            Ok(rates) => out.iter_mut().zip(rates.iter()).for_each(|(out, rate)| *out += rate),
             // The step is refused, and the formula named.
             Err(_) => out.fill(f64::NAN),
         }
@@ -287,6 +302,9 @@ impl<const D: usize> Problem<D> for Evolution {
     fn step(&mut self, tools: Tools<'_, D>) -> Result<(), StepError> {
         let Tools { cloud, operators, interrupt, phases, from, to } = tools;
         let operator = &operators.rows[0];
+        if self.varying.is_empty() {
+            self.varying = self.parts.diffusivities.iter().map(|diffusivity| diffusivity.rows(operator)).collect();
+        }
         self.earlier.clone_from(&self.values);
         match self.parts.integrator {
             EvolutionIntegrator::Bdf2(solver) => {
@@ -404,6 +422,7 @@ impl<const D: usize> Problem<D> for Evolution {
         (self.attempts, self.iterations) = (attempts, iterations);
         self.pair.discard_slope();
         self.implicit = None;
+        self.varying.clear();
         Ok(())
     }
 
@@ -444,5 +463,9 @@ impl<const D: usize> Problem<D> for Evolution {
             }
         };
         method.insert("integrator", integrator);
+        let varying: Vec<String> = self.parts.diffusivities.iter().filter_map(Diffusivity::range).collect();
+        if !varying.is_empty() {
+            method.insert("diffusivity", format!("varies: {}", varying.join(", ")));
+        }
     }
 }

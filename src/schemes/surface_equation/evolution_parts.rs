@@ -1,17 +1,37 @@
 //! What an evolution on a surface is made of.
 
+use super::diffusivity::Diffusivity;
 use super::formula_field::{FormulaField, Sites};
 use super::reactions::{Reaction, Terms};
 use super::solver::Solver;
+use std::borrow::Cow;
 use std::sync::Arc;
 
-/// What is made or taken at every point of a surface, as a formula of place and time.
+/// What is made or taken at every point of a surface.
 #[derive(Debug, Clone)]
-pub struct Source {
-    /// The rate.
-    pub field: Arc<FormulaField>,
-    /// The points.
-    pub sites: Sites,
+pub enum Source {
+    /// A formula of place and time.
+    Formula {
+        /// The rate.
+        field: Arc<FormulaField>,
+        /// The points.
+        sites: Sites,
+    },
+    /// A rate at every point that stays.
+    Values(Vec<f64>),
+}
+
+impl Source {
+    /// The rates at a time.
+    ///
+    /// # Errors
+    /// The formula and the first point where it has no value.
+    pub(super) fn rates(&self, time: f64) -> Result<Cow<'_, [f64]>, String> {
+        match self {
+            Self::Formula { field, sites } => field.values(sites, time).map(Cow::Owned),
+            Self::Values(rates) => Ok(Cow::Borrowed(rates)),
+        }
+    }
 }
 
 /// How time is integrated.
@@ -46,6 +66,8 @@ pub struct EvolutionParts {
     pub initial: Vec<f64>,
     /// Reaction of the substances; without one it is diffusion alone.
     pub reaction: Option<Reaction>,
+    /// Diffusivity of each substance; a reaction multiplies by its own where it is uniform.
+    pub diffusivities: Vec<Diffusivity>,
     /// What is made at every point, without a reaction.
     pub source: Option<Source>,
     /// Δt of the implicit formula.
@@ -65,7 +87,7 @@ impl EvolutionParts {
     /// Why formulas have no value where the substances have these values, if they have none.
     pub(super) fn undefined(&self, values: &[f64], time: f64) -> Option<String> {
         if let Some(source) = &self.source {
-            return source.field.values(&source.sites, time).err();
+            return source.rates(time).err();
         }
         match &self.reaction.as_ref()?.terms {
             Terms::Formulas(terms) => terms.fault(values, time),

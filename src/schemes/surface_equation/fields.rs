@@ -36,13 +36,19 @@ pub enum ExactField {
     },
     /// A formula of the place, and of the normal.
     Formula(Arc<FormulaField>),
+    /// Values at the points, which a cloud keeps under this name.
+    Data(&'static str),
 }
 
 impl ExactField {
     /// Whether the field is one of the place alone; formulas may name the normal.
     #[must_use]
     pub fn is_of_place(&self) -> bool {
-        !matches!(self, Self::Formula(field) if !field.is_of_place())
+        match self {
+            Self::Formula(field) => field.is_of_place(),
+            Self::Data(_) => false,
+            _ => true,
+        }
     }
 
     /// The field at a point.
@@ -60,6 +66,8 @@ impl ExactField {
                 if d < 0.975 { (-1.0 / (1.0 - d * d)).exp() / (sigma * sigma) } else { 0.0 }
             }
             Self::Formula(field) => field.value(x),
+            // Data are known at the points of a cloud alone.
+            Self::Data(_) => f64::NAN,
         }
     }
 
@@ -73,7 +81,7 @@ impl ExactField {
                 -(k.norm_squared() - along * along) * phase.sin() - curvature * along * phase.cos()
             }
             Self::Formula(field) => field.laplace_beltrami(x, n, curvature),
-            Self::SinPlusCos { .. } | Self::TruncatedGaussian { .. } => {
+            Self::SinPlusCos { .. } | Self::TruncatedGaussian { .. } | Self::Data(_) => {
                 self.decay(x.norm()).map_or(f64::NAN, |rate| -rate * self.value(x))
             }
         }
@@ -91,6 +99,7 @@ impl ExactField {
             Self::SphericalHarmonic { .. }
             | Self::SinPlusCos { .. }
             | Self::TruncatedGaussian { .. }
+            | Self::Data(_)
             | Self::Formula(_) => None,
         }
     }
@@ -101,7 +110,7 @@ impl ExactField {
         match self {
             Self::SphericalHarmonic { l, .. } => Some(f64::from(l * (l + 1)) / (radius * radius)),
             Self::SinPlusCos { m } => Some(f64::from(*m).powi(2) / (radius * radius)),
-            Self::PlaneWave { .. } | Self::TruncatedGaussian { .. } | Self::Formula(_) => None,
+            Self::PlaneWave { .. } | Self::TruncatedGaussian { .. } | Self::Formula(_) | Self::Data(_) => None,
         }
     }
 }

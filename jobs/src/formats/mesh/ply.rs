@@ -2,7 +2,9 @@
 //! strips are read; other elements, properties and comments are passed over.
 
 use super::{MOST_CORNERS, Mesh, strip_faces, text};
+use crate::formats::cloud_file::MOST_VALUES;
 use crate::spec::uploads::MOST_POINTS;
+use meniscus::scene::Column;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Encoding {
@@ -76,6 +78,8 @@ const LARGEST_HEADER: usize = 1 << 20;
 const LONGEST_LINE: usize = 1 << 14;
 const MOST_ELEMENTS: usize = 256;
 const MOST_PROPERTIES: usize = 4096;
+/// Further columns of the vertices that are read at most.
+const MOST_COLUMNS: usize = 64;
 /// Numbers of all rows of corners at most.
 const MOST_ROWS: u64 = 4 * MOST_POINTS;
 
@@ -91,7 +95,7 @@ struct Header {
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
     let Header { encoding, elements, length } = header(bytes)?;
     let mut values = Values { rest: &bytes[length..], encoding };
-    let mut mesh = Mesh::default();
+    let mut mesh = Mesh { columns: further_columns(&elements), ..Mesh::default() };
     let is_wanted = |element: &Element| element.kind != Kind::Other;
     // What follows the last element that is read need not be there.
     let last = elements.iter().rposition(is_wanted).map_or(0, |last| last + 1);
@@ -104,6 +108,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
         }
     }
     Ok(mesh)
+}
+
+/// Scalars of the vertices beside places and normals, as columns without values.
+fn further_columns(elements: &[Element]) -> Vec<Column> {
+    let Some(vertices) = elements.iter().find(|element| element.kind == Kind::Vertex) else { return Vec::new() };
+    let is_further = |property: &&Property| property.list.is_none() && !COLUMNS.contains(&property.name.as_str());
+    let found = vertices.properties.iter().filter(is_further);
+    let most = MOST_COLUMNS.min((MOST_VALUES / vertices.count.max(1)) as usize);
+    found.take(most).map(|property| Column { name: property.name.clone(), values: Vec::new() }).collect()
 }
 
 /// The lines of a header end in LF, CR LF or CR, all as the first one does.
@@ -205,11 +218,17 @@ fn check_element(element: &Element) -> Result<(), String> {
 fn read_row(element: &Element, values: &mut Values, mesh: &mut Mesh) -> Result<(), String> {
     // Points of the plane have no z.
     let mut row = [0.0; COLUMNS.len()];
+    let mut further = mesh.columns.len();
     for property in &element.properties {
         let Some(count) = property.list else {
             let place = COLUMNS.iter().position(|name| element.kind == Kind::Vertex && *name == property.name);
             match place {
                 Some(place) => row[place] = values.next(property.scalar)?,
+                None if element.kind == Kind::Vertex && further > 0 => {
+                    let column = mesh.columns.len() - further;
+                    mesh.columns[column].values.push(values.next(property.scalar)?);
+                    further -= 1;
+                }
                 None => values.skip(property.scalar, 1)?,
             }
             continue;

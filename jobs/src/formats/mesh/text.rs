@@ -3,10 +3,10 @@
 use super::foreign;
 
 /// The byte order mark of UTF-8.
-pub(super) const MARK: &[u8] = b"\xEF\xBB\xBF";
+pub(in crate::formats) const MARK: &[u8] = b"\xEF\xBB\xBF";
 
 /// The text of a file. Bytes that are no UTF-8 can only be in comments and names, which are not read.
-pub(super) fn decode(bytes: &[u8]) -> Result<String, String> {
+pub(in crate::formats) fn decode(bytes: &[u8]) -> Result<String, String> {
     if let Some(name) = foreign::format(bytes) {
         return Err(format!("this is {name}, which is not read; save it as PLY, OBJ, STL, XYZ or VTKHDF"));
     }
@@ -28,18 +28,18 @@ pub(super) fn decode(bytes: &[u8]) -> Result<String, String> {
 }
 
 /// Lines with their numbers from 1. They end in LF or CR LF, or in CR where the text has no LF.
-pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+pub(in crate::formats) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let end = if text.contains('\n') { '\n' } else { '\r' };
     (1..).zip(text.split(end).map(|line| line.trim_end_matches('\r')))
 }
 
 /// A number of a line.
-pub(super) fn real(word: &str, line: usize) -> Result<f64, String> {
+pub(in crate::formats) fn real(word: &str, line: usize) -> Result<f64, String> {
     word.parse().map_err(|_| format!("line {line}: {}", no_number(word)))
 }
 
 /// Why a word is no number.
-pub(super) fn no_number(word: &str) -> String {
+pub(in crate::formats) fn no_number(word: &str) -> String {
     let short: String = word.chars().take(40).collect();
     if has_decimal_comma(word) {
         return format!(
@@ -51,6 +51,6 @@ pub(super) fn no_number(word: &str) -> String {
 }
 
 /// Whether a comma stands between two digits.
-pub(super) fn has_decimal_comma(word: &str) -> bool {
+pub(in crate::formats) fn has_decimal_comma(word: &str) -> bool {
     word.as_bytes().windows(3).any(|bytes| bytes[1] == b',' && bytes[0].is_ascii_digit() && bytes[2].is_ascii_digit())
 }

@@ -5,6 +5,8 @@ use super::element::Element;
 use super::header::Message;
 use super::{Bytes, DataSet, FILTERS, LARGEST_BLOCK, LARGEST_DATA, Reader, Refusal, Storage, UNDEFINED, numbers};
 
+/// Axes of a data set at most: time, three of space, components.
+const MOST_AXES: u64 = 5;
 /// Filters of a data set at most.
 const MOST_FILTERS: u64 = 8;
 
@@ -61,7 +63,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
     }
 
     /// The extent, and that which the data set may grow to.
-    fn extent(&self, place: &str, space: &Message) -> Result<(Vec<u64>, Vec<u64>), Refusal> {
+    pub(super) fn extent(&self, place: &str, space: &Message) -> Result<(Vec<u64>, Vec<u64>), Refusal> {
         let torn = || self.damaged(place, space.at, "the extent is torn");
         let mut cursor = numbers(&space.data);
         let version = cursor.number(1).ok_or_else(torn)?;
@@ -74,7 +76,7 @@ impl<B: Bytes + ?Sized> Reader<'_, B> {
                 _ => return Err(self.unaccepted(place, format!("extent version {version}"))),
             })
             .ok_or_else(torn)?;
-        if rank > 4 {
+        if rank > MOST_AXES {
             return Err(self.unaccepted(place, format!("{rank} dimensions")));
         }
         let mut axes = || (0..rank).map(|_| cursor.number(8)).collect::<Option<Vec<u64>>>().ok_or_else(torn);

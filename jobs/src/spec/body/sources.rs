@@ -154,6 +154,8 @@ pub(super) fn size_of<S: Sources>(
                 CloudRole::Surface => &[Purpose::Surface],
                 CloudRole::Points => &[Purpose::Points],
                 CloudRole::Mesh => &[Purpose::Mesh],
+                CloudRole::Values => &[Purpose::Values],
+                CloudRole::Flow => &[Purpose::Flow],
             };
             let found = sources.uploaded_points(upload)?.filter(|(purpose, _)| wanted.contains(purpose));
             let names: Vec<&str> = wanted.iter().map(|purpose| purpose.word()).collect();

@@ -7,6 +7,7 @@ use crate::parallel::Interrupt;
 use crate::point_clouds::PreparedCloud;
 use crate::point_clouds::cleaning::Cleaning;
 use crate::scene::{self, BuildContext, Cloud, Clouds};
+use crate::scenes::surface_pde::field_spec::everywhere;
 use crate::simulation::{CpuClock, FieldValues, OutputPlan, Selection, Simulation};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -344,11 +345,11 @@ fn edges_are_open_stars_in_a_row() {
     assert_eq!(built.err().unwrap()[0].pointer, "/edges");
     let half: Vec<_> = points.into_iter().filter(|x| x[2] > 0.0).collect();
     let cloud = PreparedCloud::new(&half, None, Cleaning::Drop).unwrap();
-    let choice = EdgesChoice::Dirichlet { value: 1.0, normal: None, offset: 0.0 };
+    let choice = EdgesChoice::Dirichlet { value: everywhere(1.0), normal: None, offset: 0.0 };
     let edges = Edges::new(&cloud, cloud.points.len(), &choice);
     // Points are 0.056 apart.
     assert!(edges.held_count() > 60, "{}", edges.held_count());
-    let inside = edges.held.iter().filter(|(i, _)| cloud.points[*i][2] > 0.25).count();
+    let inside = edges.held.iter().filter(|i| cloud.points[**i][2] > 0.25).count();
     assert_eq!(inside, 0, "{} held, {} single", edges.held_count(), edges.single);
 }
 
