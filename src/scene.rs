@@ -189,6 +189,11 @@ pub trait Scene: Send + Sync {
         Vec::new()
     }
 
+    /// What does not fit together of the things that come from outside, as far as their sizes tell.
+    fn check_sizes(&self, _sizes: &CloudSizes) -> Vec<Violation> {
+        Vec::new()
+    }
+
     /// Size of the run; `sizes` tells of points that come from outside.
     fn estimate(&self, sizes: &CloudSizes) -> Estimate;
 

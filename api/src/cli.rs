@@ -236,7 +236,8 @@ fn make_token(name: &str, scopes: &str) -> ExitCode {
 
 fn inspect(purpose: &str, file: &Path) -> ExitCode {
     let Some(purpose) = Purpose::from_word(purpose) else {
-        return fail(&"unknown purpose; allowed are checkpoint, points, surface, queries, mesh");
+        let words = Purpose::ALL.map(Purpose::word).join(", ");
+        return fail(&format!("unknown purpose; allowed are {words}"));
     };
     let seen = sandbox::enter().and_then(|()| look::run(purpose, file, &mut std::io::stdout().lock()));
     seen.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)

@@ -8,6 +8,7 @@ pub mod flow_file;
 pub mod frame_index;
 pub mod frame_view;
 pub mod hdf5_file;
+mod image;
 pub mod measured_level;
 pub mod mesh;
 pub mod operator_files;

@@ -131,11 +131,13 @@ pub struct CloudSize {
     pub points: u64,
     /// Surface area of a mesh, or length of a polygon.
     pub area: Option<f64>,
+    /// Points of the file that are not among them.
+    pub left_out: u64,
 }
 
 impl From<u64> for CloudSize {
     fn from(points: u64) -> Self {
-        Self { points, area: None }
+        Self { points, area: None, left_out: 0 }
     }
 }
 

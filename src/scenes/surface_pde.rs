@@ -15,6 +15,7 @@ mod simulations;
 mod plan;
 mod solvers;
 pub mod spec;
+mod spread;
 mod starts;
 mod surface_scene;
 mod surfaces;

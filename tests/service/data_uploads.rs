@@ -50,14 +50,16 @@ fn values_of_uploads_begin_jobs_and_their_restarts() {
     let wrong = json!({"scene": heat(&surface, &json!({"type": "data", "upload": surface["id"]}))});
     assert_eq!(service.post("/v1/jobs", &wrong).pointers(), ["/scene/problem/initial"]);
     let few = upload(&service, "values", b"1\n2\n");
-    for (initial, told) in [
-        (json!({"type": "data", "name": "w", "upload": values["id"]}), "no column"),
-        (json!({"type": "data", "upload": few["id"]}), "2 values for 400 points"),
-    ] {
-        let id = service.submit(&json!({"scene": heat(&surface, &initial)}));
-        let job = service.wait_for(&id, &["failed"]);
-        assert!(job["error"].to_string().contains(told) && job.to_string().contains("/problem/initial"), "{job}");
-    }
+    let few = json!({"scene": heat(&surface, &json!({"type": "data", "upload": few["id"]}))});
+    let refused = service.post("/v1/jobs", &few);
+    assert!(refused.pointers() == ["/scene/problem/initial"] && refused.text().contains("2 values for 400 points"));
+    let unnamed = heat(&surface, &json!({"type": "data", "name": "w", "upload": values["id"]}));
+    let job = service.wait_for(&service.submit(&json!({ "scene": unnamed })), &["failed"]);
+    let message = job["message"].as_str().unwrap();
+    assert!(
+        message.contains("/problem/initial") && message.contains("no column \"w\"; it has \"a\", \"u\""),
+        "{message}"
+    );
 }
 
 #[test]
@@ -166,7 +168,7 @@ fn an_uploaded_flow_carries_a_surface() {
         let worst =
             errors.iter().filter(|e| e["norm"] == "max" && matches!(e["quantity"].as_str(), Some("phi" | "points")));
         let worst = worst.map(|e| e["value"].as_f64().unwrap()).fold(0.0, f64::max);
-        assert!(worst < 1e-4, "{report}");
+        assert!(worst < 3e-4, "{report}");
     }
     let turned = rotation().replace("Spacing", "Direction=\"0 1 0 1 0 0 0 0 1\" Spacing");
     let refused = upload(&service, "flow", turned.as_bytes());

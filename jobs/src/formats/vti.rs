@@ -1,6 +1,6 @@
 //! VTI files: image data as XML, with numbers as text, in base64, or appended, plain or deflated.
 
-use super::flow_file::{Image, VELOCITY, check_count, check_direction, counts, triples};
+use super::image::{Image, VELOCITY, check_count, check_direction, counts, triples};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use meniscus::geometry::flows::GridNodes;

@@ -1,6 +1,6 @@
 //! Image data of VTKHDF files: velocities at the nodes of a regular grid, at one time or at those of `Steps`.
 
-use super::flow_file::{Image, VELOCITY, check_count, check_direction, counts, triples};
+use super::image::{Image, VELOCITY, check_count, check_direction, counts, triples};
 use super::structure::{self, DataSet, Structure};
 use meniscus::geometry::flows::GridNodes;
 use std::fs::File;

@@ -258,6 +258,8 @@ fn planned_scene<S: Sources>(
             uploads.push(upload);
         }
     }
+    let unfit = scene.iter().flat_map(|scene| scene.check_sizes(&sizes));
+    errors.extend(unfit.map(|error| error.under(start.prefix)));
     Ok((scene, uploads, sizes))
 }
 

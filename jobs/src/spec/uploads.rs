@@ -195,7 +195,9 @@ impl Contents {
             Self::Checkpoint(_) => None,
             Self::Values(found) => Some(found.values.into()),
             Self::Flow(found) => Some((found.nodes.iter().product::<usize>() as u64).into()),
-            Self::Points(found) => Some(CloudSize { points: found.points, area: found.area }),
+            Self::Points(PointContents { points, area, points_left_out, .. }) => {
+                Some(CloudSize { points: *points, area: *area, left_out: points_left_out.unwrap_or(0) })
+            }
         }
     }
 }

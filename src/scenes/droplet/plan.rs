@@ -176,13 +176,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let geometry = geometry.map_err(|error| errors.push(error)).ok();
     let tension = *spec.surface_tension.get_or_insert(case.tension);
     let surface = shape.as_ref().and_then(|(_, surface, _)| surface.as_ref());
-    // A layer, and what points from outside tell, is one part.
-    let is_known = |shape: &Shape| !shape.is_from_outside() && !matches!(shape, Shape::Layer { .. });
-    let parts = match (surface, &shape) {
-        (Some(surface), _) => Some(surface.parts.len()),
-        (None, Some((shape, ..))) if !is_known(shape) => Some(1),
-        _ => None,
-    };
+    let parts = part_count(shape.as_ref().map(|(shape, ..)| shape), surface);
     let (velocity, motion, speeds) = motion_at_start::<D>(&spec, parts, (&low, &lengths), &mut errors);
     let start = StartBox { shape: shape.as_ref().map(|(shape, ..)| shape), surface, low, lengths };
     let tensions = [tension, tension * largest_tension(&spec, &start)];
@@ -222,6 +216,13 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         chosen,
         clouds: points.into_iter().collect(),
     }))
+}
+
+/// Number of parts of a drop; None where its shape is refused.
+fn part_count<const D: usize>(shape: Option<&Shape>, surface: Option<&ShapeSurface<D>>) -> Option<usize> {
+    // A layer, and what points from outside tell, is one part.
+    let is_one = |shape: &&Shape| shape.is_from_outside() || matches!(shape, Shape::Layer { .. });
+    surface.map(|surface| surface.parts.len()).or_else(|| shape.filter(is_one).map(|_| 1))
 }
 
 /// An error where neighbors reach around the box.

@@ -2,7 +2,7 @@
 
 use super::field_spec::{FieldChoice, FieldValue, InitialChoice, OwnField};
 use super::spec::{EdgesChoice, ModelChoice, ProblemSpec, SurfaceChoice, SurfacePde};
-use crate::scene::cloud::{Cloud, CloudReference, CloudRole, Clouds, PointsSource};
+use crate::scene::cloud::{Cloud, CloudReference, CloudRole, CloudSizes, Clouds, PointsSource};
 use crate::schemes::surface_equation::MOST_SPECIES;
 use crate::spec::{Parameter, Violation};
 use serde_json::{Value, json};
@@ -124,6 +124,21 @@ pub(super) fn references(spec: &SurfacePde, errors: &mut Vec<Violation>) -> Vec<
     found
 }
 
+/// Violations where there are other numbers of values than of points of the file of the surface.
+pub(super) fn check_sizes(clouds: &[CloudReference], sizes: &CloudSizes) -> Vec<Violation> {
+    let Some(surface) = sizes.get("/surface") else { return Vec::new() };
+    let points = surface.points + surface.left_out;
+    let values = clouds.iter().filter(|cloud| cloud.role == CloudRole::Values);
+    let found = values.filter_map(|cloud| Some((cloud.pointer, sizes.get(cloud.pointer)?.points)));
+    let refuse =
+        |(pointer, count): (&str, u64)| Violation::new(pointer, "conflict", told(count, points), count, points);
+    found.filter(|(_, count)| *count != points).map(refuse).collect()
+}
+
+fn told(values: u64, points: u64) -> String {
+    format!("there are {values} values for {points} points")
+}
+
 /// The values of all data fields at the unknowns of a run. `surface` has the points of the surface where they came from outside,
 /// and `rows` the index of each unknown among them; without a surface from outside, unknowns are in the order of values.
 ///
@@ -167,7 +182,7 @@ fn of_field(
         None => rows.len(),
     };
     if column.len() != expected {
-        return Err(format!("there are {} values for {expected} points", column.len()));
+        return Err(told(column.len() as u64, expected as u64));
     }
     let place = |row: usize| surface.filter(|_| of_file).map_or(row, |surface| surface.place_in_file(row));
     let at = |row: &usize| {

@@ -61,19 +61,19 @@ pub(super) fn check(
         let detail = "conjugate gradients need a symmetric system, which held points do not leave";
         errors.push(conflict("/solver", detail, json!("cg"), json!(["auto", "bicgstab", "gmres", "sparse_lu"])));
     }
-    let dimension = shape.dimension();
+    check_half_space(normal.as_ref(), *offset, shape.dimension(), errors);
+}
+
+/// Refuses a half-space that is none.
+fn check_half_space(normal: Option<&Coordinates>, offset: f64, dimension: usize, errors: &mut Vec<Violation>) {
     match normal {
         Some(normal) if normal.len() != dimension || normal.iter().all(|c| *c == 0.0) => {
             let detail = format!("a direction has {dimension} numbers, which are not all zero");
             errors.push(Violation::new("/edges/normal", "range", detail, normal.to_json(), dimension));
         }
-        None if *offset != 0.0 => {
-            errors.push(conflict(
-                "/edges/offset",
-                "without a normal there is no half-space",
-                json!(offset),
-                json!(0.0),
-            ));
+        None if offset != 0.0 => {
+            let detail = "without a normal there is no half-space";
+            errors.push(Violation::new("/edges/offset", "conflict", detail, offset, 0.0));
         }
         _ => {}
     }

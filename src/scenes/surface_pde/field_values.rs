@@ -1,10 +1,9 @@
 //! Values of fields, and of their exact operators, at the points of a cloud.
 
 use super::field_choices::raised;
-use super::starts::Spread;
 use super::surfaces::Shape;
 use crate::geometry::Vector;
-use crate::schemes::surface_equation::{Diffusivity, ExactField, Sites, SurfaceCloud};
+use crate::schemes::surface_equation::{ExactField, Sites, SurfaceCloud};
 use crate::spec::Violation;
 use serde_json::Value;
 
@@ -27,30 +26,6 @@ pub(super) fn values<const D: usize>(
         return handed_over.ok_or_else(|| vec![missing()]);
     }
     Ok(cloud.points[..cloud.rows].iter().map(|x| field.value(&raised(x))).collect())
-}
-
-/// How fast a substance diffuses at the points of a cloud.
-///
-/// # Errors
-/// One [`Violation`] where a formula has no value, or a diffusivity is negative.
-pub(super) fn diffusivity<const D: usize>(
-    spread: &Spread,
-    cloud: &SurfaceCloud<D>,
-    pointer: &str,
-) -> Result<Diffusivity, Vec<Violation>> {
-    let field = match spread {
-        Spread::Uniform(number) => return Ok(Diffusivity::Uniform(*number)),
-        Spread::Field(field) => field,
-    };
-    let values = values(field, cloud, pointer)?;
-    match values.iter().position(|value| *value < 0.0) {
-        None => Ok(Diffusivity::Varying(values)),
-        Some(i) => {
-            let place: Vec<f64> = cloud.points[i].iter().copied().collect();
-            let detail = format!("the diffusivity is negative at point {i}, {place:?}");
-            Err(vec![Violation::new(pointer, "data", detail, values[i], "numbers of 0 or more")])
-        }
-    }
 }
 
 /// The unknowns of a cloud as sites of formulas.

@@ -1,7 +1,8 @@
 //! What a problem costs: operators, work and memory.
 
 use super::problems::ProblemChoice;
-use super::starts::{Spread, Start};
+use super::spread::Spread;
+use super::starts::Start;
 use crate::scene::work::PhaseWork;
 use crate::schemes::surface_equation::{EvolutionIntegrator, Solver};
 

@@ -7,7 +7,8 @@ use super::field_values::{operated, sites, values};
 use super::motions::{self, MotionPlan, place};
 use super::solvers::explicit;
 use super::spec::{ConditionWord, EdgesChoice, EvolutionChoice, ProblemSpec, SurfacePde};
-use super::starts::{self, Spread, Start, begin};
+use super::spread::{Spread, spread};
+use super::starts::{self, Start, begin};
 use super::surfaces::Shape;
 use super::velocities::{self, Velocity};
 use crate::geometry::Vector;
@@ -108,21 +109,7 @@ pub(super) fn plan(
             };
             ProblemChoice::Poisson { field, has_source, is_dirichlet, solver }
         }
-        ProblemSpec::Diffusion {
-            initial, diffusivity, source, parameters, end_time, time_step, integrator, ..
-        } => {
-            let owner = ("/problem", &*parameters);
-            let source = source.as_ref();
-            let source = source.map(|source| site(data_fields::SOURCE).value(source, owner, Course::InTime, errors));
-            let diffusivity = starts::spread(site(data_fields::DIFFUSIVITY), diffusivity, owner, errors);
-            let start = Start::Field { initial: start(site("/problem/initial"), initial, errors), diffusivity, source };
-            let integrator = match integrator.get_or_insert_with(|| default_integrator(shape)) {
-                EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
-                EvolutionChoice::Bdf2 => EvolutionIntegrator::Bdf2(solver),
-            };
-            let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
-            ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator }
-        }
+        ProblemSpec::Diffusion { .. } => diffusion(&mut spec.problem, site("/problem/initial"), solver, errors)?,
         ProblemSpec::Eigenvalues { count } => {
             check_eigenvalues(&spec.edges, (*count, site("").count, shape), errors);
             ProblemChoice::Eigenvalues { count: *count as usize }
@@ -141,6 +128,32 @@ pub(super) fn plan(
             ProblemChoice::Evolution { start, end_time, time_step, integrator }
         }
     })
+}
+
+/// Plans a diffusion.
+fn diffusion(
+    problem: &mut ProblemSpec,
+    site: Site,
+    solver: Solver,
+    errors: &mut Vec<Violation>,
+) -> Option<ProblemChoice> {
+    let ProblemSpec::Diffusion { initial, diffusivity, source, parameters, end_time, time_step, integrator, .. } =
+        problem
+    else {
+        return None;
+    };
+    let owner = ("/problem", &*parameters);
+    let at = |pointer| Site { pointer, ..site };
+    let source = source.as_ref();
+    let source = source.map(|source| at(data_fields::SOURCE).value(source, owner, Course::InTime, errors));
+    let diffusivity = spread(at(data_fields::DIFFUSIVITY), diffusivity, owner, errors);
+    let start = Start::Field { initial: start(site, initial, errors), diffusivity, source };
+    let integrator = match integrator.get_or_insert_with(|| default_integrator(site.shape)) {
+        EvolutionChoice::Dopri5 { tolerance } => explicit(*tolerance, *time_step),
+        EvolutionChoice::Bdf2 => EvolutionIntegrator::Bdf2(solver),
+    };
+    let time_step = time_step.unwrap_or(*end_time / DEFAULT_STEPS);
+    Some(ProblemChoice::Evolution { start, end_time: *end_time, time_step, integrator })
 }
 
 /// Plans what is carried by a motion of the surface, or by a velocity on it.

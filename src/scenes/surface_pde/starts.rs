@@ -2,12 +2,10 @@
 
 use super::data_fields;
 use super::field_choices::{Course, Site, raised};
-use super::field_spec::FieldValue;
-use super::field_values::{diffusivity, operated, sites, values};
+use super::field_values::{operated, sites, values};
 use super::spec::{ModelChoice, ProblemSpec};
+use super::spread::{Spread, diffusivity, spread};
 use super::surfaces::Shape;
-use crate::formulas::NamedNumbers;
-use crate::geometry::Vector;
 use crate::geometry::random::CounterRandom;
 use crate::schemes::surface_equation::{
     Diffusivity, ExactCourse, ExactField, FormulaTerms, Model, Reaction, SurfaceCloud, Terms,
@@ -30,49 +28,6 @@ pub(super) enum Start {
         noise: f64,
         manufactured: Option<ExactField>,
     },
-}
-
-/// How fast a substance diffuses.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Spread {
-    /// As fast everywhere.
-    Uniform(f64),
-    /// By the place.
-    Field(ExactField),
-}
-
-/// The diffusivity that stands at a site.
-pub(super) fn spread(
-    site: Site,
-    value: &FieldValue,
-    owner: (&str, &NamedNumbers),
-    errors: &mut Vec<Violation>,
-) -> Spread {
-    let Some(number) = value.number() else { return Spread::Field(site.value(value, owner, Course::AtRest, errors)) };
-    if number < 0.0 {
-        let detail = "a diffusivity is not negative";
-        errors.push(Violation::new(site.pointer, "range", detail, number, json!({"least": 0})));
-    }
-    Spread::Uniform(number)
-}
-
-impl Spread {
-    /// The largest diffusivity, for estimates: that at places about the origin where it is a formula of the place, and 1 where
-    /// nothing is known of it.
-    pub fn largest(&self, reach: f64) -> f64 {
-        match self {
-            Self::Uniform(number) => *number,
-            Self::Field(ExactField::Formula(field)) if field.is_of_place() => {
-                let place = |k: usize| {
-                    let side = if k.is_multiple_of(2) { reach } else { -reach };
-                    Vector::<3>::from_fn(|d, _| if d == k / 2 { side } else { 0.0 })
-                };
-                let values = (0..6).map(|k| field.value(&place(k))).filter(|value| value.is_finite());
-                values.fold(0.0, f64::max)
-            }
-            Self::Field(_) => 1.0,
-        }
-    }
 }
 
 impl Start {

@@ -179,6 +179,10 @@ impl Scene for SurfaceScene {
         self.clouds.clone()
     }
 
+    fn check_sizes(&self, sizes: &CloudSizes) -> Vec<Violation> {
+        data_fields::check_sizes(&self.clouds, sizes)
+    }
+
     fn estimate(&self, sizes: &CloudSizes) -> Estimate {
         let particles = sizes.get("/surface").map_or_else(|| self.shape.points(self.count), |size| size.points);
         let points = particles as f64;
