@@ -10,7 +10,9 @@ mod tree;
 
 use super::distance_level::DistanceLevel;
 use super::sampled::line_volume::line_volume;
-use super::sampled::{Found, LocalFoot, Patch, PatchSet, local_foot, medial_distance, radius_in_ball};
+use super::sampled::{
+    BULGE, Found, LEAST_BULGE, LocalFoot, Patch, PatchSet, local_foot, medial_distance, radius_in_ball,
+};
 use super::{Solid, Surface, SurfacePoint, Vector};
 use crate::geometry::block::indices;
 use crate::geometry::level::{Hessian, LevelFunction, LevelJet};
@@ -230,7 +232,7 @@ impl<const D: usize> Composed<D> {
         let curvature: f64 = jets.iter().map(LevelJet::sharpest_curvature).sum::<f64>() / least_sine(&jets);
         let turn = curvature * reach;
         let radius = if count == D { 0.0 } else { radius_in_ball(reach, (seed - center).norm(), turn) };
-        let bulge = (0.75 * curvature * radius * radius).min(radius) + 1e-3 * radius;
+        let bulge = (BULGE * curvature * radius * radius).min(radius) + LEAST_BULGE * radius;
         let normal = jets[0].normal();
         Some(Patch { seed, is_on_surface, faces, count, radius, bulge, normal, across })
     }
@@ -248,6 +250,9 @@ impl<const D: usize> Composed<D> {
         let solve = |patch: &Patch<D>, _: bool| {
             if patch.count == D {
                 return Some(LocalFoot { point: patch.seed, stretch: f64::INFINITY, is_smooth: true });
+            }
+            if !patch.may_hold_foot(x) {
+                return None;
             }
             self.local_foot(patch.faces(), x, &patch.seed, patch.radius)
                 .filter(|foot| self.is_on_surface_by_faces(&foot.point, patch.faces()))

@@ -7,7 +7,9 @@
 use super::sampled::newton::{descend, project};
 use super::sampled::trace::{bulges, polygon_area, trace};
 use super::sampled::volume::curved_volume;
-use super::sampled::{Found, LocalFoot, Patch, PatchSet, local_foot, medial_distance, radius_in_ball};
+use super::sampled::{
+    BULGE, Found, LEAST_BULGE, LocalFoot, Patch, PatchSet, local_foot, medial_distance, radius_in_ball,
+};
 use super::{Surface, SurfacePoint, Vector};
 use crate::geometry::block::indices;
 use crate::geometry::level::{LevelFunction, LevelJet};
@@ -346,7 +348,7 @@ impl<const D: usize> Sampler<'_, D> {
 fn patch<const D: usize>(seed: Vector<D>, jet: &LevelJet<D>, radius: f64) -> Patch<D> {
     let normal = jet.normal();
     // A curve leaves its tangent by κr²/2; half as much again for curvature that grows.
-    let bulge = (0.75 * jet.sharpest_curvature() * radius * radius).min(radius) + 1e-3 * radius;
+    let bulge = (BULGE * jet.sharpest_curvature() * radius * radius).min(radius) + LEAST_BULGE * radius;
     Patch {
         seed,
         is_on_surface: true,

@@ -10,6 +10,6 @@ pub(super) mod trace;
 pub(super) mod volume;
 
 pub(super) use newton::{LocalFoot, local_foot};
-pub(super) use patches::{Found, Patch, PatchSet, medial_distance, radius_in_ball};
+pub(super) use patches::{BULGE, Found, LEAST_BULGE, Patch, PatchSet, medial_distance, radius_in_ball};
 
 use super::Vector;

@@ -52,6 +52,16 @@ impl<const D: usize> Patch<D> {
         distance <= self.radius || is_flat && is_next()
     }
 
+    /// Whether the piece may hold a local closest point y, where x − y is normal to it: at the seed the part of x − seed along the
+    /// piece is no longer than the way to y, and what the normal turns by on it.
+    pub fn may_hold_foot(&self, x: &Vector<D>) -> bool {
+        let offset = x - self.seed;
+        let along = (offset - self.across * offset).norm();
+        // As bulges are made of curvatures.
+        let turn = (self.bulge / self.radius.max(f64::MIN_POSITIVE) - LEAST_BULGE).max(0.0) / BULGE;
+        along <= ROOM * (self.radius + offset.norm() * turn) + 1e-12 * offset.norm()
+    }
+
     /// No point of the piece is nearer to `x`.
     fn least_distance(&self, x: &Vector<D>) -> f64 {
         let offset = x - self.seed;
@@ -71,6 +81,12 @@ pub(in crate::geometry::surfaces) struct Found<const D: usize> {
     /// Index of its patch.
     pub patch: usize,
 }
+
+/// Bulge of a piece by its curvature times the square of its radius, and the least one by its radius.
+pub(in crate::geometry::surfaces) const BULGE: f64 = 0.75;
+pub(in crate::geometry::surfaces) const LEAST_BULGE: f64 = 1e-3;
+/// Room that is left for what curvatures do not tell.
+const ROOM: f64 = 1.3;
 
 /// The patches of a surface in a tree.
 #[derive(Debug, Clone)]
