@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
-use support::{column, pool, scene};
+use support::{build_with, column, error, pool, scene};
 
 const PLAN: OutputPlan = OutputPlan { every_time: None, series_every_steps: 1 };
 
@@ -359,6 +359,39 @@ fn reactions_by_formula_run_on_the_bunny() {
     let u = column(&*excited, "value");
     let (least, most) = u.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     assert!(least > -2.5 && most < 2.5 && most - least > 0.1, "{least} to {most}");
+}
+
+/// The bunny's mesh as a front: outward by half a spacing and a bit, and by its mean curvature.
+#[test]
+fn the_mesh_of_the_bunny_moves_as_a_front() {
+    let Some(mesh) = model("bunny") else { return };
+    let positions: Vec<[f64; 3]> = mesh.corners.iter().map(|x| [x[0], x[1], x[2]]).collect();
+    let triangles = mesh.triangles.iter().map(|corners| corners.map(|k| k as u32)).collect();
+    let clouds = Clouds::from([("/shape", Cloud { positions: positions.clone(), triangles, ..Cloud::default() })]);
+    let spacing = 0.25;
+    let moved = |law: Value, end_time: f64| {
+        let shape = json!({"type": "mesh", "upload": "upl_b"});
+        let body = json!({"kind": "front", "dimension": 3, "spacing": spacing, "end_time": end_time, "law": law, "shape": shape});
+        pool(2).install(|| {
+            let mut simulation = build_with(&body, PLAN, &clouds).unwrap();
+            while !simulation.is_finished() {
+                simulation.step().unwrap();
+            }
+            simulation
+        })
+    };
+    // The exact front is that of the offset mesh.
+    let grown = moved(json!({"type": "normal", "speed": 0.5}), 0.3);
+    let report = grown.report();
+    assert!(error(&report, "front", "mean", None) < 0.05 * spacing, "{:?}", report.errors);
+    // By mean curvature nothing leaves the box that it began in, and ears and tail draw back.
+    let shrunk = moved(json!("mean_curvature"), 0.1);
+    let points = shrunk.fields(Selection::All).points;
+    let largest = |points: &[[f64; 3]], d: usize| points.iter().map(|x| x[d].abs()).fold(0.0, f64::max);
+    for d in 0..3 {
+        let (before, after) = (largest(&positions, d), largest(&points, d));
+        assert!(after < before && after > 0.8 * before, "{d}: {before} {after}");
+    }
 }
 
 #[test]

@@ -143,6 +143,7 @@ mod tests {
     use super::PathIntegrator;
     use crate::geometry::flows::{Rotation, SingleVortex};
     use crate::geometry::{Flow, Vector};
+    use std::sync::atomic::{AtomicU64, Ordering};
 
     fn end(integrator: PathIntegrator, flow: &dyn Flow<2>, steps: u32) -> Vector<2> {
         let mut x = Vector::<2>::new(0.5, 0.9);
@@ -176,6 +177,37 @@ mod tests {
                 assert_eq!(integrator.advance(&flow, start, 0.5, 1.5), *end, "{integrator:?}");
             }
         }
+    }
+
+    /// A flow that stops before a wall, beyond which there is no velocity.
+    struct Walled {
+        speed: fn(f64) -> f64,
+        calls: AtomicU64,
+    }
+
+    impl Flow<2> for Walled {
+        fn velocity(&self, x: &Vector<2>, _: f64) -> Vector<2> {
+            self.calls.fetch_add(1, Ordering::Relaxed);
+            if x[0] < 1.0 { Vector::<2>::new((self.speed)(x[0]), 0.0) } else { Vector::<2>::repeat(f64::NAN) }
+        }
+
+        fn top_speed(&self, _: &Vector<2>, _: &Vector<2>) -> f64 {
+            1.0
+        }
+    }
+
+    #[test]
+    fn stages_beyond_the_end_of_a_flow_shorten_the_step_and_paths_into_it_end_soon() {
+        let integrator = PathIntegrator::Dopri5 { tolerance: 1e-8 };
+        let moved = |speed: fn(f64) -> f64| {
+            let flow = Walled { speed, calls: AtomicU64::new(0) };
+            let end = integrator.advance(&flow, &Vector::<2>::zeros(), 0.0, 5.0);
+            (end, flow.calls.into_inner())
+        };
+        let (near, calls) = moved(|x| 1.0 - x);
+        assert!((near[0] - (1.0 - (-5.0_f64).exp())).abs() < 1e-6 && calls < 2000, "{near:?} {calls}");
+        let (beyond, calls) = moved(|_| 1.0);
+        assert!(beyond[0].is_nan() && calls < 2000, "{beyond:?} {calls}");
     }
 
     #[test]
