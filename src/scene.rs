@@ -45,6 +45,8 @@ pub struct SceneKind {
     pub example: &'static str,
     /// Short scenes by which the speed of a machine is measured, as a JSON array. Together they have every phase of the kind.
     pub calibration: &'static str,
+    /// Short scenes with spacings, as a JSON array: what they say of errors tells where the search for an accuracy begins.
+    pub precision: &'static str,
     /// What a resolved scene of an earlier version sets otherwise, so that it means the same now.
     pub of_earlier_version: fn(Given) -> Preset,
     /// What frames, series and reports of the kind show.
@@ -153,6 +155,11 @@ pub trait Scene: Send + Sync {
 
     /// Distance of neighboring particles or points, where it is known before a run.
     fn spacing(&self) -> Option<f64>;
+
+    /// The length that errors of the scene go by: half the least extent of its shape, where that is known.
+    fn size(&self) -> Option<f64> {
+        None
+    }
 
     /// Order p of an error ~ spacingᵖ that theory gives, by quantity and norm of the report; None where none is known.
     fn order(&self, _quantity: &str, _norm: &str) -> Option<f64> {

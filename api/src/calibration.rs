@@ -1,7 +1,7 @@
 //! Measures an unknown machine once, in a separate process.
 
 use meniscus_jobs::service::store::Store;
-use meniscus_jobs::spec::calibration::PhaseMeasured;
+use meniscus_jobs::spec::calibration::Measurements;
 use std::io;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -44,7 +44,8 @@ fn measure(store: &Store, threads: usize) -> io::Result<usize> {
     if !output.status.success() {
         return Err(io::Error::other("the measuring process failed"));
     }
-    let found: Vec<PhaseMeasured> = serde_json::from_slice(&output.stdout)?;
-    store.calibrate(&found).map_err(io::Error::other)?;
-    Ok(found.len())
+    let found: Measurements = serde_json::from_slice(&output.stdout)?;
+    store.calibrate(&found.phases).map_err(io::Error::other)?;
+    store.keep_precision(&found.precision).map_err(io::Error::other)?;
+    Ok(found.phases.len())
 }

@@ -252,7 +252,11 @@ fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
     if std::fs::read_dir(scratch).is_ok_and(|mut entries| entries.next().is_some()) {
         return fail(&format!("{} is not empty", scratch.display()));
     }
-    let found = match worker::calibration::measure_here(scratch, threads) {
+    let measured = worker::calibration::measure_here(scratch, threads).and_then(|phases| {
+        let precision = worker::calibration::precision_here(scratch, threads)?;
+        Ok(Measurements { phases, precision })
+    });
+    let found = match measured {
         Ok(found) => found,
         Err(error) => return fail(&error),
     };

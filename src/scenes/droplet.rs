@@ -38,4 +38,5 @@ pub static KIND: SceneKind = SceneKind {
         norms: own::norms(),
     },
     calibration: include_str!("droplet/calibration.json"),
+    precision: "[]",
 };

@@ -30,4 +30,5 @@ pub static KIND: SceneKind = SceneKind {
         norms: own::norms(),
     },
     calibration: include_str!("front/calibration.json"),
+    precision: "[]",
 };

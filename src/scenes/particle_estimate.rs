@@ -95,3 +95,10 @@ pub fn memory_bytes<const D: usize>(particles: u64, method: &PcpMethod) -> u64 {
     let fits = (8 * fields * terms + geometry) / 7;
     particles.saturating_mul((3 * columns + search + output + fits) as u64)
 }
+
+/// Half the least extent of a surface.
+#[must_use]
+pub fn half_extent<const D: usize>(surface: &dyn Surface<D>) -> f64 {
+    let (low, high) = surface.bounding_box();
+    0.5 * (high - low).min()
+}

@@ -23,4 +23,5 @@ pub static KIND: SceneKind = SceneKind {
         norms: own::NORMS.to_vec(),
     },
     calibration: include_str!("redistance/calibration.json"),
+    precision: include_str!("redistance/precision.json"),
 };

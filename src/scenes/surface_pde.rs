@@ -43,4 +43,5 @@ pub static KIND: SceneKind = SceneKind {
         norms: without_repetition(&[&own::norms(), embedding::NORMS]),
     },
     calibration: include_str!("surface_pde/calibration.json"),
+    precision: include_str!("surface_pde/precision.json"),
 };

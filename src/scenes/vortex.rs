@@ -30,4 +30,5 @@ pub static KIND: SceneKind = SceneKind {
         norms: without_repetition(&[advected_level_set::quantities::NORMS, &grid_based_particle::quantities::norms()]),
     },
     calibration: include_str!("vortex/calibration.json"),
+    precision: include_str!("vortex/precision.json"),
 };

@@ -1,8 +1,10 @@
 //! The sweep that finds the spacing for an accuracy: where it begins, and what it compares.
 
-use crate::spec::accuracy::Wanted;
+use crate::convergence::Level;
+use crate::spec::accuracy::{LEAST_LEVELS, Wanted};
 use crate::spec::body::{Allowance, BodyError, JobBody, Sources};
 use crate::spec::study::{SweepPoint, point_body};
+use crate::spec::work_precision::{error_scale, reference_of, spacing_for};
 use meniscus::spec::Json;
 use serde_json::{Value, json};
 
@@ -30,11 +32,23 @@ pub fn sweep<S: Sources>(
     wanted: &Wanted,
     allowance: Allowance,
     sources: &S,
+    known: Known<'_, S::Error>,
 ) -> Result<Value, BodyError<S::Error>> {
     let search = Search { body, wanted, base: base_of(&body.spec), allowance, sources };
+    if let Some((from, choice)) = search.told(known)? {
+        let choice: Vec<OpenChoice> = choice.into_iter().map(|(pointer, value)| (pointer, vec![value])).collect();
+        return Ok(wanted.sweep(from, &choice, LEAST_LEVELS[1]));
+    }
     let from = search.first_value()?;
-    Ok(wanted.sweep(from, &search.open_choices(from)?))
+    Ok(wanted.sweep(from, &search.open_choices(from)?, LEAST_LEVELS[0]))
 }
+
+/// Looks up what short runs said of an error, by the name of the runs, the quantity and the norm.
+pub type Known<'a, E> = &'a dyn Fn(&str, &str, &str) -> Result<Vec<Level>, E>;
+
+/// Spacings of the first level by the one that short runs tell, the coarsest first: two levels of it and the next one cost a third
+/// of the run.
+const PILOTS: [f64; 4] = [3.0, 2.1, 1.5, 1.0];
 
 /// A search among bodies.
 struct Search<'a, S> {
@@ -43,6 +57,19 @@ struct Search<'a, S> {
     base: Json,
     allowance: Allowance,
     sources: &'a S,
+}
+
+/// Pointer of a value of the scene, and the value.
+type Choice = (&'static str, Json);
+
+/// The value of the axis at the first level, and a choice that goes with it.
+type FirstLevel = (f64, Option<Choice>);
+
+/// What short runs tell: a spacing that would do, its CPU seconds, and with which choice.
+struct Begin {
+    spacing: f64,
+    cpu_s: f64,
+    choice: Option<Choice>,
 }
 
 /// Pointer of a value of the scene that the body leaves open, and the values that are compared.
@@ -59,6 +86,69 @@ impl<S: Sources> Search<'_, S> {
             Err(BodyError::Invalid(_)) => Ok(None),
             Err(error) => Err(error),
         }
+    }
+
+    /// The value of the axis for a spacing.
+    fn axis_value(&self, spacing: f64) -> Option<f64> {
+        let default = self.body.scene.spacing()?;
+        let value = Value::pointer(&self.body.resolved.scene, self.wanted.axis).and_then(Value::as_f64);
+        if self.wanted.axis == "/count" {
+            // Where the body has none, the count is that of the default spacing.
+            let count = value.unwrap_or(self.body.forecast.estimate.particles as f64);
+            Some((count * (default / spacing).powi(2)).round())
+        } else {
+            Some(spacing)
+        }
+    }
+
+    /// Where short runs tell the search to begin: the value of the axis, and the choice that is cheapest by them.
+    fn told(&self, known: Known<'_, S::Error>) -> Result<Option<FirstLevel>, BodyError<S::Error>> {
+        let Some(Begin { spacing, choice, .. }) = self.cheapest(known)? else { return Ok(None) };
+        for coarser in PILOTS {
+            let Some(value) = self.axis_value(spacing * coarser) else { return Ok(None) };
+            let given: Vec<Choice> = choice.iter().cloned().chain([(self.wanted.axis, json!(value))]).collect();
+            let level = self.body_with(&given)?;
+            if level.is_some_and(|level| level.scene.warnings().is_empty()) {
+                return Ok(Some((value, choice.filter(|(pointer, _)| self.is_open(pointer)))));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The choice that reaches the tolerance with the least CPU time by short runs of other scenes.
+    fn cheapest(&self, known: Known<'_, S::Error>) -> Result<Option<Begin>, BodyError<S::Error>> {
+        let wish = &self.wanted.spec;
+        let error = wish.quantity.error.as_ref().filter(|_| !wish.relative && wish.quantity.time.is_none());
+        let (Some(error), Some(size)) = (error, self.body.scene.size()) else { return Ok(None) };
+        let tolerance = wish.tolerance / error_scale(self.body.scene.as_ref(), &error.quantity, size);
+        let mut best: Option<Begin> = None;
+        for choice in self.choices() {
+            let given: Vec<Choice> = choice.iter().cloned().collect();
+            let Some(body) = self.body_with(&given)? else { continue };
+            let name = reference_of(body.scene.as_ref(), choice.as_ref().map(|(pointer, value)| (*pointer, value)));
+            let levels = known(&name, &error.quantity, &error.norm).map_err(BodyError::Lookup)?;
+            let Some((spacing, cpu_s)) = spacing_for(&levels, tolerance) else { continue };
+            if best.as_ref().is_none_or(|best| cpu_s < best.cpu_s) {
+                best = Some(Begin { spacing: spacing * size, cpu_s, choice });
+            }
+        }
+        Ok(best)
+    }
+
+    /// Whether the body leaves a value of the scene open.
+    fn is_open(&self, pointer: &str) -> bool {
+        Value::pointer(&self.base, &format!("/scene{pointer}")).is_none()
+    }
+
+    /// The values of a choice that the body leaves open, or the one that it gives; nothing where the scene has no choice.
+    fn choices(&self) -> Vec<Option<Choice>> {
+        let mut found: Vec<Option<Choice>> = Vec::new();
+        for (pointer, values) in self.body.scene.choices() {
+            let given = Value::pointer(&self.base, &format!("/scene{pointer}"));
+            let values = values.into_iter().filter(|value| given.is_none_or(|given| given == value));
+            found.extend(values.map(|value| Some((pointer, value))));
+        }
+        if found.is_empty() { vec![None] } else { found }
     }
 
     /// The value of the axis at the first level: the coarsest that is valid and of which nothing is doubtful before it runs.
@@ -81,7 +171,7 @@ impl<S: Sources> Search<'_, S> {
     fn open_choices(&self, from: f64) -> Result<Vec<OpenChoice>, BodyError<S::Error>> {
         let mut open = Vec::new();
         for (pointer, values) in self.body.scene.choices() {
-            if Value::pointer(&self.base, &format!("/scene{pointer}")).is_some() {
+            if !self.is_open(pointer) {
                 continue;
             }
             let mut possible = Vec::new();

@@ -31,8 +31,8 @@ pub fn tell(plan: &Plan, levels: &[MeasuredLevel], is_last: bool) -> Option<Told
     if judged.is_met {
         return Some(among(plan, levels, &judged));
     }
-    let order = judged.order?.value;
-    let order = target(&plan.spec, &plan.quantity, levels).theory.map_or(order, |theory| order.min(theory));
+    let theory = target(&plan.spec, &plan.quantity, levels).theory;
+    let order = judged.order.map(|order| order.value).into_iter().chain(theory).reduce(f64::min)?;
     let uncertainty = judged.uncertainty?;
     let distance = finest.spacing / judged.next_spacing?;
     let is_near = distance <= FARTHEST && judged.convergence == Some(Convergence::Monotone);

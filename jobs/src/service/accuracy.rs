@@ -24,7 +24,9 @@ pub fn study_for(
     wanted: &Wanted,
     allowance: Allowance,
 ) -> Result<NewStudy, BodyError<StoreError>> {
-    let sweep = for_accuracy::sweep(body, wanted, allowance, store)?;
+    let sweep = for_accuracy::sweep(body, wanted, allowance, store, &|name, quantity, norm| {
+        store.precision(name, quantity, norm)
+    })?;
     let spec = json!({"base": for_accuracy::base_of(&body.spec), "sweep": sweep});
     let calibration = store.calibration().map_err(BodyError::Lookup)?;
     let parsed = study::parse(&spec, allowance, 1, store, &calibration, NewJob::from_body);
@@ -49,7 +51,9 @@ pub fn known_body(
     allowance: Allowance,
 ) -> Result<Option<JobBody>, BodyError<StoreError>> {
     let base = for_accuracy::base_of(&body.spec);
-    let sweep = for_accuracy::sweep(body, wanted, allowance, store)?;
+    let sweep = for_accuracy::sweep(body, wanted, allowance, store, &|name, quantity, norm| {
+        store.precision(name, quantity, norm)
+    })?;
     let Some(plan) = Plan::new(&sweep, &base) else { return Ok(None) };
     let Quantity::Error { quantity, norm, time: None } = &plan.quantity else { return Ok(None) };
     if plan.spec.until.relative {

@@ -59,12 +59,12 @@ impl Wanted {
 
     /// The sweep of the study that finds the spacing, from a first value of the axis.
     #[must_use]
-    pub fn sweep(&self, from: f64, alternatives: &[(&str, Vec<Json>)]) -> Value {
+    pub fn sweep(&self, from: f64, alternatives: &[(&str, Vec<Json>)], least_levels: u64) -> Value {
         let lists: serde_json::Map<String, Value> =
             alternatives.iter().map(|(pointer, values)| (format!("/scene{pointer}"), json!(values))).collect();
         let mut sweep = json!({
             "mode": "refine", "axis": format!("/scene{}", self.axis), "from": from, "ratio": RATIO,
-            "levels": {"least": LEAST_LEVELS, "most": MOST_LEVELS}, "quantity": self.spec.quantity.as_given(),
+            "levels": {"least": least_levels, "most": MOST_LEVELS}, "quantity": self.spec.quantity.as_given(),
             "until": {"tolerance": self.spec.tolerance, "relative": self.spec.relative},
         });
         if let (false, Some(object)) = (lists.is_empty(), sweep.as_object_mut()) {
@@ -76,8 +76,8 @@ impl Wanted {
 
 /// Ratio of two levels of the study.
 const RATIO: f64 = 1.4;
-/// Levels of the study at least.
-const LEAST_LEVELS: u64 = 3;
+/// Levels of the study at least, where nothing is known, and where short runs told where to begin.
+pub const LEAST_LEVELS: [u64; 2] = [3, 2];
 /// Levels of the study at most.
 const MOST_LEVELS: u64 = 10;
 

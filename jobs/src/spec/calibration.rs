@@ -2,6 +2,7 @@
 //! that finishes.
 
 use crate::spec::json_numbers::{null_is_zero, nulls_are_zero};
+use crate::spec::work_precision::PrecisionMeasured;
 use crate::system::process;
 use meniscus::scene::PhaseWork;
 use meniscus::scene::work::Course;
@@ -27,6 +28,15 @@ pub struct PhaseMeasured {
     pub phase: String,
     /// Work and time of that phase.
     pub measured: Measured,
+}
+
+/// What `meniscus calibrate` hands over.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measurements {
+    /// Speed of this machine, by phase.
+    pub phases: Vec<PhaseMeasured>,
+    /// Errors of short runs.
+    pub precision: Vec<PrecisionMeasured>,
 }
 
 /// Everything that was measured on this machine with this build.

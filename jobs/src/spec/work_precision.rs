@@ -4,6 +4,7 @@
 use crate::convergence::{Cost, Level};
 use crate::spec::report::RunReport;
 use crate::system::digest;
+use meniscus::scene::Scene;
 use meniscus::spec::{Json, Object};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -66,6 +67,57 @@ pub fn of_report(problem: &str, spacing: f64, report: &RunReport) -> Vec<Precisi
     latest.into_iter().map(row).collect()
 }
 
+/// Under which name short runs of `meniscus calibrate` keep what they say of scenes like this one with a choice of its own.
+#[must_use]
+pub fn reference_of(scene: &dyn Scene, choice: Option<(&str, &Json)>) -> String {
+    let choice = choice.map_or_else(String::new, |(pointer, value)| format!(" {pointer} = {}", sorted(value)));
+    format!("reference {}{choice}", scene.family())
+}
+
+/// What an error of a quantity is divided by when scenes of different sizes are compared.
+#[must_use]
+pub fn error_scale(scene: &dyn Scene, quantity: &str, size: f64) -> f64 {
+    let field = scene.fields().into_iter().find(|field| field.name == quantity);
+    match field.map(|field| field.unit) {
+        Some("length") => size,
+        Some("1/length") => size.recip(),
+        _ => 1.0,
+    }
+}
+
+/// What a short run says of scenes of any size: spacing and errors by the size.
+#[must_use]
+pub fn of_reference(scene: &dyn Scene, choice: Option<(&str, &Json)>, report: &RunReport) -> Vec<PrecisionMeasured> {
+    let Some((size, spacing)) = scene.size().zip(scene.spacing()) else { return Vec::new() };
+    let mut rows = of_report(&reference_of(scene, choice), spacing / size, report);
+    for row in &mut rows {
+        row.error /= error_scale(scene, &row.quantity, size);
+    }
+    rows
+}
+
+/// The spacing at which levels reach a tolerance, and its CPU seconds: between levels and beyond them by the nearest power. The coarsest
+/// level comes first; None where they tell no order.
+#[must_use]
+pub fn spacing_for(levels: &[Level], tolerance: f64) -> Option<(f64, f64)> {
+    let orders: Vec<f64> = levels
+        .windows(2)
+        .map(|pair| (pair[0].value / pair[1].value).ln() / (pair[0].spacing / pair[1].spacing).ln())
+        .collect();
+    // The first pair whose finer level meets it, else the last one.
+    let place = levels.iter().skip(1).position(|level| level.value <= tolerance);
+    let place = place.or(orders.len().checked_sub(1))?;
+    let (order, from) = (orders[place], levels[place + 1]);
+    if !order.is_finite() || order < LEAST_ORDER {
+        return None;
+    }
+    let spacing = from.spacing * (tolerance / from.value).powf(order.recip());
+    Some((spacing, cost_at(levels, spacing)?))
+}
+
+/// Order below which levels tell nothing.
+const LEAST_ORDER: f64 = 0.5;
+
 /// CPU seconds of a run at a spacing, by levels that are known, the coarsest first: between two levels by the power through them.
 #[must_use]
 pub fn cost_at(levels: &[Level], spacing: f64) -> Option<f64> {
@@ -78,7 +130,7 @@ pub fn cost_at(levels: &[Level], spacing: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{cost_at, problem_of};
+    use super::{cost_at, problem_of, spacing_for};
     use crate::convergence::Level;
     use serde_json::json;
 
@@ -89,6 +141,18 @@ mod tests {
         let other = problem_of(&json!({"kind": "redistance", "shape": {"type": "circle", "radius": 2}}));
         assert!(one.is_some() && one == same && one != other);
         assert_eq!(problem_of(&json!(3)), None);
+    }
+
+    #[test]
+    fn levels_tell_the_spacing_of_a_tolerance_between_them_and_beyond() {
+        let levels = [0.4, 0.2, 0.1].map(|h: f64| Level { spacing: h, value: 3.0 * h.powi(3), cpu_s: h.powi(-2) });
+        for spacing in [0.5, 0.3, 0.15, 0.03_f64] {
+            let (found, cost) = spacing_for(&levels, 3.0 * spacing.powi(3)).unwrap();
+            assert!((found / spacing - 1.0).abs() < 1e-12 && (cost * spacing.powi(2) - 1.0).abs() < 1e-9);
+        }
+        assert_eq!(spacing_for(&levels[..1], 1e-3), None);
+        let flat = levels.map(|level| Level { value: 1.0, ..level });
+        assert_eq!(spacing_for(&flat, 1e-3), None);
     }
 
     #[test]

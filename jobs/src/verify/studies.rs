@@ -224,7 +224,9 @@ fn try_one(workspace: &Workspace, trials: &Trials, trial: &Trial) -> Result<Trie
     let accuracy = json!({"quantity": trials.quantity, "tolerance": trial.tolerance, "relative": trials.relative});
     let body = parsed(&json!({"scene": trial.scene, "accuracy": accuracy}))?;
     let wanted = body.wanted.as_ref().ok_or("the trial asks for no accuracy")?;
-    let sweep = for_accuracy::sweep(&body, wanted, allowance(), &NoSources).map_err(|_| "no sweep was found")?;
+    let known = |name: &str, quantity: &str, norm: &str| Ok(workspace.precision(name, quantity, norm));
+    let sweep =
+        for_accuracy::sweep(&body, wanted, allowance(), &NoSources, &known).map_err(|_| "no sweep was found")?;
     let base = for_accuracy::base_of(&body.spec);
     let plan = Plan::new(&sweep, &base).ok_or("the sweep is not understood")?;
     let mut runner = Runner { workspace, plan: &plan, base: &base, spent_s: 0.0 };

@@ -2,19 +2,25 @@
 
 use super::bad_case::Fate;
 use super::measure::FinishedRun;
+use crate::convergence::Level;
 use crate::spec::attempt_files;
 use crate::spec::records::Verdict;
 use crate::spec::report::RunReport;
+use crate::spec::work_precision::PrecisionMeasured;
 use crate::system::build;
 use crate::system::digest;
+use crate::worker::calibration;
 use crate::worker::local_run::{self, Keep, Refused};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// The directory of the runs of this build.
 pub(super) struct Workspace {
     directory: PathBuf,
+    /// What the short runs of `meniscus calibrate` say of errors, once they are asked for.
+    precision: OnceLock<Vec<PrecisionMeasured>>,
 }
 
 impl Workspace {
@@ -22,7 +28,25 @@ impl Workspace {
     pub(super) fn new(runs: &Path) -> Self {
         let own = std::env::current_exe().ok().and_then(|path| digest::of_file(&path).ok());
         let build = own.map_or_else(build::name, |(digest, _)| digest[..16].to_owned());
-        Self { directory: runs.join(build) }
+        Self { directory: runs.join(build), precision: OnceLock::new() }
+    }
+
+    /// Levels that the short runs of `meniscus calibrate` tell, the coarsest first; none where these cannot be made.
+    pub(super) fn precision(&self, name: &str, quantity: &str, norm: &str) -> Vec<Level> {
+        let measured = self.precision.get_or_init(|| {
+            calibration::precision_here(&self.directory.join("precision"), 1).unwrap_or_else(|error| {
+                tracing::warn!(error, "short runs for the precision failed");
+                Vec::new()
+            })
+        });
+        let is_asked = |row: &&PrecisionMeasured| row.problem == name && row.quantity == quantity && row.norm == norm;
+        let mut levels: Vec<Level> = measured
+            .iter()
+            .filter(is_asked)
+            .map(|row| Level { spacing: row.spacing, value: row.error, cpu_s: row.cpu_s })
+            .collect();
+        levels.sort_by(|a, b| b.spacing.total_cmp(&a.spacing));
+        levels
     }
 
     /// A finished run of a job body: an earlier one with this build, or one made now.

@@ -2,9 +2,11 @@
 
 use crate::spec::attempt_files;
 use crate::spec::calibration::PhaseMeasured;
-use crate::spec::forecast::measured;
+use crate::spec::forecast::{ForecastRecord, measured};
 use crate::spec::report::RunReport;
+use crate::spec::work_precision::{PrecisionMeasured, of_reference};
 use crate::worker::local_run;
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -33,13 +35,76 @@ pub fn measure_here(directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>
     Ok(medians(&rounds))
 }
 
-fn measure_run(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
-    let body = json!({"scene": scene});
-    let body = local_run::run(&body, directory, threads, local_run::Keep::Report)
+/// What short runs with several spacings say of errors, for every kind that names some.
+///
+/// # Errors
+/// A sentence that names the run.
+pub fn precision_here(directory: &Path, threads: u64) -> Result<Vec<PrecisionMeasured>, String> {
+    let mut rows = Vec::new();
+    for kind in meniscus::scenes::SCENES {
+        let named: Vec<Reference> = serde_json::from_str(kind.precision)
+            .map_err(|error| format!("scenes of {} for the precision: {error}", kind.kind))?;
+        for Reference { scene, values } in named {
+            for value in values {
+                rows.extend(measure_precision(&scene, value, directory, threads)?);
+            }
+        }
+    }
+    let _ = std::fs::remove_dir_all(directory);
+    Ok(rows)
+}
+
+/// A scene without a spacing, and values of the spacing or of the number of points.
+#[derive(Deserialize)]
+struct Reference {
+    scene: Value,
+    values: Vec<f64>,
+}
+
+/// One spacing with every choice that the scene leaves open.
+fn measure_precision(
+    scene: &Value,
+    value: f64,
+    directory: &Path,
+    threads: u64,
+) -> Result<Vec<PrecisionMeasured>, String> {
+    let is_count = scene["kind"] == "surface_pde";
+    let mut scene = scene.clone();
+    scene[if is_count { "count" } else { "spacing" }] = if is_count { json!(value as u64) } else { json!(value) };
+    let plan = |scene: &Value| {
+        meniscus::scene::parse(scene, meniscus::scenes::SCENES).map_err(|errors| format!("{scene}: {errors:?}"))
+    };
+    let mut choices: Vec<Option<(&str, Value)>> = Vec::new();
+    for (pointer, values) in plan(&scene)?.choices() {
+        choices.extend(values.into_iter().map(|value| Some((pointer, value))));
+    }
+    if choices.is_empty() {
+        choices.push(None);
+    }
+    let mut rows = Vec::new();
+    for choice in &choices {
+        let mut scene = scene.clone();
+        if let Some((pointer, value)) = choice {
+            scene[pointer.trim_start_matches('/')] = value.clone();
+        }
+        let (report, _) = run_report(&scene, directory, threads)?;
+        let choice = choice.as_ref().map(|(pointer, value)| (*pointer, value));
+        rows.extend(of_reference(plan(&scene)?.as_ref(), choice, &report));
+    }
+    Ok(rows)
+}
+
+fn run_report(scene: &Value, directory: &Path, threads: u64) -> Result<(RunReport, ForecastRecord), String> {
+    let body = local_run::run(&json!({"scene": scene}), directory, threads, local_run::Keep::Report)
         .map_err(|cause| format!("{scene}: {cause}"))?;
     let report = std::fs::read(directory.join(attempt_files::REPORT)).map_err(|error| error.to_string())?;
     let report: RunReport = serde_json::from_slice(&report).map_err(|error| error.to_string())?;
-    Ok(measured(&body.forecast.record(), &report.cost, threads))
+    Ok((report, body.forecast.record()))
+}
+
+fn measure_run(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>, String> {
+    let (report, forecast) = run_report(scene, directory, threads)?;
+    Ok(measured(&forecast, &report.cost, threads))
 }
 
 /// Of every phase of every run the round in the middle; all rounds list the same.

@@ -8,7 +8,7 @@ use crate::geometry::lattice::Lattice;
 use crate::scene::cloud::{self, CloudReference, CloudRole, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
-use crate::scenes::particle_estimate::{check_extent, memory_bytes, shape_particles};
+use crate::scenes::particle_estimate::{check_extent, half_extent, memory_bytes, shape_particles};
 use crate::scenes::pcp_spec::PcpContext;
 use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
@@ -207,6 +207,10 @@ impl<const D: usize> Scene for RedistanceScene<D> {
 
     fn spacing(&self) -> Option<f64> {
         Some(self.lattice.spacing)
+    }
+
+    fn size(&self) -> Option<f64> {
+        self.surface.as_ref().map(|surface| half_extent(surface.whole.as_ref()))
     }
 
     fn choices(&self) -> Vec<(&'static str, Vec<Value>)> {

@@ -115,6 +115,10 @@ impl Scene for SurfaceScene {
         self.points.is_none().then(|| self.shape.spacing(self.count))
     }
 
+    fn size(&self) -> Option<f64> {
+        self.points.is_none().then(|| self.shape.reach())
+    }
+
     fn choices(&self) -> Vec<(&'static str, Vec<Value>)> {
         let of_order = |order: u64| json!({"type": "surface_dcpse", "order": order});
         let is_exact = self.points.is_none() && matches!(self.normals, Normals::Exact);

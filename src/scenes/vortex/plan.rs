@@ -12,7 +12,7 @@ use crate::scenes::flow_data;
 use crate::scenes::flow_return::check_return;
 use crate::scenes::flow_work::error_units;
 use crate::scenes::front::{FrontChoice, Law, plan_front};
-use crate::scenes::particle_estimate::{check_extent, memory_bytes, shape_particles};
+use crate::scenes::particle_estimate::{check_extent, half_extent, memory_bytes, shape_particles};
 use crate::scenes::pcp_spec::{Neighborhood, PcpContext, PcpSpec};
 use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
@@ -278,6 +278,10 @@ impl<const D: usize> Scene for VortexScene<D> {
 
     fn spacing(&self) -> Option<f64> {
         Some(self.spec.spacing)
+    }
+
+    fn size(&self) -> Option<f64> {
+        self.surface.as_ref().map(|surface| half_extent(surface.whole.as_ref()))
     }
 
     fn view(&self) -> View {
