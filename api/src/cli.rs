@@ -9,6 +9,7 @@ use clap::{Parser, Subcommand};
 use meniscus_jobs::inspection::{look, sandbox};
 use meniscus_jobs::service::backup;
 use meniscus_jobs::service::fsck;
+use meniscus_jobs::spec::calibration::Measurements;
 use meniscus_jobs::spec::records::Verdict;
 use meniscus_jobs::spec::requests::NOT_STARTED_CODE;
 use meniscus_jobs::spec::uploads::Purpose;
