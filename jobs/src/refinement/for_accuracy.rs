@@ -187,3 +187,51 @@ impl<S: Sources> Search<'_, S> {
         Ok(open)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{base_of, sweep};
+    use crate::convergence::Level;
+    use crate::spec::body::{self, Allowance, NoSources};
+    use serde_json::{Value, json};
+    use std::convert::Infallible;
+
+    /// The sweep for a redistancing to 1e-6; `order` is that of a choice of its own, by its name, and `size` half the shape.
+    fn found(scene: &Value, order: impl Fn(&str) -> Option<f64>) -> Value {
+        let accuracy = json!({"quantity": {"error": {"quantity": "phi", "norm": "rms"}}, "tolerance": 1e-6});
+        let allowance = Allowance { threads: 1, memory_bytes: 4 << 30, local_files: false };
+        let body = body::parse(&json!({"scene": scene, "accuracy": accuracy}), allowance, &NoSources).unwrap();
+        let known = |name: &str, _: &str, _: &str| -> Result<Vec<Level>, Infallible> {
+            let level = |order: f64, h: f64| Level { spacing: h, value: h.powf(order), cpu_s: h.powi(-2) };
+            Ok(order(name).map_or(Vec::new(), |order| [0.4, 0.2, 0.1].map(|h| level(order, h)).to_vec()))
+        };
+        let wanted = body.wanted.as_ref().unwrap();
+        sweep(&body, wanted, allowance, &NoSources, &known)
+            .unwrap_or_else(|_| panic!("{base:?}", base = base_of(&body.spec)))
+    }
+
+    #[test]
+    fn short_runs_tell_the_set_up_and_where_to_begin() {
+        let scene = json!({"kind": "redistance", "shape": {"type": "circle", "radius": 0.5}});
+        let by_degree =
+            |name: &str| (3..7).find(|n| name.contains(&format!("\"degree\":{n}"))).map(|n| f64::from(n) + 1.0);
+        let told = found(&scene, by_degree);
+        assert_eq!(told["alternatives"], json!({"/scene/method": [{"type": "pcp", "degree": 6}]}), "{told}");
+        assert_eq!(told["levels"]["least"], 2);
+        // h⁷ = 1e-6/0.5 by the radius of 0.5, and three times as coarse.
+        let spacing = 0.5 * (2e-6_f64).powf(1.0 / 7.0);
+        let from = told["from"].as_f64().unwrap();
+        assert!(
+            [3.0, 2.1, 1.5, 1.0].iter().any(|coarser| (from / spacing / coarser - 1.0).abs() < 1e-9),
+            "{from} {spacing}"
+        );
+        // A degree that is given is kept.
+        let given = json!({"kind": "redistance", "shape": {"type": "circle", "radius": 0.5}, "method": {"type": "pcp", "degree": 4}});
+        let told = found(&given, by_degree);
+        assert!(told.get("alternatives").is_none() && told["levels"]["least"] == 2, "{told}");
+        // Where nothing is known, all are compared.
+        let unknown = found(&scene, |_| None);
+        assert_eq!(unknown["levels"]["least"], 3);
+        assert_eq!(unknown["alternatives"]["/scene/method"].as_array().map(Vec::len), Some(4));
+    }
+}
