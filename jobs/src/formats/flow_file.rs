@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{Read, Seek};
 
 /// Bytes of a VTI file at most.
-const LARGEST: u64 = 2 << 30;
+const LARGEST: u64 = 1 << 30;
 /// Names of the components.
 const COMPONENTS: [&str; 3] = ["velocity_x", "velocity_y", "velocity_z"];
 /// Reads a flow, and says what was found.

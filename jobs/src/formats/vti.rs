@@ -171,7 +171,8 @@ impl Coding<'_> {
         let bytes = blocks.checked_add(3).and_then(|n| n.checked_mul(self.head)).filter(|n| *n <= text.len());
         let signs = coded(bytes.ok_or_else(torn)?);
         let head = decode(text.get(..signs).ok_or_else(torn)?)?;
-        let sizes = (0..blocks).map(|k| self.count(&head, 3 + k)).sum::<Option<usize>>().ok_or_else(torn)?;
+        let whole = (0..blocks).try_fold(0_usize, |sum, k| sum.checked_add(self.count(&head, 3 + k)?));
+        let sizes = whole.filter(|sizes| *sizes <= text.len()).ok_or_else(torn)?;
         let data = decode(text.get(signs..signs + coded(sizes)).ok_or_else(torn)?)?;
         self.inflated(&head, &data)
     }

@@ -116,7 +116,7 @@ impl Scene for SurfaceScene {
     }
 
     fn size(&self) -> Option<f64> {
-        self.points.is_none().then(|| self.shape.reach())
+        self.points.is_none().then(|| self.shape.size())
     }
 
     fn choices(&self) -> Vec<(&'static str, Vec<Value>)> {

@@ -168,6 +168,15 @@ impl Shape {
         }
     }
 
+    /// The length that errors go by: the least radius of the surface, where it has one.
+    pub fn size(&self) -> f64 {
+        match self {
+            Self::Ellipsoid(ellipsoid) => ellipsoid.semi_axes.min(),
+            Self::Torus(torus) => torus.minor_radius,
+            other => other.reach(),
+        }
+    }
+
     /// The exact unit normal at a point of it, z = 0 of a circle; nothing is known of points.
     pub fn normal(&self, x: &Vector<3>) -> Option<Vector<3>> {
         Some(match self {
