@@ -138,7 +138,10 @@ fn all_errors_of_a_query_come_at_once() {
     assert_eq!(errors[4]["did_you_mean"], "created_at");
     let answer = service.request("POST", "/v1/uploads?nam=x", &[], Some(b"1 2 3\n"));
     assert_eq!(answer.pointers(), ["nam", "as"]);
-    assert_eq!(answer.json()["errors"][1]["allowed"], json!(["checkpoint", "points", "surface", "queries", "mesh"]));
+    assert_eq!(
+        answer.json()["errors"][1]["allowed"],
+        json!(["checkpoint", "points", "surface", "queries", "mesh", "values", "flow"])
+    );
 }
 
 #[test]

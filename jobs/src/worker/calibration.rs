@@ -44,9 +44,10 @@ pub fn precision_here(directory: &Path, threads: u64) -> Result<Vec<PrecisionMea
     for kind in meniscus::scenes::SCENES {
         let named: Vec<Reference> = serde_json::from_str(kind.precision)
             .map_err(|error| format!("scenes of {} for the precision: {error}", kind.kind))?;
-        for Reference { scene, values } in named {
+        for Reference { mut scene, axis, values } in named {
             for value in values {
-                rows.extend(measure_precision(&scene, value, directory, threads)?);
+                scene[&axis] = value;
+                rows.extend(measure_precision(&scene, directory, threads)?);
             }
         }
     }
@@ -54,28 +55,21 @@ pub fn precision_here(directory: &Path, threads: u64) -> Result<Vec<PrecisionMea
     Ok(rows)
 }
 
-/// A scene without a spacing, and values of the spacing or of the number of points.
+/// A scene without a spacing, and values of its `spacing` or of its `count` of points.
 #[derive(Deserialize)]
 struct Reference {
     scene: Value,
-    values: Vec<f64>,
+    axis: String,
+    values: Vec<Value>,
 }
 
-/// One spacing with every choice that the scene leaves open.
-fn measure_precision(
-    scene: &Value,
-    value: f64,
-    directory: &Path,
-    threads: u64,
-) -> Result<Vec<PrecisionMeasured>, String> {
-    let is_count = scene["kind"] == "surface_pde";
-    let mut scene = scene.clone();
-    scene[if is_count { "count" } else { "spacing" }] = if is_count { json!(value as u64) } else { json!(value) };
+/// One scene with every choice that it leaves open.
+fn measure_precision(scene: &Value, directory: &Path, threads: u64) -> Result<Vec<PrecisionMeasured>, String> {
     let plan = |scene: &Value| {
         meniscus::scene::parse(scene, meniscus::scenes::SCENES).map_err(|errors| format!("{scene}: {errors:?}"))
     };
     let mut choices: Vec<Option<(&str, Value)>> = Vec::new();
-    for (pointer, values) in plan(&scene)?.choices() {
+    for (pointer, values) in plan(scene)?.choices() {
         choices.extend(values.into_iter().map(|value| Some((pointer, value))));
     }
     if choices.is_empty() {
