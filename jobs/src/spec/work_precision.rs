@@ -146,10 +146,13 @@ mod tests {
     #[test]
     fn levels_tell_the_spacing_of_a_tolerance_between_them_and_beyond() {
         let levels = [0.4, 0.2, 0.1].map(|h: f64| Level { spacing: h, value: 3.0 * h.powi(3), cpu_s: h.powi(-2) });
-        for spacing in [0.5, 0.3, 0.15, 0.03_f64] {
+        for spacing in [0.3, 0.15, 0.03_f64] {
             let (found, cost) = spacing_for(&levels, 3.0 * spacing.powi(3)).unwrap();
             assert!((found / spacing - 1.0).abs() < 1e-12 && (cost * spacing.powi(2) - 1.0).abs() < 1e-9);
         }
+        // What is coarser than all levels costs no more than the coarsest.
+        let (found, cost) = spacing_for(&levels, 3.0 * 0.5_f64.powi(3)).unwrap();
+        assert!((found - 0.5).abs() < 1e-12 && (cost - levels[0].cpu_s).abs() < 1e-12);
         assert_eq!(spacing_for(&levels[..1], 1e-3), None);
         let flat = levels.map(|level| Level { value: 1.0, ..level });
         assert_eq!(spacing_for(&flat, 1e-3), None);

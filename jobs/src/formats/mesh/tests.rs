@@ -119,8 +119,9 @@ fn what_is_not_needed_is_passed_over() {
     let mut body: Vec<String> = body.lines().map(str::to_owned).collect();
     body[..4].iter_mut().for_each(|line| *line += &format!(" {} 2 5 6", "7 ".repeat(66)));
     body.splice(4..4, ["1 3 1 2 3".to_owned(), "1 0".to_owned()]);
-    let found = read(format!("{head}end_header\n{}\n", body.join("\n")).as_bytes());
-    assert_eq!(found, Ok(tetrahedron()));
+    let found = read(format!("{head}end_header\n{}\n", body.join("\n")).as_bytes()).unwrap();
+    assert!(found.columns.len() == 64 && found.columns.iter().all(|column| column.values == [7.0; 4]));
+    assert_eq!(Mesh { columns: Vec::new(), ..found }, tetrahedron());
     // Continued lines, lines as faces, texture coordinates, colors, groups, curves, and words that are no ASCII.
     let obj = "o Gr\u{f6}\u{df}e\nmtllib x\nv 0 0 0 1 .5 .5\nv 1 0 0\nv 0 1 \\\n 0\nv 0 0 1\nvt 0 0\nvn 1 0 0\nl 1 2\nf 1 2\nf 1/1/1 3/1/1 \\\r\n2/1/1 # x\nf 1/1/1 2/1/1 \\\n\\\n4/1/1\ns off\nf -4/-1/-1 -1//-1 3//1\ncurv 1 2\nf 2/1/1 3/1/1 4/1/1\np 1\n";
     let obj = read(obj.as_bytes()).unwrap();
