@@ -22,7 +22,7 @@ use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{CpuClock, Entry, OutputPlan, Section, Selection, state_of};
 use serde_json::{Value, json};
-use support::{build, pool, scene};
+use support::{build, build_with, pool, scene};
 
 const PLAN: OutputPlan = OutputPlan { every_time: Some(0.21), series_every_steps: 3 };
 
@@ -70,9 +70,9 @@ fn bodies() -> Vec<Value> {
     bodies
 }
 
-fn states(body: &Value, threads: usize) -> Vec<Section> {
+fn states(body: &Value, clouds: &Clouds, threads: usize) -> Vec<Section> {
     pool(threads).install(|| {
-        let mut simulation = build(body, PLAN);
+        let mut simulation = build_with(body, PLAN, clouds).unwrap();
         let mut states = vec![state_of(simulation.as_ref())];
         while !simulation.is_finished() {
             simulation.step().unwrap();
@@ -132,29 +132,31 @@ fn every_example_runs_to_its_end_with_finite_results() {
 #[test]
 fn k_steps_and_a_restore_and_the_rest_equal_the_unbroken_run_for_1_2_and_3_threads() {
     for body in bodies() {
-        let unbroken = states(&body, 1);
-        for threads in [2, 3] {
-            for (a, b) in states(&body, threads).iter().zip(&unbroken) {
-                assert_same(a, b, &format!("{threads} threads, {body}"));
+        check_restarts(&body, &Clouds::new());
+    }
+}
+
+/// k steps, a restore and the rest are the unbroken run, on any number of threads.
+fn check_restarts(body: &Value, clouds: &Clouds) {
+    let unbroken = states(body, clouds, 1);
+    for threads in [2, 3] {
+        for (a, b) in states(body, clouds, threads).iter().zip(&unbroken) {
+            assert_same(a, b, &format!("{threads} threads, {body}"));
+        }
+    }
+    let last = unbroken.len() - 1;
+    for k in [0, 1, last / 2, last - 1, last] {
+        let threads = 1 + k % 3;
+        pool(threads).install(|| {
+            let mut simulation = build_with(body, PLAN, clouds).unwrap();
+            simulation.load(&unbroken[k]).unwrap();
+            assert_same(&state_of(simulation.as_ref()), &unbroken[k], "restored");
+            while !simulation.is_finished() {
+                simulation.step().unwrap();
             }
-        }
-        let last = unbroken.len() - 1;
-        for k in [0, 1, last / 2, last - 1, last] {
-            let threads = 1 + k % 3;
-            pool(threads).install(|| {
-                let mut simulation = build(&body, PLAN);
-                simulation.load(&unbroken[k]).unwrap();
-                assert_same(&state_of(simulation.as_ref()), &unbroken[k], "restored");
-                while !simulation.is_finished() {
-                    simulation.step().unwrap();
-                }
-                assert_same(
-                    &state_of(simulation.as_ref()),
-                    &unbroken[last],
-                    &format!("restart at {k} on {threads} threads, {body}"),
-                );
-            });
-        }
+            let what = format!("restart at {k} on {threads} threads, {body}");
+            assert_same(&state_of(simulation.as_ref()), &unbroken[last], &what);
+        });
     }
 }
 
@@ -169,7 +171,11 @@ fn looking_changes_nothing() {
                 assert_eq!(fields.points, again.points);
                 let _ = (watched.observables(), watched.report(), watched.health());
             }
-            assert_same(&state_of(watched.as_ref()), states(&body, 1).last().unwrap(), &body.to_string());
+            assert_same(
+                &state_of(watched.as_ref()),
+                states(&body, &Clouds::new(), 1).last().unwrap(),
+                &body.to_string(),
+            );
         });
     }
 }

@@ -35,14 +35,18 @@ fn measure(store: &Store, threads: usize) -> io::Result<usize> {
         .arg(&scratch)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
-        .stderr(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()?;
     // The process ends when its input closes, and `wait_with_output` would close it.
     let input = child.stdin.take();
     let output = child.wait_with_output()?;
     drop(input);
+    let said = String::from_utf8_lossy(&output.stderr);
     if !output.status.success() {
-        return Err(io::Error::other("the measuring process failed"));
+        return Err(io::Error::other(format!("the measuring process failed: {}", said.trim())));
+    }
+    for line in said.lines() {
+        tracing::warn!(line, "the measuring process could not do all of its runs");
     }
     let found: Measurements = serde_json::from_slice(&output.stdout)?;
     store.calibrate(&found.phases).map_err(io::Error::other)?;

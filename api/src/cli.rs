@@ -254,7 +254,10 @@ fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
         return fail(&format!("{} is not empty", scratch.display()));
     }
     let measured = worker::calibration::measure_here(scratch, threads).and_then(|phases| {
-        let precision = worker::calibration::precision_here(scratch, threads)?;
+        let failed = |error: &str| {
+            fail(&error);
+        };
+        let precision = worker::calibration::precision_here(scratch, threads, &failed)?;
         Ok(Measurements { phases, precision })
     });
     let found = match measured {

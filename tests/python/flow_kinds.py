@@ -59,7 +59,7 @@ def write_vtkhdf(path, counts=COUNTS, times=None, libver="earliest", offsets=Non
         if times is None:
             points.create_dataset("velocity", data=velocity(counts), **more)
             return
-        stored = [times[k] for k in sorted(set(offsets))] if offsets else times
+        stored = [times[k] for k in sorted(set(offsets))] if offsets else times or [0.0]
         points.create_dataset("velocity", data=numpy.stack([velocity(counts, time) for time in stored]), **more)
         steps = group.create_group("Steps")
         steps.attrs["NSteps"] = len(times)
@@ -86,6 +86,8 @@ def main(folder):
     write_vtkhdf(folder / "times.vtkhdf", times=[0.0, 0.5, 2.0])
     write_vtkhdf(folder / "times_newest.vtkhdf", libver="latest", times=[0.0, 0.5, 2.0], chunks=(1, 5, 7, 9, 3))
     write_vtkhdf(folder / "offsets.vtkhdf", times=[0.0, 0.5, 2.0], offsets=[0, 1, 1])
+    write_vtkhdf(folder / "refused_without_times.vtkhdf", times=[])
+    write_vtkhdf(folder / "refused_with_a_time_of_nan.vtkhdf", times=[0.0, float("nan")])
 
 
 main(Path(sys.argv[1]))

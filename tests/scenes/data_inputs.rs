@@ -1,13 +1,13 @@
 //! Scenes with values of a file: fields, diffusivities, sources and held values at points, and flows on grids; held against exact
 //! answers and against formulas that say the same.
 
+use super::check_restarts;
 use super::support::{PLAN, build_with, column, error, pool, slope};
-use super::{assert_same, state_of};
 use meniscus::geometry::fibonacci;
 use meniscus::geometry::flows::GridNodes;
 use meniscus::scene::{Cloud, Clouds, Column, parse};
 use meniscus::scenes::SCENES;
-use meniscus::simulation::Simulation;
+use meniscus::simulation::{Simulation, StepError};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -324,7 +324,7 @@ fn what_a_flow_of_data_lacks_is_told() {
 /// Scenes of each kind that takes data go on from any step bit for bit, and do not depend on threads.
 #[test]
 fn runs_with_data_go_on_bit_for_bit() {
-    let flow = json!({"type": "grid", "upload": "upl_f", "period": 2});
+    let flow = json!({"type": "grid", "upload": "upl_f"});
     let circle = json!({"type": "circle", "center": [0.5, 0.75], "radius": 0.15});
     let surface = sphere(300, &[("u", |x| 1.0 + x[0]), ("d", |x| 1.0 + 0.5 * x[2])]);
     let data = |name: &str| json!({"type": "data", "name": name});
@@ -351,32 +351,41 @@ fn runs_with_data_go_on_bit_for_bit() {
         ),
     ];
     for (body, clouds) in cases {
-        // A period that the data do not have is left out where it would be refused.
-        let mut body = body;
-        if body["kind"] == "front" {
-            body["law"]["flow"]["period"] = Value::Null;
-        }
-        let states = |threads: usize| {
-            pool(threads).install(|| {
-                let mut simulation = build_with(&body, PLAN, &clouds).unwrap();
-                let mut states = vec![state_of(simulation.as_ref())];
-                while !simulation.is_finished() {
-                    simulation.step().unwrap();
-                    states.push(state_of(simulation.as_ref()));
-                }
-                states
-            })
-        };
-        let unbroken = states(1);
-        let last = unbroken.last().unwrap();
-        assert_same(states(3).last().unwrap(), last, "3 threads");
-        pool(2).install(|| {
+        check_restarts(&body, &clouds);
+    }
+}
+
+/// A wind of 1 along x about the unit square; in space about the unit sphere.
+fn wind(dimension: usize) -> Cloud {
+    let (low, last) = if dimension == 2 { (-0.25, 3) } else { (-1.5, 6) };
+    let mut counts = [last + 1; 3];
+    counts[dimension..].fill(1);
+    let nodes = GridNodes { counts, origin: [low; 3], spacing: [0.5; 3], times: vec![0.0] };
+    let count = nodes.len();
+    let component = |d: usize| column_of("velocity", vec![if d == 0 { 1.0 } else { 0.0 }; count]);
+    Cloud { columns: (0..dimension).map(component).collect(), grid: Some(nodes), ..Cloud::default() }
+}
+
+#[test]
+fn particles_that_leave_the_grid_end_the_run_and_are_named() {
+    let flow = json!({"type": "grid", "upload": "upl_f"});
+    let mut vortex = vortex(&flow);
+    (vortex["end_time"], vortex["steps"]) = (json!(2), json!(40));
+    let front = json!({"kind": "front", "spacing": 0.04, "end_time": 2, "time_step": 0.04,
+        "shape": {"type": "circle", "center": [0.5, 0.75], "radius": 0.15}, "law": {"type": "flow", "flow": flow}});
+    let surface = on_points(&json!({"type": "moving_diffusion", "motion": flow, "end_time": 2, "time_step": 0.04,
+        "initial": {"type": "formula", "value": "x"}}));
+    let cases = [
+        (vortex, Clouds::from([("/flow", wind(2))])),
+        (front, Clouds::from([("/law/flow", wind(2))])),
+        (surface, Clouds::from([("/surface", sphere(300, &[])), ("/problem/motion", wind(3))])),
+    ];
+    for (body, clouds) in cases {
+        let error = pool(2).install(|| {
             let mut simulation = build_with(&body, PLAN, &clouds).unwrap();
-            simulation.load(&unbroken[unbroken.len() / 2]).unwrap();
-            while !simulation.is_finished() {
-                simulation.step().unwrap();
-            }
-            assert_same(&state_of(simulation.as_ref()), last, "restored");
+            (0..50).find_map(|_| simulation.step().err())
         });
+        let Some(StepError::Undefined { reason, step, .. }) = &error else { panic!("{body}: {error:?}") };
+        assert!(reason.contains("leaves the grid of velocities") && *step > 3, "{body}: {error:?}");
     }
 }

@@ -1,16 +1,8 @@
 //! The OpenAPI document as programs use it: it validates, and clients that are generated from it work.
 
-use crate::service;
+use crate::{python, service};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-/// The Python of the tests with the tools beside it; None where tests run without `make test`.
-fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("MENISCUS_PYTHON").map(PathBuf::from);
-    let is_required = std::env::var_os("CI").is_some() || std::env::var_os("MENISCUS_BIN").is_some();
-    assert!(python.is_some() || !is_required, "MENISCUS_PYTHON is not set");
-    python
-}
 
 fn run(command: &mut Command) {
     let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));

@@ -1,19 +1,13 @@
 //! The OpenAPI document against the running service, by schemathesis: whatever fits the document, and much that does not,
 //! gets an answer that the document has, and never a 5xx.
 
-use crate::service;
+use crate::{python, service};
 use serde_json::json;
 use std::process::Command;
 
 #[test]
 fn schemathesis_finds_no_failure() {
-    let Ok(python) = std::env::var("MENISCUS_PYTHON") else {
-        assert!(
-            std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none(),
-            "MENISCUS_PYTHON is not set"
-        );
-        return;
-    };
+    let Some(python) = python() else { return };
     let (_directory, service) = service(&["--slots", "1"]);
     // Something to be found under every path, so that more than "not found" is tried.
     let job = service.submit(&json!({"scene": {"kind": "redistance", "spacing": 0.1}}));

@@ -1,13 +1,12 @@
 //! Values at points and flows on grids as uploads: read in every form that NumPy, VTK and h5py write, used by jobs and their restarts,
 //! refused with what is wrong.
 
-use crate::service;
 use crate::support::program;
 use crate::upload_kinds::inspected;
 use crate::uploads::upload;
+use crate::{files_of, service};
 use meniscus::geometry::fibonacci;
 use serde_json::{Value, json};
-use std::path::Path;
 use std::process::Command;
 
 /// A sphere of 400 points as XYZ.
@@ -82,25 +81,10 @@ fn values_come_in_the_forms_that_people_have() {
     assert!(said["rejected"].as_str().unwrap().contains("no values"), "{said}");
 }
 
-/// The files that `tests/python/flow_kinds.py` writes.
-fn flow_kinds(directory: &Path) -> bool {
-    let Ok(python) = std::env::var("MENISCUS_PYTHON") else {
-        assert!(
-            std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none(),
-            "MENISCUS_PYTHON is not set"
-        );
-        return false;
-    };
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/flow_kinds.py");
-    let made = Command::new(python).arg(script).arg(directory).output().unwrap();
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    true
-}
-
 #[test]
 fn flows_of_vtk_and_h5py_are_read_in_every_form() {
     let directory = tempfile::tempdir().unwrap();
-    if !flow_kinds(directory.path()) {
+    if files_of("flow_kinds.py", directory.path()).is_none() {
         return;
     }
     let mut files: Vec<_> = std::fs::read_dir(directory.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -108,8 +92,14 @@ fn flows_of_vtk_and_h5py_are_read_in_every_form() {
     assert!(files.len() > 20, "{files:?}");
     for path in files {
         let (said, cloud) = inspected(&path, "flow");
-        let cloud = cloud.unwrap_or_else(|| panic!("{path:?}: {said}"));
         let name = path.file_stem().unwrap().to_str().unwrap();
+        if name.starts_with("refused") {
+            let reason = said["rejected"].as_str().unwrap_or_default();
+            let part = if name.ends_with("nan") { "the time of step 1 (counted from 0) is NaN" } else { "no times" };
+            assert!(reason.contains(part), "{path:?}: {said}");
+            continue;
+        }
+        let cloud = cloud.unwrap_or_else(|| panic!("{path:?}: {said}"));
         let nodes = cloud.grid.unwrap();
         let times: &[f64] = if name.contains("times") || name == "offsets" { &[0.0, 0.5, 2.0] } else { &[0.0] };
         let counts = match name {
@@ -133,6 +123,23 @@ fn flows_of_vtk_and_h5py_are_read_in_every_form() {
         }
         assert_eq!(cloud.columns.len(), if name == "plane" { 2 } else { 3 }, "{path:?}");
     }
+}
+
+#[test]
+fn a_number_too_few_in_a_flow_is_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("torn.vti");
+    let file = |numbers: &str| {
+        format!(
+            "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 1 0 1 0 0\"><Piece><PointData><DataArray type=\"Float64\" \
+             Name=\"velocity\" NumberOfComponents=\"2\" format=\"ascii\">{numbers}</DataArray></PointData></Piece></ImageData></VTKFile>"
+        )
+    };
+    std::fs::write(&path, file("1 2 3 4 5 6 7")).unwrap();
+    let (said, _) = inspected(&path, "flow");
+    assert!(said["rejected"].as_str().unwrap_or_default().contains("9 numbers of velocities for 12"), "{said}");
+    std::fs::write(&path, file("1 2 3 4 5 6 7 8")).unwrap();
+    assert!(inspected(&path, "flow").1.is_some());
 }
 
 /// Rigid rotation about (0.5, 0.75) as a VTI file of the plane.

@@ -1,18 +1,8 @@
 //! Frames in the hands of others: h5py and VTK's own reader.
 
-use crate::service;
+use crate::{python, service};
 use serde_json::{Value, json};
 use std::process::Command;
-
-/// The Python of `make test`, which says where it is.
-fn python() -> Option<String> {
-    let found = std::env::var("MENISCUS_PYTHON").ok();
-    assert!(
-        found.is_some() || (std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none()),
-        "MENISCUS_PYTHON is not set"
-    );
-    found
-}
 
 /// Archives and texts of an operator have the same matrix for SciPy: symmetric in areas, and constants have no Laplacian.
 #[test]

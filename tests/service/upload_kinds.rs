@@ -1,9 +1,9 @@
 //! Files as other programs write them: each is read, or refused with a reason that says what helps. The service and
 //! `meniscus run` find and say the same.
 
-use crate::service;
 use crate::support::{Service, program};
 use crate::uploads::upload;
+use crate::{files_of, manifest, service};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Command, Output};
@@ -158,17 +158,8 @@ fn meshes_are_taken_as_they_come_or_refused_with_what_helps() {
 
 /// The files that `tests/python/hdf5_kinds.py` writes, and what it says of them.
 fn hdf5_kinds(directory: &Path) -> Option<Vec<Value>> {
-    let Ok(python) = std::env::var("MENISCUS_PYTHON") else {
-        assert!(
-            std::env::var_os("CI").is_none() && std::env::var_os("MENISCUS_BIN").is_none(),
-            "MENISCUS_PYTHON is not set"
-        );
-        return None;
-    };
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/hdf5_kinds.py");
-    let made = Command::new(python).arg(script).arg(directory).output().unwrap();
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    Some(serde_json::from_slice(&std::fs::read(directory.join("manifest.json")).unwrap()).unwrap())
+    files_of("hdf5_kinds.py", directory)?;
+    manifest(directory).as_array().cloned()
 }
 
 /// What the inspection of a file hands over: its line, and positions, level and normals of the points.

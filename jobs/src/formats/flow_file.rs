@@ -1,37 +1,22 @@
 //! Velocities on a regular grid from outside: image data of VTKHDF files, of one time or several, and VTI files.
 
 use super::image::Image;
-use super::{structure, vti, vtkhdf_image};
+use super::{file_bytes, vti, vtkhdf_image};
 use crate::spec::uploads::FlowContents;
 use meniscus::geometry::flows::GridNodes;
 use meniscus::scene::{Cloud, Column};
 use std::fs::File;
-use std::io::{Read, Seek};
 
-/// Bytes of a VTI file at most.
-const LARGEST: u64 = 1 << 30;
 /// Names of the components.
 const COMPONENTS: [&str; 3] = ["velocity_x", "velocity_y", "velocity_z"];
+
 /// Reads a flow, and says what was found.
 ///
 /// # Errors
 /// A sentence: what is wrong, where, and what helps.
 pub fn read(file: &mut File) -> Result<(FlowContents, Cloud), String> {
-    let failed = |error: std::io::Error| error.to_string();
-    let mut head = Vec::new();
-    (&mut *file).take(structure::SIGNATURE.len() as u64).read_to_end(&mut head).map_err(failed)?;
-    file.rewind().map_err(failed)?;
-    let image = if head == structure::SIGNATURE {
-        vtkhdf_image::read(file)?
-    } else {
-        let size = file.metadata().map_err(failed)?.len();
-        if size > LARGEST {
-            return Err(format!("a file of {size} bytes; at most {LARGEST} are read"));
-        }
-        let mut bytes = Vec::new();
-        file.take(LARGEST).read_to_end(&mut bytes).map_err(failed)?;
-        vti::read(&bytes)?
-    };
+    let image =
+        if file_bytes::is_hdf5(file)? { vtkhdf_image::read(file)? } else { vti::read(&file_bytes::all(file)?)? };
     let dimension = check(&image)?;
     let nodes = &image.nodes;
     let fastest = image.velocity.as_chunks::<3>().0.iter().map(|[x, y, z]| x.hypot(*y).hypot(*z)).fold(0.0, f64::max);
@@ -67,8 +52,14 @@ fn check(image: &Image) -> Result<usize, String> {
             origin[d], spacing[d]
         ));
     }
+    if let Some(k) = times.iter().position(|time| !time.is_finite()) {
+        return Err(format!("the time of step {k} (counted from 0) is {}", times[k]));
+    }
     if let Some(k) = (1..times.len()).find(|k| times[*k - 1] >= times[*k]) {
         return Err(format!("the times do not ascend: {} is followed by {}", times[k - 1], times[k]));
+    }
+    if times.is_empty() {
+        return Err("there are no times of velocities: Steps/Values is empty".to_owned());
     }
     let expected = image.nodes.len() * times.len() * 3;
     if image.velocity.len() != expected {

@@ -29,7 +29,7 @@ pub(super) fn triples(values: Vec<f64>, components: usize) -> Vec<f64> {
     if components == 3 {
         return values;
     }
-    values.chunks(components).flat_map(|u| [u[0], u[1], 0.0]).collect()
+    values.as_chunks::<2>().0.iter().flat_map(|[x, y]| [*x, *y, 0.0]).collect()
 }
 
 /// Nodes along the axes of an extent of indices from first to last.

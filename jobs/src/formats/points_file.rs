@@ -1,39 +1,24 @@
-//! Points of any file from outside: VTKHDF, or a mesh by what its bytes look like. The service's inspection and `meniscus run`
-//! read files by this alone, so that both accept and refuse the same, in the same words.
+//! Points from outside: of a VTKHDF file, or of a mesh by what its bytes look like.
 
 use super::mesh::{self, Mesh};
-use super::{cloud_file, structure, vtkhdf_points};
+use super::{cloud_file, file_bytes, vtkhdf_points};
 use crate::spec::uploads::{FaceContents, PointContents, Purpose};
 use meniscus::scene::{Cloud, mesh_size};
 use std::fs::File;
-use std::io::{Read, Seek};
-
-/// Bytes of a mesh file at most.
-const LARGEST_MESH: u64 = 1 << 30;
 
 /// Reads the points of a file for a purpose, and says what was found.
 ///
 /// # Errors
 /// A sentence: what is wrong, where, and what helps.
 pub fn read(file: &mut File, purpose: Purpose) -> Result<(PointContents, Cloud), String> {
-    let failed = |error: std::io::Error| error.to_string();
-    let mut head = Vec::new();
-    file.take(structure::SIGNATURE.len() as u64).read_to_end(&mut head).map_err(failed)?;
-    let is_hdf5 = head == structure::SIGNATURE;
+    let is_hdf5 = file_bytes::is_hdf5(file)?;
     if is_hdf5 || purpose == Purpose::Points {
         let found = vtkhdf_points::read(file, purpose)?;
         let level = found.level;
         check_level(level.as_deref())?;
         return finish(found.mesh, level, purpose, is_hdf5);
     }
-    let size = file.metadata().map_err(failed)?.len();
-    if size > LARGEST_MESH {
-        return Err(format!("a mesh of {size} bytes; at most {LARGEST_MESH} are read"));
-    }
-    file.rewind().map_err(failed)?;
-    let mut bytes = Vec::new();
-    file.take(LARGEST_MESH).read_to_end(&mut bytes).map_err(failed)?;
-    finish(mesh::read(&bytes)?, None, purpose, false)
+    finish(mesh::read(&file_bytes::all(file)?)?, None, purpose, false)
 }
 
 /// Checks numbers, leaves out what is no part of a surface, and describes what is there.

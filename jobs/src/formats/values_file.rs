@@ -3,14 +3,11 @@
 
 use super::cloud_file::MOST_VALUES;
 use super::mesh::{self, text};
-use super::{structure, vtkhdf_points};
+use super::{file_bytes, vtkhdf_points};
 use crate::spec::uploads::{ColumnContents, ValueContents};
 use meniscus::scene::{Cloud, Column};
 use std::fs::File;
-use std::io::{Read, Seek};
 
-/// Bytes of a file at most.
-const LARGEST: u64 = 1 << 30;
 /// Columns of a text at most.
 const MOST_COLUMNS: usize = 64;
 /// Name of values without one.
@@ -23,21 +20,8 @@ const NUMPY: &[u8] = b"\x93NUMPY";
 /// # Errors
 /// A sentence: what is wrong, where, and what helps.
 pub fn read(file: &mut File) -> Result<(ValueContents, Cloud), String> {
-    let failed = |error: std::io::Error| error.to_string();
-    let mut head = Vec::new();
-    (&mut *file).take(structure::SIGNATURE.len() as u64).read_to_end(&mut head).map_err(failed)?;
-    file.rewind().map_err(failed)?;
-    let columns = if head == structure::SIGNATURE {
-        vtkhdf_points::columns(file)?
-    } else {
-        let size = file.metadata().map_err(failed)?.len();
-        if size > LARGEST {
-            return Err(format!("a file of {size} bytes; at most {LARGEST} are read"));
-        }
-        let mut bytes = Vec::new();
-        file.take(LARGEST).read_to_end(&mut bytes).map_err(failed)?;
-        columns_of(&bytes)?
-    };
+    let columns =
+        if file_bytes::is_hdf5(file)? { vtkhdf_points::columns(file)? } else { columns_of(&file_bytes::all(file)?)? };
     if columns.iter().all(|column| column.values.is_empty()) {
         return Err("there are no values in the file".to_owned());
     }

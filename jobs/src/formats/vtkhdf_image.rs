@@ -70,7 +70,7 @@ fn in_order(values: &[f64], (times, stored): (usize, usize), offsets: Option<&[f
             Some(offsets) => offsets.get(time).copied().unwrap_or(-1.0),
             None => time as f64,
         };
-        if offset < 0.0 || offset >= stored as f64 {
+        if !(0.0..stored as f64).contains(&offset) {
             return Err(format!(
                 "there are {stored} times of velocities, and time step {time} is that of place {offset}"
             ));

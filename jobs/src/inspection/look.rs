@@ -1,7 +1,7 @@
 //! Looking into a file from outside. Runs in a process of its own, under limits.
 
 use super::sandbox;
-use crate::formats::{checkpoint, cloud_file, flow_file, points_file, structure, values_file};
+use crate::formats::{checkpoint, cloud_file, outside_file, structure};
 use crate::spec::body::resolved_scene;
 use crate::spec::run_options::RunOptions;
 use crate::spec::uploads::{ArrayContents, CheckpointContents, Contents, Inspection, Purpose};
@@ -36,16 +36,7 @@ fn inspect(purpose: Purpose, path: &Path) -> Result<(Contents, Option<Cloud>), S
         return of_checkpoint(&file, path).map(|contents| (contents, None));
     }
     sandbox::shut_the_door(&file).map_err(|error| error.to_string())?;
-    if purpose == Purpose::Values {
-        let (contents, cloud) = values_file::read(&mut file)?;
-        return Ok((Contents::Values(contents), Some(cloud)));
-    }
-    if purpose == Purpose::Flow {
-        let (contents, cloud) = flow_file::read(&mut file)?;
-        return Ok((Contents::Flow(contents), Some(cloud)));
-    }
-    let (contents, cloud) = points_file::read(&mut file, purpose)?;
-    Ok((Contents::Points(contents), Some(cloud)))
+    outside_file::read(&mut file, purpose).map(|(contents, cloud)| (contents, Some(cloud)))
 }
 
 fn of_checkpoint(file: &File, path: &Path) -> Result<Contents, String> {

@@ -1,7 +1,7 @@
 //! The sweep that finds the spacing for an accuracy: where it begins, and what it compares.
 
 use crate::convergence::Level;
-use crate::spec::accuracy::{LEAST_LEVELS, Wanted};
+use crate::spec::accuracy::{LEAST_LEVELS, LEAST_LEVELS_ONCE_TOLD, Wanted};
 use crate::spec::body::{Allowance, BodyError, JobBody, Sources};
 use crate::spec::study::{SweepPoint, point_body};
 use crate::spec::work_precision::{error_scale, reference_of, spacing_for};
@@ -37,10 +37,10 @@ pub fn sweep<S: Sources>(
     let search = Search { body, wanted, base: base_of(&body.spec), allowance, sources };
     if let Some((from, choice)) = search.told(known)? {
         let choice: Vec<OpenChoice> = choice.into_iter().map(|(pointer, value)| (pointer, vec![value])).collect();
-        return Ok(wanted.sweep(from, &choice, LEAST_LEVELS[1]));
+        return Ok(wanted.sweep(from, &choice, LEAST_LEVELS_ONCE_TOLD));
     }
     let from = search.first_value()?;
-    Ok(wanted.sweep(from, &search.open_choices(from)?, LEAST_LEVELS[0]))
+    Ok(wanted.sweep(from, &search.open_choices(from)?, LEAST_LEVELS))
 }
 
 /// Looks up what short runs said of an error, by the name of the runs, the quantity and the norm.
@@ -207,7 +207,7 @@ mod tests {
         };
         let wanted = body.wanted.as_ref().unwrap();
         sweep(&body, wanted, allowance, &NoSources, &known)
-            .unwrap_or_else(|_| panic!("{base:?}", base = base_of(&body.spec)))
+            .unwrap_or_else(|_| panic!("no sweep for {:?}", base_of(&body.spec)))
     }
 
     #[test]

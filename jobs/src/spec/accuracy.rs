@@ -76,8 +76,10 @@ impl Wanted {
 
 /// Ratio of two levels of the study.
 const RATIO: f64 = 1.4;
-/// Levels of the study at least, where nothing is known, and where short runs told where to begin.
-pub const LEAST_LEVELS: [u64; 2] = [3, 2];
+/// Levels of the study at least, where nothing is known.
+pub const LEAST_LEVELS: u64 = 3;
+/// Levels of the study at least, where short runs told where to begin.
+pub const LEAST_LEVELS_ONCE_TOLD: u64 = 2;
 /// Levels of the study at most.
 const MOST_LEVELS: u64 = 10;
 

@@ -225,9 +225,16 @@ mod tests {
             "points": 4, "fields": [], "low": [0.0, 0.0, 0.0], "high": [1.0, 1.0, 1.0], "faces": 4, "is_closed": true,
             "area": 2.5, "volume": 0.125,
         });
-        for json in [points, mesh, closed, checkpoint] {
+        let values = json!({"values": 3, "columns": [{"name": "u", "least": -1.0, "greatest": 2.5}]});
+        let flow = json!({
+            "nodes": [9, 7, 1], "low": [0.0, 0.0, 0.0], "high": [1.0, 1.0, 0.0], "times": 2, "first_time": 0.0,
+            "last_time": 1.0, "fastest": 3.5,
+        });
+        for (json, has_points) in
+            [(points, true), (mesh, true), (closed, true), (checkpoint, false), (values, false), (flow, false)]
+        {
             let contents: Contents = serde_json::from_value(json.clone()).unwrap();
-            assert_eq!(matches!(contents, Contents::Checkpoint(_)), contents.points().is_none());
+            assert_eq!(contents.points().is_some(), has_points);
             assert_eq!(serde_json::to_value(&contents).unwrap(), json);
             assert_eq!(serde_json::to_value(Inspection::Ready(contents)).unwrap(), json!({"ready": json}));
         }

@@ -34,8 +34,9 @@ impl Workspace {
     /// Levels that the short runs of `meniscus calibrate` tell, the coarsest first; none where these cannot be made.
     pub(super) fn precision(&self, name: &str, quantity: &str, norm: &str) -> Vec<Level> {
         let measured = self.precision.get_or_init(|| {
-            calibration::precision_here(&self.directory.join("precision"), 1).unwrap_or_else(|error| {
-                tracing::warn!(error, "short runs for the precision failed");
+            let failed = |error: &str| tracing::warn!(error, "a short run for the precision failed");
+            calibration::precision_here(&self.directory.join("precision"), 1, &failed).unwrap_or_else(|error| {
+                failed(&error);
                 Vec::new()
             })
         });

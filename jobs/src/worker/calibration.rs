@@ -35,11 +35,12 @@ pub fn measure_here(directory: &Path, threads: u64) -> Result<Vec<PhaseMeasured>
     Ok(medians(&rounds))
 }
 
-/// What short runs with several spacings say of errors, for every kind that names some.
+/// What short runs with several spacings say of errors, for every kind that names some. Of a run that fails `failed` is told, and
+/// the others are made all the same.
 ///
 /// # Errors
-/// A sentence that names the run.
-pub fn precision_here(directory: &Path, threads: u64) -> Result<Vec<PrecisionMeasured>, String> {
+/// A sentence that names the kind whose scenes are not understood.
+pub fn precision_here(directory: &Path, threads: u64, failed: &dyn Fn(&str)) -> Result<Vec<PrecisionMeasured>, String> {
     let mut rows = Vec::new();
     for kind in meniscus::scenes::SCENES {
         let named: Vec<Reference> = serde_json::from_str(kind.precision)
@@ -47,7 +48,10 @@ pub fn precision_here(directory: &Path, threads: u64) -> Result<Vec<PrecisionMea
         for Reference { mut scene, axis, values } in named {
             for value in values {
                 scene[&axis] = value;
-                rows.extend(measure_precision(&scene, directory, threads)?);
+                match measure_precision(&scene, directory, threads) {
+                    Ok(found) => rows.extend(found),
+                    Err(error) => failed(&error),
+                }
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Points that a scene takes from files, as its worker reads them: uploads in the plain format that their inspection
 //! wrote, local files of `meniscus run` as they are.
 
-use crate::formats::{cloud_file, flow_file, points_file, values_file};
+use crate::formats::{cloud_file, outside_file};
 use crate::spec::attempt_spec::AttemptSpec;
 use crate::spec::uploads::Purpose;
 use meniscus::scene::{Cloud, CloudReference, CloudRole, CloudSource, Clouds, Scene};
@@ -39,9 +39,5 @@ fn read_local(path: &Path, role: CloudRole) -> Result<Cloud, String> {
         CloudRole::Flow => Purpose::Flow,
     };
     let mut file = File::open(path).map_err(|error| error.to_string())?;
-    match purpose {
-        Purpose::Values => values_file::read(&mut file).map(|(_, values)| values),
-        Purpose::Flow => flow_file::read(&mut file).map(|(_, flow)| flow),
-        _ => points_file::read(&mut file, purpose).map(|(_, cloud)| cloud),
-    }
+    outside_file::read(&mut file, purpose).map(|(_, cloud)| cloud)
 }

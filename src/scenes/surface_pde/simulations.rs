@@ -36,7 +36,7 @@ pub(super) struct Outside {
 /// What is wrong with the values at the start.
 pub(super) fn build<const D: usize, const M: usize>(
     problem: &ProblemChoice,
-    (shape, cloud, method): (&Shape, SurfaceCloud<D>, Method),
+    (shape, mut cloud, method): (&Shape, SurfaceCloud<D>, Method),
     Run { seed, fixed, interrupt, cpu_clock, clouds }: Run,
     outside: Option<Outside>,
 ) -> Result<Box<dyn Simulation>, Vec<Violation>> {
@@ -56,6 +56,8 @@ pub(super) fn build<const D: usize, const M: usize>(
         }));
     }
     let problem = problem.build(shape, &cloud, seed, fixed.time_step)?;
+    // The problem has taken what it needs of them.
+    cloud.data.clear();
     let equation = SurfaceEquation::<D, M>::new(cloud, method, problem, fixed, interrupt, cpu_clock);
     Ok(Box::new(match outside {
         Some(Outside { origin, findings, marks, counted }) => {

@@ -1,8 +1,10 @@
 //! How the points of a moving surface move.
 
 use crate::geometry::{Flow, Vector};
+use crate::parallel::Interrupt;
 use crate::time::PathIntegrator;
-use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
+use crate::time::integrators::{PATHS, PathError, longer};
+use rayon::prelude::{ParallelIterator, ParallelSliceMut};
 
 /// The motion of a surface.
 pub enum Motion<const D: usize> {
@@ -22,25 +24,33 @@ pub enum Motion<const D: usize> {
     Flow(Box<dyn Flow<D>>),
 }
 
-/// Points of a parallel task.
-const POINTS: usize = 256;
-
 impl<const D: usize> Motion<D> {
     /// Where points are after a step, where that does not depend on the surface; else where they are.
-    #[must_use]
-    pub fn moved(&self, points: &[Vector<D>], time: f64, step: f64) -> Vec<Vector<D>> {
+    ///
+    /// # Errors
+    /// A raised interrupt, and a path that meets a place without a velocity.
+    pub fn moved(
+        &self,
+        points: &[Vector<D>],
+        time: f64,
+        step: f64,
+        interrupt: &Interrupt,
+    ) -> Result<Vec<Vector<D>>, PathError> {
+        let mut moved = points.to_vec();
         match self {
-            Self::Normal { .. } => points.to_vec(),
+            Self::Normal { .. } => {}
             Self::Expansion { rate, center } => {
                 let factor = (rate * step).exp();
-                points.iter().map(|x| center + (x - center) * factor).collect()
+                moved.iter_mut().for_each(|x| *x = center + (*x - center) * factor);
             }
-            Self::Flow(flow) => points
-                .par_iter()
-                .with_min_len(POINTS)
-                .map(|x| PathIntegrator::Rk4.advance(flow.as_ref(), x, time, step))
-                .collect(),
+            Self::Flow(flow) => {
+                moved
+                    .par_chunks_mut(PATHS)
+                    .map(|block| PathIntegrator::Rk4.carry(flow.as_ref(), block, time, step, interrupt))
+                    .reduce(|| Ok(0.0), longer)?;
+            }
         }
+        Ok(moved)
     }
 
     /// What it is, for reports.

@@ -181,8 +181,8 @@ impl<const D: usize> MovingSurface<D> {
     }
 
     /// Moves the points, and looks at the stars where they are then.
-    fn advance(&mut self, from: Clock, to: Clock) {
-        let Self { parts, points, normals, .. } = self;
+    fn advance(&mut self, from: Clock, to: Clock) -> Result<(), StepError> {
+        let Self { parts, points, normals, interrupt, .. } = self;
         let step = to.time - from.time;
         let moved = match &parts.motion {
             Motion::Normal { speed } => {
@@ -193,11 +193,15 @@ impl<const D: usize> MovingSurface<D> {
                 let along = normals.iter().zip(&later).map(|(n, m)| (n + m) * (0.5 * speed * step));
                 points.iter().zip(along).map(|(x, d)| x + d).collect()
             }
-            motion => motion.moved(points, from.time, step),
+            motion => {
+                let moved = motion.moved(points, from.time, step, interrupt);
+                moved.map_err(|error| StepError::from_path(error, to))?
+            }
         };
         let (later, _, graph) = look(&moved, std::mem::take(normals), 1);
         (self.points, self.normals, self.graph) = (moved, later, graph);
         self.areas = self.cells.areas(&self.points);
+        Ok(())
     }
 
     /// A step of the formula (3 m⁺ − 4 m + m⁻)/2Δt = d L⁺ u⁺ with m = A u.
@@ -210,7 +214,7 @@ impl<const D: usize> MovingSurface<D> {
             masses.iter().zip(&self.previous).map(|(now, before)| (4.0 * now - before) / 3.0).collect()
         };
         self.previous = masses;
-        self.advance(from, to);
+        self.advance(from, to)?;
         let share = if is_first { 1.0 } else { 2.0 / 3.0 } * (to.time - from.time) * self.parts.diffusivity;
         self.solve(share, &right, to)
     }
