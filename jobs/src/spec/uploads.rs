@@ -182,7 +182,7 @@ pub struct FaceContents {
 }
 
 impl Contents {
-    /// Number of points; None for a checkpoint.
+    /// Number of points, values or nodes; None for a checkpoint.
     #[must_use]
     pub fn points(&self) -> Option<u64> {
         self.size().map(|size| size.points)
@@ -231,7 +231,7 @@ mod tests {
             "last_time": 1.0, "fastest": 3.5,
         });
         for (json, has_points) in
-            [(points, true), (mesh, true), (closed, true), (checkpoint, false), (values, false), (flow, false)]
+            [(points, true), (mesh, true), (closed, true), (checkpoint, false), (values, true), (flow, true)]
         {
             let contents: Contents = serde_json::from_value(json.clone()).unwrap();
             assert_eq!(contents.points().is_some(), has_points);
