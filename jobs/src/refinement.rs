@@ -5,6 +5,7 @@
 
 pub mod decision;
 pub mod for_accuracy;
+pub mod short_runs;
 pub mod spacing;
 
 use crate::spec::quantity::Quantity;

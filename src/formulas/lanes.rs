@@ -69,6 +69,19 @@ pub(super) fn unary(op: UnaryOp, to: &mut [Lanes], a: &[Lanes]) {
     }
 }
 
+/// Sines and cosines of all of `a`, with the values that [`unary`] gives.
+pub(super) fn sine_and_cosine(sines: &mut [Lanes], cosines: &mut [Lanes], a: &[Lanes]) {
+    let largest = Lanes::splat(LARGEST_ANGLE);
+    for ((sine, cosine), a) in sines.iter_mut().zip(cosines).zip(a) {
+        (*sine, *cosine) = a.sin_cos();
+        let holds = a.abs().simd_le(largest);
+        if !holds.all() {
+            *sine = holds.select(*sine, each(*a, f64::sin));
+            *cosine = holds.select(*cosine, each(*a, f64::cos));
+        }
+    }
+}
+
 /// Applies a function of two numbers to all of `a` and `b`.
 pub(super) fn binary(op: BinaryOp, to: &mut [Lanes], a: &[Lanes], b: &[Lanes]) {
     #[inline(always)]
@@ -158,6 +171,15 @@ mod tests {
                     found[0].to_array()[0]
                 };
                 assert!(alone.to_bits() == found.to_bits() || (alone.is_nan() && found.is_nan()), "{op:?}({x})");
+                let (mut sine, mut cosine) = ([Lanes::splat(0.0)], [Lanes::splat(0.0)]);
+                super::sine_and_cosine(&mut sine, &mut cosine, &[Lanes::from(beside)]);
+                let pair = match op {
+                    UnaryOp::Sin => Some(sine[0]),
+                    UnaryOp::Cos => Some(cosine[0]),
+                    _ => None,
+                };
+                let pair = pair.map_or(found, |pair| pair.to_array()[k % 4]);
+                assert!(pair.to_bits() == found.to_bits() || (pair.is_nan() && found.is_nan()), "{op:?}({x})");
                 let is_near = (found - exact).abs()
                     <= 4e-16 * exact.abs().max(1e-300) + 3e-16 * f64::from(u8::from(exact.abs() <= 1.0));
                 assert!(

@@ -18,6 +18,10 @@ enum Step {
     Unary(UnaryOp, usize),
     Binary(BinaryOp, usize, usize),
     Choose(usize, usize, usize),
+    /// The sine of a column and, in the column that follows, its cosine: both come from one reduction of the angle.
+    SineAndCosine(usize),
+    /// The column that the step before has written, too.
+    Written,
 }
 
 /// Formulas that are evaluated together, as steps in order. Step k writes column k.
@@ -60,10 +64,21 @@ impl Program {
                 }
             }
         }
-        let mut place = vec![0; nodes.len()];
+        let partners = partners(nodes, &is_needed);
+        let mut place = vec![usize::MAX; nodes.len()];
         let (mut steps, mut needs) = (Vec::new(), Vec::<u64>::new());
         for (id, node) in nodes.iter().enumerate().filter(|(id, _)| is_needed[*id]) {
+            if place[id] != usize::MAX {
+                continue;
+            }
             place[id] = steps.len();
+            if let (Some(partner), Node::Unary(op, a)) = (partners[id], *node) {
+                let (sine, cosine) = if op == UnaryOp::Sin { (id, partner) } else { (partner, id) };
+                (place[sine], place[cosine]) = (steps.len(), steps.len() + 1);
+                steps.extend([Step::SineAndCosine(place[a]), Step::Written]);
+                needs.extend([needs[place[a]]; 2]);
+                continue;
+            }
             let (step, need) = match *node {
                 Node::Constant(value) => (Step::Constant(value), 0),
                 Node::Variable(index) => (Step::Variable(index), 1 << (index % 64)),
@@ -90,7 +105,7 @@ impl Program {
     /// Number of operations of one evaluation at a point, for estimates.
     #[must_use]
     pub fn operations(&self) -> usize {
-        self.steps.iter().filter(|step| !matches!(step, Step::Constant(_) | Step::Variable(_))).count()
+        self.steps.iter().filter(|step| !matches!(step, Step::Constant(_) | Step::Variable(_) | Step::Written)).count()
     }
 
     /// Whether a variable is read.
@@ -121,7 +136,7 @@ impl Program {
         let varying = varying.fold(0_u64, |mask, (index, _)| mask | 1 << (index % 64));
         for (k, step) in self.steps.iter().enumerate() {
             let (before, rest) = columns.split_at_mut(k);
-            let Some(to) = rest.first_mut() else { return };
+            let [to, after @ ..] = rest else { return };
             // What is the same at all points is computed once.
             let is_uniform = self.needs[k] & varying == 0;
             let length = if is_uniform { 1 } else { vectors };
@@ -131,6 +146,11 @@ impl Program {
                 Step::Unary(op, a) => lanes::unary(op, &mut to[..length], &before[a]),
                 Step::Binary(op, a, b) => lanes::binary(op, &mut to[..length], &before[a], &before[b]),
                 Step::Choose(a, b, c) => lanes::choose(&mut to[..length], &before[a], &before[b], &before[c]),
+                Step::SineAndCosine(a) => {
+                    let [cosines, ..] = after else { return };
+                    lanes::sine_and_cosine(&mut to[..length], &mut cosines[..length], &before[a]);
+                }
+                Step::Written => {}
             }
             if is_uniform {
                 let first = to[0];
@@ -147,6 +167,24 @@ impl Program {
             }
         }
     }
+}
+
+/// Of every sine that is needed beside the cosine of the same term the node of that, and the other way around.
+fn partners(nodes: &[Node], is_needed: &[bool]) -> Vec<Option<NodeId>> {
+    let mut partners = vec![None; nodes.len()];
+    let mut sines = vec![None; nodes.len()];
+    let mut cosines = vec![None; nodes.len()];
+    for (id, node) in nodes.iter().enumerate().filter(|(id, _)| is_needed[*id]) {
+        match *node {
+            Node::Unary(UnaryOp::Sin, a) => sines[a] = Some(id),
+            Node::Unary(UnaryOp::Cos, a) => cosines[a] = Some(id),
+            _ => {}
+        }
+    }
+    for (sine, cosine) in sines.into_iter().zip(cosines).filter_map(|(sine, cosine)| sine.zip(cosine)) {
+        (partners[sine], partners[cosine]) = (Some(cosine), Some(sine));
+    }
+    partners
 }
 
 fn arguments(node: Node) -> [Option<NodeId>; 3] {
@@ -171,5 +209,39 @@ fn load(to: &mut Column, input: Option<&Input<'_>>, count: usize) {
         }
         Some(Input::Uniform(value)) => to.fill(Lanes::splat(*value)),
         None => to.fill(Lanes::splat(f64::NAN)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::expression::Graph;
+    use super::super::functions::UnaryOp;
+    use super::{BLOCK, Input, Program, Workspace};
+
+    fn values(program: &Program, inputs: &[Input<'_>], count: usize) -> Vec<Vec<f64>> {
+        let mut found = vec![vec![0.0; count]; program.outputs()];
+        program.evaluate(inputs, count, &mut Workspace::default(), |k, i, value| found[k][i] = value);
+        found
+    }
+
+    #[test]
+    fn sines_and_cosines_of_one_term_are_those_that_stand_alone() {
+        let mut graph = Graph::default();
+        let (x, t) = (graph.variable(0), graph.variable(1));
+        let mut trigonometric = |a| [graph.unary(UnaryOp::Cos, a), graph.unary(UnaryOp::Sin, a)];
+        let [cos_x, sin_x] = trigonometric(x);
+        let [cos_t, sin_t] = trigonometric(t);
+        let nested = graph.unary(UnaryOp::Cos, sin_x);
+        let outputs = [nested, cos_x, sin_x, sin_t, cos_t];
+        let together = Program::new(&graph, &outputs);
+        assert_eq!(together.operations(), 3, "two pairs, and the cosine of a sine");
+        let numbers: Vec<f64> = (0..BLOCK - 3).map(|k| 0.37 * k as f64 * if k == 7 { 1e9 } else { 1.0 }).collect();
+        let inputs = [Input::Column(&numbers), Input::Uniform(2.5)];
+        let all = values(&together, &inputs, numbers.len());
+        for (k, output) in outputs.into_iter().enumerate() {
+            let alone = values(&Program::new(&graph, &[output]), &inputs, numbers.len());
+            assert_eq!(alone[0], all[k], "output {k}");
+        }
+        assert!(together.reads(1) && together.depends_on(0));
     }
 }

@@ -38,5 +38,5 @@ pub static KIND: SceneKind = SceneKind {
         norms: own::norms(),
     },
     calibration: include_str!("droplet/calibration.json"),
-    precision: "[]",
+    precision: include_str!("droplet/precision.json"),
 };

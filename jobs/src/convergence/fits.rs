@@ -24,21 +24,46 @@ pub struct Fitted {
     pub degrees_of_freedom: usize,
 }
 
+/// A line fitted to points (x, y) with weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Its slope.
+    pub slope: f64,
+    /// A place on it: the weighted mean of the points.
+    pub mean: (f64, f64),
+    /// Standard deviation of the points about it, where there are more than two.
+    pub scatter: Option<f64>,
+    /// Weighted sum of squares of x about the mean, by the mean weight.
+    spread: f64,
+    degrees_of_freedom: usize,
+}
+
+impl Line {
+    /// The line through points (x, y, weight); None for fewer than two places x.
+    #[must_use]
+    pub fn through(points: &[(f64, f64, f64)]) -> Option<Self> {
+        let total: f64 = points.iter().map(|(_, _, w)| w).sum();
+        let mean = |pick: fn(&(f64, f64, f64)) -> f64| points.iter().map(|p| p.2 * pick(p)).sum::<f64>() / total;
+        let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+        let spread: f64 = points.iter().map(|p| p.2 * (p.0 - x).powi(2)).sum();
+        if spread.is_nan() || spread <= 1e-12 * total {
+            return None;
+        }
+        let slope = points.iter().map(|p| p.2 * (p.0 - x) * (p.1 - y)).sum::<f64>() / spread;
+        let degrees_of_freedom = points.len().saturating_sub(2);
+        let mean_weight = total / points.len() as f64;
+        let squares: f64 = points.iter().map(|p| p.2 * (p.1 - y - slope * (p.0 - x)).powi(2)).sum();
+        let scatter = (degrees_of_freedom > 0).then(|| (squares / mean_weight / degrees_of_freedom as f64).sqrt());
+        Some(Self { slope, mean: (x, y), scatter, spread: spread / mean_weight, degrees_of_freedom })
+    }
+}
+
 /// The slope of the line through points (x, y) with weights; None for fewer than two places x.
 #[must_use]
 pub fn slope(points: &[(f64, f64, f64)]) -> Option<Fitted> {
-    let total: f64 = points.iter().map(|(_, _, w)| w).sum();
-    let mean = |pick: fn(&(f64, f64, f64)) -> f64| points.iter().map(|p| p.2 * pick(p)).sum::<f64>() / total;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let spread: f64 = points.iter().map(|p| p.2 * (p.0 - x).powi(2)).sum();
-    if spread.is_nan() || spread <= 1e-12 * total {
-        return None;
-    }
-    let value = points.iter().map(|p| p.2 * (p.0 - x) * (p.1 - y)).sum::<f64>() / spread;
-    let degrees_of_freedom = points.len().saturating_sub(2);
-    let squares: f64 = points.iter().map(|p| p.2 * (p.1 - y - value * (p.0 - x)).powi(2)).sum();
-    let deviation = (degrees_of_freedom > 0).then(|| (squares / degrees_of_freedom as f64 / spread).sqrt());
-    Some(Fitted { value, deviation, degrees_of_freedom })
+    let line = Line::through(points)?;
+    let deviation = line.scatter.map(|scatter| scatter / line.spread.sqrt());
+    Some(Fitted { value: line.slope, deviation, degrees_of_freedom: line.degrees_of_freedom })
 }
 
 /// Orders between which a power law is looked for.

@@ -2,6 +2,7 @@
 
 use crate::convergence::{Assessment, Convergence, Cost, Level, Subject, Target, assess};
 use crate::spec::quantity::Quantity;
+use crate::spec::states::Reason;
 use crate::spec::study::{MeasuredLevel, RefineSpec, RefinementOutcome};
 
 /// One of the set-ups that are compared.
@@ -9,8 +10,44 @@ use crate::spec::study::{MeasuredLevel, RefineSpec, RefinementOutcome};
 pub struct Setup {
     /// What its levels have come to, the coarsest first.
     pub levels: Vec<MeasuredLevel>,
+    /// Number of coarser levels that were passed over: a check ended the last of them.
+    pub passed: usize,
     /// Why it cannot go on: a level failed, or does not fit into the memory.
     pub obstacle: Option<(RefinementOutcome, String)>,
+}
+
+impl Setup {
+    /// Number of the level that follows.
+    #[must_use]
+    pub fn next_level(&self) -> usize {
+        self.passed + self.levels.len()
+    }
+
+    /// Spacing of the first level that has come to something, by that of the first one.
+    #[must_use]
+    pub fn first_share(&self, ratio: f64) -> f64 {
+        ratio.powf(-(self.passed as f64))
+    }
+
+    /// Spacing of the finest level, by that of the first one.
+    #[must_use]
+    pub fn finest_share(&self, ratio: f64) -> f64 {
+        ratio.powf(1.0 - self.next_level().max(1) as f64)
+    }
+
+    /// A level that failed with a reason. Where a check ended it and few levels have come to something, these are too coarse to be
+    /// judged: all so far are passed over, as long as enough are left. Otherwise it is in the way.
+    pub fn pass_or_stop(&mut self, spec: &RefineSpec, reason: Option<Reason>, message: String) {
+        let passed = self.next_level() + 1;
+        let is_early = (self.levels.len() as u64) < spec.levels.least;
+        let is_left = passed as u64 + spec.levels.least <= spec.levels.most;
+        if is_early && is_left && reason.is_some_and(Reason::is_of_physics) {
+            self.passed = passed;
+            self.levels.clear();
+        } else {
+            self.obstacle = Some((RefinementOutcome::Failed, message));
+        }
+    }
 }
 
 /// The next step of a study.
@@ -98,7 +135,7 @@ pub fn level_cost(levels: &[MeasuredLevel], spacing: f64, forecast_cpu_s: Option
 fn go_on(spec: &RefineSpec, quantity: &Quantity, setup: &Setup, number: usize) -> Step {
     let levels = &setup.levels;
     let end = |outcome, message| Step::End { outcome, message };
-    let make = Step::Make { setup: number, level: levels.len() };
+    let make = Step::Make { setup: number, level: setup.next_level() };
     let is_judged = levels.len() as u64 >= spec.levels.least;
     let judged = judge(spec, quantity, levels);
     if is_judged && judged.is_met {
@@ -112,9 +149,12 @@ fn go_on(spec: &RefineSpec, quantity: &Quantity, setup: &Setup, number: usize) -
         return make;
     }
     let count = levels.len();
-    if count as u64 >= spec.levels.most {
-        let message =
-            format!("the {count} levels that were allowed do not meet the tolerance: {}", said(quantity, &judged));
+    if setup.next_level() as u64 >= spec.levels.most {
+        let message = format!(
+            "the {} levels that were allowed do not meet the tolerance: {}",
+            spec.levels.most,
+            said(quantity, &judged)
+        );
         return end(RefinementOutcome::Levels, message);
     }
     // Coarse levels may be far from what leads in the end: a verdict needs one level more.
@@ -140,19 +180,17 @@ fn said(quantity: &Quantity, judged: &Assessment) -> String {
 fn compare(spec: &RefineSpec, quantity: &Quantity, setups: &[Setup]) -> Step {
     let left = || setups.iter().enumerate().filter(|(_, setup)| setup.obstacle.is_none());
     let least = spec.levels.least as usize;
-    let shortest = left().map(|(_, setup)| setup.levels.len()).min();
+    let is_short = |(_, setup): &(usize, &Setup)| setup.levels.len() < least;
+    let shortest = left().filter(is_short).min_by_key(|(_, setup)| setup.next_level());
     match shortest {
-        None => {
+        None if left().next().is_none() => {
             let causes = setups.iter().filter_map(|setup| setup.obstacle.as_ref());
             let messages: Vec<&str> = causes.clone().map(|(_, message)| message.as_str()).collect();
             let outcome = causes.map(|(outcome, _)| *outcome).next().unwrap_or(RefinementOutcome::Failed);
             Step::End { outcome, message: format!("no alternative is left: {}", messages.join("; ")) }
         }
-        Some(shortest) if shortest < least => {
-            let setup = left().find(|(_, setup)| setup.levels.len() == shortest).map_or(0, |(number, _)| number);
-            Step::Make { setup, level: shortest }
-        }
-        Some(_) => Step::Choose { setup: cheapest(spec, quantity, setups) },
+        Some((number, setup)) => Step::Make { setup: number, level: setup.next_level() },
+        None => Step::Choose { setup: cheapest(spec, quantity, setups) },
     }
 }
 
@@ -189,6 +227,7 @@ fn cheapest(spec: &RefineSpec, quantity: &Quantity, setups: &[Setup]) -> usize {
 mod tests {
     use super::{Setup, Step, level_cost, next_step};
     use crate::spec::quantity::Quantity;
+    use crate::spec::states::Reason;
     use crate::spec::study::{MeasuredLevel, RefineSpec, RefinementOutcome};
     use meniscus::spec::Parameter;
     use serde_json::{Value, json};
@@ -223,7 +262,7 @@ mod tests {
 
     fn setup(count: i32, value: impl Fn(f64) -> f64) -> Setup {
         let spacings = (0..count).map(|k| 0.1 / 2.0_f64.powi(k));
-        Setup { levels: spacings.map(|h| level(h, value(h))).collect(), obstacle: None }
+        Setup { levels: spacings.map(|h| level(h, value(h))).collect(), ..Setup::default() }
     }
 
     /// How many levels are made of one set-up, and the word of the end.
@@ -293,6 +332,30 @@ mod tests {
             next_step(&spec(&[]), &error(), &[met], None),
             Step::End { outcome: RefinementOutcome::Tolerance, .. }
         ));
+    }
+
+    #[test]
+    fn first_levels_that_a_check_ends_are_passed_over_as_long_as_enough_are_left() {
+        let spec = spec(&[]);
+        let mut passed = Setup::default();
+        for level in 1..=3 {
+            passed.pass_or_stop(&spec, Some(Reason::DivergedUnresolved), "too coarse".to_owned());
+            assert!(passed.obstacle.is_none());
+            assert_eq!(next_step(&spec, &error(), &[passed.clone()], None), Step::Make { setup: 0, level });
+        }
+        let mut measured = Setup { levels: setup(3, |h| h).levels, ..passed.clone() };
+        let end = next_step(&spec, &error(), &[measured.clone()], None);
+        assert!(matches!(end, Step::End { outcome: RefinementOutcome::Levels, .. }), "all six are made: {end:?}");
+        passed.pass_or_stop(&spec, Some(Reason::DivergedUnresolved), "too coarse".to_owned());
+        assert!(passed.obstacle.is_some(), "three of the six are needed");
+        measured.pass_or_stop(&spec, Some(Reason::DivergedUnresolved), "level 6".to_owned());
+        assert!(measured.obstacle.is_some(), "enough levels have come to something");
+        let mut lucky = setup(1, |h| h);
+        lucky.pass_or_stop(&spec, Some(Reason::DivergedUnresolved), "level 1".to_owned());
+        assert_eq!((lucky.passed, lucky.levels.len()), (2, 0), "a level coarser than one that failed is not judged");
+        let mut crashed = Setup::default();
+        crashed.pass_or_stop(&spec, Some(Reason::WorkerCrash), "crashed".to_owned());
+        assert!(crashed.obstacle.is_some());
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! The sweep that finds the spacing for an accuracy: where it begins, and what it compares.
 
-use crate::convergence::Level;
-use crate::spec::accuracy::{LEAST_LEVELS, LEAST_LEVELS_ONCE_TOLD, Wanted};
+use super::short_runs::{Known, curve_of};
+use crate::spec::accuracy::Wanted;
 use crate::spec::body::{Allowance, BodyError, JobBody, Sources};
 use crate::spec::study::{SweepPoint, point_body};
-use crate::spec::work_precision::{error_scale, reference_of, spacing_for};
+use crate::spec::work_precision::error_scale;
 use meniscus::spec::Json;
 use serde_json::{Value, json};
 
@@ -35,20 +35,18 @@ pub fn sweep<S: Sources>(
     known: Known<'_, S::Error>,
 ) -> Result<Value, BodyError<S::Error>> {
     let search = Search { body, wanted, base: base_of(&body.spec), allowance, sources };
-    if let Some((from, choice)) = search.told(known)? {
-        let choice: Vec<OpenChoice> = choice.into_iter().map(|(pointer, value)| (pointer, vec![value])).collect();
-        return Ok(wanted.sweep(from, &choice, LEAST_LEVELS_ONCE_TOLD));
-    }
-    let from = search.first_value()?;
-    Ok(wanted.sweep(from, &search.open_choices(from)?, LEAST_LEVELS))
+    let (from, choices) = match search.told(known)? {
+        Some(told) => told,
+        None => {
+            let from = search.first_value()?;
+            (from, search.open_choices(from)?)
+        }
+    };
+    Ok(wanted.sweep(from, &choices))
 }
 
-/// Looks up what short runs said of an error, by the name of the runs, the quantity and the norm.
-pub type Known<'a, E> = &'a dyn Fn(&str, &str, &str) -> Result<Vec<Level>, E>;
-
-/// Spacings of the first level by the one that short runs tell, the coarsest first: two levels of it and the next one cost a third
-/// of the run.
-const PILOTS: [f64; 4] = [3.0, 2.1, 1.5, 1.0];
+/// Spacings of the first level by the one that short runs tell, the coarsest first.
+const PILOTS: [f64; 4] = [2.0, 1.7, 1.4, 1.0];
 
 /// A search among bodies.
 struct Search<'a, S> {
@@ -62,10 +60,7 @@ struct Search<'a, S> {
 /// Pointer of a value of the scene, and the value.
 type Choice = (&'static str, Json);
 
-/// The value of the axis at the first level, and a choice that goes with it.
-type FirstLevel = (f64, Option<Choice>);
-
-/// What short runs tell: a spacing that would do, its CPU seconds, and with which choice.
+/// What short runs tell of a choice: a spacing that would do, and its CPU seconds.
 struct Begin {
     spacing: f64,
     cpu_s: f64,
@@ -74,6 +69,9 @@ struct Begin {
 
 /// Pointer of a value of the scene that the body leaves open, and the values that are compared.
 type OpenChoice = (&'static str, Vec<Json>);
+
+/// The value of the axis at the first level, and the choices that are compared.
+type Begun = (f64, Vec<OpenChoice>);
 
 impl<S: Sources> Search<'_, S> {
     /// The body with some values of the scene, if that is valid.
@@ -90,49 +88,63 @@ impl<S: Sources> Search<'_, S> {
 
     /// The value of the axis for a spacing.
     fn axis_value(&self, spacing: f64) -> Option<f64> {
-        let default = self.body.scene.spacing()?;
+        Some(self.axis_value_by_default(spacing / self.body.scene.spacing()?))
+    }
+
+    /// The value of the axis for a spacing by that of the body as it is.
+    fn axis_value_by_default(&self, coarser: f64) -> f64 {
         let value = Value::pointer(&self.body.resolved.scene, self.wanted.axis).and_then(Value::as_f64);
         if self.wanted.axis == "/count" {
             // Where the body has none, the count is that of the default spacing.
             let count = value.unwrap_or(self.body.forecast.estimate.particles as f64);
-            Some((count * (default / spacing).powi(2)).round())
+            (count / (coarser * coarser)).round()
         } else {
-            Some(spacing)
+            value.or(self.body.scene.spacing()).unwrap_or(1.0) * coarser
         }
     }
 
-    /// Where short runs tell the search to begin: the value of the axis, and the choice that is cheapest by them.
-    fn told(&self, known: Known<'_, S::Error>) -> Result<Option<FirstLevel>, BodyError<S::Error>> {
-        let Some(Begin { spacing, choice, .. }) = self.cheapest(known)? else { return Ok(None) };
+    /// Where short runs tell the search to begin: a level about twice as coarse as would do, with the choice that is cheapest by them.
+    /// The others stand behind it, since that level may say something else.
+    fn told(&self, known: Known<'_, S::Error>) -> Result<Option<Begun>, BodyError<S::Error>> {
+        let begins = self.begins(known)?;
+        let Some(Begin { spacing, choice, .. }) = begins.first() else { return Ok(None) };
         for coarser in PILOTS {
             let Some(value) = self.axis_value(spacing * coarser) else { return Ok(None) };
             let given: Vec<Choice> = choice.iter().cloned().chain([(self.wanted.axis, json!(value))]).collect();
             let level = self.body_with(&given)?;
             if level.is_some_and(|level| level.scene.warnings().is_empty()) {
-                return Ok(Some((value, choice.filter(|(pointer, _)| self.is_open(pointer)))));
+                let mut open: Vec<OpenChoice> = Vec::new();
+                for (pointer, value) in begins.into_iter().filter_map(|begin| begin.choice) {
+                    match open.iter_mut().find(|(known, _)| *known == pointer) {
+                        Some((_, values)) => values.push(value),
+                        None if self.is_open(pointer) => open.push((pointer, vec![value])),
+                        None => {}
+                    }
+                }
+                return Ok(Some((value, open)));
             }
         }
         Ok(None)
     }
 
-    /// The choice that reaches the tolerance with the least CPU time by short runs of other scenes.
-    fn cheapest(&self, known: Known<'_, S::Error>) -> Result<Option<Begin>, BodyError<S::Error>> {
+    /// What short runs of other scenes tell of the choices, the one first that reaches the tolerance with the least CPU time.
+    fn begins(&self, known: Known<'_, S::Error>) -> Result<Vec<Begin>, BodyError<S::Error>> {
         let wish = &self.wanted.spec;
         let error = wish.quantity.error.as_ref().filter(|_| !wish.relative && wish.quantity.time.is_none());
-        let (Some(error), Some(size)) = (error, self.body.scene.size()) else { return Ok(None) };
+        let (Some(error), Some(size)) = (error, self.body.scene.size()) else { return Ok(Vec::new()) };
         let tolerance = wish.tolerance / error_scale(self.body.scene.as_ref(), &error.quantity, size);
-        let mut best: Option<Begin> = None;
+        let mut begins: Vec<Begin> = Vec::new();
         for choice in self.choices() {
             let given: Vec<Choice> = choice.iter().cloned().collect();
             let Some(body) = self.body_with(&given)? else { continue };
-            let name = reference_of(body.scene.as_ref(), choice.as_ref().map(|(pointer, value)| (*pointer, value)));
-            let levels = known(&name, &error.quantity, &error.norm).map_err(BodyError::Lookup)?;
-            let Some((spacing, cpu_s)) = spacing_for(&levels, tolerance) else { continue };
-            if best.as_ref().is_none_or(|best| cpu_s < best.cpu_s) {
-                best = Some(Begin { spacing: spacing * size, cpu_s, choice });
-            }
+            let curve = curve_of(&body, (&error.quantity, &error.norm), known).map_err(BodyError::Lookup)?;
+            let place = curve.as_ref().and_then(|curve| Some((curve, curve.place(tolerance)?)));
+            let Some((curve, place)) = place else { continue };
+            let Some(cpu_s) = curve.cost(place.spacing) else { continue };
+            begins.push(Begin { spacing: place.spacing * size, cpu_s, choice });
         }
-        Ok(best)
+        begins.sort_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
+        Ok(begins)
     }
 
     /// Whether the body leaves a value of the scene open.
@@ -153,18 +165,14 @@ impl<S: Sources> Search<'_, S> {
 
     /// The value of the axis at the first level: the coarsest that is valid and of which nothing is doubtful before it runs.
     fn first_value(&self) -> Result<f64, BodyError<S::Error>> {
-        let axis = self.wanted.axis;
-        let default = Value::pointer(&self.body.resolved.scene, axis).and_then(Value::as_f64).unwrap_or(1.0);
-        let value = |coarser: f64| {
-            if axis == "/count" { (default / (coarser * coarser)).round() } else { default * coarser }
-        };
         for coarser in FIRST_SPACINGS {
-            let level = self.body_with(&[(axis, json!(value(coarser)))])?;
+            let value = self.axis_value_by_default(coarser);
+            let level = self.body_with(&[(self.wanted.axis, json!(value))])?;
             if level.is_some_and(|level| level.scene.warnings().is_empty()) {
-                return Ok(value(coarser));
+                return Ok(value);
             }
         }
-        Ok(value(1.0))
+        Ok(self.axis_value_by_default(1.0))
     }
 
     /// Values of the scene that the body leaves open, with those that are compared: the ones that go with the rest of the scene.
@@ -216,22 +224,25 @@ mod tests {
         let by_degree =
             |name: &str| (3..7).find(|n| name.contains(&format!("\"degree\":{n}"))).map(|n| f64::from(n) + 1.0);
         let told = found(&scene, by_degree);
-        assert_eq!(told["alternatives"], json!({"/scene/method": [{"type": "pcp", "degree": 6}]}), "{told}");
-        assert_eq!(told["levels"]["least"], 2);
-        // h⁷ = 1e-6/0.5 by the radius of 0.5, and three times as coarse.
+        let methods = told["alternatives"]["/scene/method"].as_array().unwrap();
+        assert_eq!(
+            (&methods[0], methods.len()),
+            (&json!({"type": "pcp", "degree": 6}), 4),
+            "the cheapest first: {told}"
+        );
+        // h⁷ = 1e-6/0.5 by the radius of 0.5, and twice as coarse.
         let spacing = 0.5 * (2e-6_f64).powf(1.0 / 7.0);
         let from = told["from"].as_f64().unwrap();
         assert!(
-            [3.0, 2.1, 1.5, 1.0].iter().any(|coarser| (from / spacing / coarser - 1.0).abs() < 1e-9),
+            [2.0, 1.7, 1.4, 1.0].iter().any(|coarser| (from / spacing / coarser - 1.0).abs() < 1e-9),
             "{from} {spacing}"
         );
         // A degree that is given is kept.
         let given = json!({"kind": "redistance", "shape": {"type": "circle", "radius": 0.5}, "method": {"type": "pcp", "degree": 4}});
         let told = found(&given, by_degree);
-        assert!(told.get("alternatives").is_none() && told["levels"]["least"] == 2, "{told}");
+        assert!(told.get("alternatives").is_none() && told["from"] != from, "{told}");
         // Where nothing is known, all are compared.
         let unknown = found(&scene, |_| None);
-        assert_eq!(unknown["levels"]["least"], 3);
         assert_eq!(unknown["alternatives"]["/scene/method"].as_array().map(Vec::len), Some(4));
     }
 }

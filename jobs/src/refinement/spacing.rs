@@ -1,7 +1,7 @@
 //! The spacing that levels tell: the one with which a run reaches a tolerance, not much finer than it needs to be.
 
 use super::Plan;
-use super::decision::{judge, target};
+use super::decision::{Setup, judge, target};
 use crate::convergence::{Assessment, Convergence};
 use crate::spec::accuracy::{ChosenAccuracy, KnownLevel};
 use crate::spec::study::MeasuredLevel;
@@ -9,14 +9,14 @@ use crate::spec::study::MeasuredLevel;
 /// How much finer than the finest level the spacing may be that is told: orders are not known to the last digit.
 const FARTHEST: f64 = 2.2;
 /// How much smaller than the tolerance the predicted error is.
-const SAFETY: f64 = 1.25;
+pub(super) const SAFETY: f64 = 1.25;
 /// Uncertainty of an order: with it the safety grows by the distance over which it is used.
 const ORDER_UNCERTAINTY: f64 = 0.2;
 
 /// A spacing for a job, by that of the first level, and the error that is predicted with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Told {
-    /// Spacing by that of the first level.
+    /// Spacing by that of the study's first level, the ones that were passed over included.
     pub share: f64,
     /// Predicted error, in the measure of the tolerance.
     pub predicted: f64,
@@ -24,7 +24,13 @@ pub struct Told {
 
 /// The spacing that the levels of a set-up tell; None where a further level is needed for that.
 #[must_use]
-pub fn tell(plan: &Plan, levels: &[MeasuredLevel], is_last: bool) -> Option<Told> {
+pub fn tell(plan: &Plan, setup: &Setup, is_last: bool) -> Option<Told> {
+    let told = by_levels(plan, &setup.levels, is_last)?;
+    Some(Told { share: told.share * setup.first_share(plan.spec.ratio), ..told })
+}
+
+/// The same by the first of the levels.
+fn by_levels(plan: &Plan, levels: &[MeasuredLevel], is_last: bool) -> Option<Told> {
     let (first, finest) = (levels.first()?, levels.last()?);
     let judged = judge(&plan.spec, &plan.quantity, levels);
     let tolerance = plan.spec.until.tolerance;
@@ -68,17 +74,16 @@ fn among(plan: &Plan, levels: &[MeasuredLevel], judged: &Assessment) -> Told {
     }
 }
 
-/// The accuracy of the body of a run with a spacing that was told; `study` names where the levels come from.
+/// The accuracy of the body of a run with a spacing that was told; `basis` says what it rests on.
 #[must_use]
-pub fn chosen(plan: &Plan, levels: &[MeasuredLevel], told: Told, study: &str) -> ChosenAccuracy {
-    let known = |level: &MeasuredLevel| KnownLevel { spacing: level.spacing, value: level.value, cpu_s: level.cpu_s };
+pub fn chosen(plan: &Plan, levels: Vec<KnownLevel>, told: Told, basis: String) -> ChosenAccuracy {
     ChosenAccuracy {
         quantity: plan.spec.quantity.as_given(),
         tolerance: plan.spec.until.tolerance,
         relative: plan.spec.until.relative,
         predicted: told.predicted,
-        basis: format!("{} levels of {study}", levels.len()),
-        levels: levels.iter().map(known).collect(),
+        basis,
+        levels,
     }
 }
 
@@ -86,6 +91,7 @@ pub fn chosen(plan: &Plan, levels: &[MeasuredLevel], told: Told, study: &str) ->
 mod tests {
     use super::{Told, tell};
     use crate::refinement::Plan;
+    use crate::refinement::decision::Setup;
     use crate::spec::study::MeasuredLevel;
     use serde_json::json;
 
@@ -95,7 +101,7 @@ mod tests {
         Plan::new(&sweep, &json!({"scene": {"kind": "redistance"}})).unwrap()
     }
 
-    fn levels(count: i32, error: impl Fn(f64) -> f64) -> Vec<MeasuredLevel> {
+    fn levels(count: i32, error: impl Fn(f64) -> f64) -> Setup {
         let level = |spacing: f64| MeasuredLevel {
             spacing,
             value: error(spacing),
@@ -108,7 +114,7 @@ mod tests {
             steps: 0,
             health: None,
         };
-        (0..count).map(|k| level(0.2 / 1.4_f64.powi(k))).collect()
+        Setup { levels: (0..count).map(|k| level(0.2 / 1.4_f64.powi(k))).collect(), ..Setup::default() }
     }
 
     /// The first spacing that is told, and after how many levels.
@@ -138,6 +144,14 @@ mod tests {
         let between = tell(&plan, &levels(8, error), true).unwrap();
         let reached = error(0.2 * between.share);
         assert!(reached <= 1e-3 && reached > 0.7e-3, "{between:?}");
+    }
+
+    #[test]
+    fn a_spacing_goes_by_the_first_level_of_all_that_was_passed_over() {
+        let passed = Setup { passed: 2, ..levels(3, |h| 3.0 * h * h) };
+        let all = Setup { passed: 0, ..passed.clone() };
+        let (of_passed, of_all) = (tell(&plan(1e-3), &passed, true).unwrap(), tell(&plan(1e-3), &all, true).unwrap());
+        assert!((of_passed.share / of_all.share - 1.4_f64.powi(-2)).abs() < 1e-12);
     }
 
     #[test]

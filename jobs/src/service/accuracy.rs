@@ -1,9 +1,10 @@
 //! Jobs that ask for an accuracy: the small study that finds their spacing.
 
+use crate::refinement::decision::Setup;
 use crate::refinement::spacing::{chosen, tell};
 use crate::refinement::{Plan, for_accuracy};
 use crate::service::store::{NewJob, NewStudy, Store, StoreError};
-use crate::spec::accuracy::Wanted;
+use crate::spec::accuracy::{KnownLevel, Wanted};
 use crate::spec::body::{Allowance, BodyError, JobBody, JobSpec};
 use crate::spec::quantity::Quantity;
 use crate::spec::study::{self, MeasuredLevel, point_body};
@@ -60,8 +61,8 @@ pub fn known_body(
         return Ok(None);
     }
     let mut best: Option<(f64, JobBody)> = None;
-    for setup in &plan.setups {
-        let body_at = |share: f64| point_body(&base, &plan.spec.point_at(&base, setup, share), allowance, store);
+    for point in &plan.setups {
+        let body_at = |share: f64| point_body(&base, &plan.spec.point_at(&base, point, share), allowance, store);
         let first = match body_at(1.0) {
             Ok(first) => first,
             Err(BodyError::Invalid(_)) => continue,
@@ -72,14 +73,17 @@ pub fn known_body(
         let known = store.precision(&problem, quantity, norm).map_err(BodyError::Lookup)?;
         let theory = first.scene.order(quantity, norm);
         let levels: Vec<MeasuredLevel> = known.iter().map(|level| MeasuredLevel::of_error(*level, theory)).collect();
-        let told = if levels.len() < LEAST_KNOWN { None } else { tell(&plan, &levels, false) };
-        let (Some(told), Some(coarsest)) = (told, levels.first()) else { continue };
+        let setup = Setup { levels, ..Setup::default() };
+        let told = if setup.levels.len() < LEAST_KNOWN { None } else { tell(&plan, &setup, false) };
+        let (Some(told), Some(coarsest)) = (told, setup.levels.first()) else { continue };
         let share = told.share * coarsest.spacing / spacing;
         let Some(cost) = cost_at(&known, told.share * coarsest.spacing) else { continue };
         if best.as_ref().is_none_or(|(least, _)| cost < *least)
             && let Ok(mut found) = body_at(share)
         {
-            found.resolved.accuracy = Some(chosen(&plan, &levels, told, "earlier runs of this build"));
+            let basis = format!("{} earlier runs with this build", setup.levels.len());
+            let levels = setup.levels.iter().map(KnownLevel::from).collect();
+            found.resolved.accuracy = Some(chosen(&plan, levels, told, basis));
             found.spec = body.spec.clone();
             found.predecessors.clone_from(&body.predecessors);
             best = Some((cost, found));

@@ -42,13 +42,17 @@ fn plan_of(study: &StudyRow) -> Option<Plan> {
     Plan::new(&study.sweep, &study.base)
 }
 
-/// The levels by set-up.
-fn by_setup(plan: &Plan, levels: &[LevelRow]) -> Vec<Setup> {
+/// The levels by set-up; `serves` says whether the study finds the spacing for a job.
+fn by_setup(plan: &Plan, levels: &[LevelRow], serves: bool) -> Vec<Setup> {
     let mut setups = vec![Setup::default(); plan.setups.len()];
     for row in levels {
         let Some(setup) = setups.get_mut(row.setup as usize) else { continue };
         match (&row.measured, row.state) {
             (Some(measured), _) => setup.levels.push(measured.clone()),
+            // Where a study chooses its levels itself, the first ones may be too coarse for the scene.
+            (None, Some(State::Failed)) if serves && !row.is_to_repeat => {
+                setup.pass_or_stop(&plan.spec, row.reason, obstacle(row).1);
+            }
             (None, Some(State::Failed | State::Canceled)) if !row.is_to_repeat => setup.obstacle = Some(obstacle(row)),
             (None, None) => {
                 let message = format!("the job of level {} was deleted before it was read", row.level);
@@ -77,9 +81,10 @@ fn advance(store: &Store, id: &str) -> Result<(), StoreError> {
         let message = "this version of the program does not understand the sweep of the study";
         return end(store, &study, RefinementOutcome::Failed, message);
     };
+    let serves = refinement.job.is_some();
     let mut levels = store.levels(id)?;
     if let Some(level) = levels.iter().find(|level| level.is_to_repeat) {
-        return match make(store, &study, &plan, &Place::of(level), &by_setup(&plan, &levels))? {
+        return match make(store, &study, &plan, &Place::of(level), &by_setup(&plan, &levels, serves))? {
             None => Ok(()),
             Some((outcome, message)) => end(store, &study, outcome, &message),
         };
@@ -87,7 +92,7 @@ fn advance(store: &Store, id: &str) -> Result<(), StoreError> {
     if let Some(message) = take_results(store, &study, &plan, &mut levels)? {
         return end(store, &study, RefinementOutcome::Failed, &message);
     }
-    let mut setups = by_setup(&plan, &levels);
+    let mut setups = by_setup(&plan, &levels, serves);
     // A set-up whose next level does not fit is put aside; there are as many turns as set-ups.
     for _ in 0..=setups.len() {
         let chosen = refinement.chosen.map(|chosen| chosen as usize);

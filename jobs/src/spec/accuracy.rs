@@ -2,6 +2,7 @@
 
 use crate::convergence::{Level, Subject, Target, assess};
 use crate::spec::quantity::{Quantity, QuantitySpec};
+use crate::spec::study::MeasuredLevel;
 use meniscus::scene::Scene;
 use meniscus::scenes::find;
 use meniscus::spec::{Interval, Json, Parameter, Violation};
@@ -59,12 +60,12 @@ impl Wanted {
 
     /// The sweep of the study that finds the spacing, from a first value of the axis.
     #[must_use]
-    pub fn sweep(&self, from: f64, alternatives: &[(&str, Vec<Json>)], least_levels: u64) -> Value {
+    pub fn sweep(&self, from: f64, alternatives: &[(&str, Vec<Json>)]) -> Value {
         let lists: serde_json::Map<String, Value> =
             alternatives.iter().map(|(pointer, values)| (format!("/scene{pointer}"), json!(values))).collect();
         let mut sweep = json!({
             "mode": "refine", "axis": format!("/scene{}", self.axis), "from": from, "ratio": RATIO,
-            "levels": {"least": least_levels, "most": MOST_LEVELS}, "quantity": self.spec.quantity.as_given(),
+            "levels": {"least": LEAST_LEVELS, "most": MOST_LEVELS}, "quantity": self.spec.quantity.as_given(),
             "until": {"tolerance": self.spec.tolerance, "relative": self.spec.relative},
         });
         if let (false, Some(object)) = (lists.is_empty(), sweep.as_object_mut()) {
@@ -76,10 +77,8 @@ impl Wanted {
 
 /// Ratio of two levels of the study.
 const RATIO: f64 = 1.4;
-/// Levels of the study at least, where nothing is known.
-pub const LEAST_LEVELS: u64 = 3;
-/// Levels of the study at least, where short runs told where to begin.
-pub const LEAST_LEVELS_ONCE_TOLD: u64 = 2;
+/// Levels of the study at least, where short runs do not tell the spacing before.
+const LEAST_LEVELS: u64 = 3;
 /// Levels of the study at most.
 const MOST_LEVELS: u64 = 10;
 
@@ -96,11 +95,12 @@ pub struct ChosenAccuracy {
     pub predicted: f64,
     /// Measurements on which the prediction rests.
     pub basis: String,
-    /// Levels that were measured, the coarsest first.
+    /// Levels on which the prediction rests, the coarsest first: those that were run, and short runs of other scenes as they would
+    /// be in this one.
     pub levels: Vec<KnownLevel>,
 }
 
-/// A level that was measured before.
+/// A level that is known before the run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct KnownLevel {
     /// Spacing.
@@ -167,6 +167,12 @@ impl ChosenAccuracy {
         let cost = crate::convergence::Cost::new(&levels);
         let next = judged.next_spacing.and_then(|spacing| Some((spacing, cost?.at(spacing))));
         Reached { report, next }
+    }
+}
+
+impl From<&MeasuredLevel> for KnownLevel {
+    fn from(level: &MeasuredLevel) -> Self {
+        Self { spacing: level.spacing, value: level.value, cpu_s: level.cpu_s }
     }
 }
 

@@ -233,6 +233,12 @@ impl From<&StepError> for Reason {
 }
 
 impl Reason {
+    /// Whether the run itself could not go on: a check ended it, or numbers that do not exist.
+    #[must_use]
+    pub fn is_of_physics(self) -> bool {
+        self.word().starts_with("diverged.")
+    }
+
     /// What a user can do about it, where the job has no checkpoint to go on from.
     #[must_use]
     pub fn hint_without_checkpoint(self) -> &'static str {

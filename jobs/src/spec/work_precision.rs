@@ -96,28 +96,6 @@ pub fn of_reference(scene: &dyn Scene, choice: Option<(&str, &Json)>, report: &R
     rows
 }
 
-/// The spacing at which levels reach a tolerance, and its CPU seconds: between levels and beyond them by the nearest power. The coarsest
-/// level comes first; None where they tell no order.
-#[must_use]
-pub fn spacing_for(levels: &[Level], tolerance: f64) -> Option<(f64, f64)> {
-    let orders: Vec<f64> = levels
-        .windows(2)
-        .map(|pair| (pair[0].value / pair[1].value).ln() / (pair[0].spacing / pair[1].spacing).ln())
-        .collect();
-    // The first pair whose finer level meets it, else the last one.
-    let place = levels.iter().skip(1).position(|level| level.value <= tolerance);
-    let place = place.or(orders.len().checked_sub(1))?;
-    let (order, from) = (orders[place], levels[place + 1]);
-    if !order.is_finite() || order < LEAST_ORDER {
-        return None;
-    }
-    let spacing = from.spacing * (tolerance / from.value).powf(order.recip());
-    Some((spacing, cost_at(levels, spacing)?))
-}
-
-/// Order below which levels tell nothing.
-const LEAST_ORDER: f64 = 0.5;
-
 /// CPU seconds of a run at a spacing, by levels that are known, the coarsest first: between two levels by the power through them.
 #[must_use]
 pub fn cost_at(levels: &[Level], spacing: f64) -> Option<f64> {
@@ -130,7 +108,7 @@ pub fn cost_at(levels: &[Level], spacing: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{cost_at, problem_of, spacing_for};
+    use super::{cost_at, problem_of};
     use crate::convergence::Level;
     use serde_json::json;
 
@@ -144,26 +122,12 @@ mod tests {
     }
 
     #[test]
-    fn levels_tell_the_spacing_of_a_tolerance_between_them_and_beyond() {
-        let levels = [0.4, 0.2, 0.1].map(|h: f64| Level { spacing: h, value: 3.0 * h.powi(3), cpu_s: h.powi(-2) });
-        for spacing in [0.3, 0.15, 0.03_f64] {
-            let (found, cost) = spacing_for(&levels, 3.0 * spacing.powi(3)).unwrap();
-            assert!((found / spacing - 1.0).abs() < 1e-12 && (cost * spacing.powi(2) - 1.0).abs() < 1e-9);
-        }
-        // What is coarser than all levels costs no more than the coarsest.
-        let (found, cost) = spacing_for(&levels, 3.0 * 0.5_f64.powi(3)).unwrap();
-        assert!((found - 0.5).abs() < 1e-12 && (cost - levels[0].cpu_s).abs() < 1e-12);
-        assert_eq!(spacing_for(&levels[..1], 1e-3), None);
-        let flat = levels.map(|level| Level { value: 1.0, ..level });
-        assert_eq!(spacing_for(&flat, 1e-3), None);
-    }
-
-    #[test]
     fn the_cost_between_two_levels_lies_between_theirs() {
         let levels = [0.2, 0.1, 0.05].map(|spacing: f64| Level { spacing, value: 0.0, cpu_s: spacing.powi(-2) });
         for spacing in [0.15_f64, 0.07, 0.04] {
             assert!((cost_at(&levels, spacing).unwrap() * spacing.powi(2) - 1.0).abs() < 1e-9);
         }
+        assert!((cost_at(&levels, 0.5).unwrap() - levels[0].cpu_s).abs() < 1e-12, "no less than the coarsest");
         assert_eq!(cost_at(&[], 0.1), None);
     }
 }

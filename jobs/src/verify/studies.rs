@@ -7,12 +7,13 @@ use super::workspace::Workspace;
 use crate::convergence::{Level, Subject, Target, assess};
 use crate::formats::measured_level;
 use crate::refinement::decision::{Setup, Step, judge, next_step};
+use crate::refinement::short_runs::{self, Curves};
 use crate::refinement::spacing::tell;
 use crate::refinement::{Plan, for_accuracy};
 use crate::spec::body::{self, Allowance, JobBody, NoSources};
-use crate::spec::study::{MeasuredLevel, SweepPoint, point_body};
+use crate::spec::study::{MeasuredLevel, RefinementOutcome, SweepPoint, point_body};
 use crate::system::process;
-use crate::worker::local_run::Keep;
+use crate::worker::local_run::{Ended, Keep};
 use serde_json::{Value, json};
 
 /// Orders agree with theory within so much.
@@ -25,6 +26,10 @@ const MOST_COST: f64 = 2.0;
 const HAND_RATIO: f64 = 1.12;
 /// Errors by the tolerance above which a set-up is given up: the spacing that it needs is far away.
 const HOPELESS: f64 = 20.0;
+/// CPU seconds below which a run is timed more than once: the least time counts, of the service's runs and of those by hand.
+const SHORT_S: f64 = 0.3;
+/// How often a short run is timed again.
+const AGAIN: usize = 4;
 /// Runs of a set-up that are tried by hand at most.
 const MOST_HAND_RUNS: usize = 9;
 
@@ -103,32 +108,52 @@ struct Runner<'a> {
     spent_s: f64,
 }
 
+/// What a study has come to.
+struct Refined {
+    /// Number of the set-up that went on.
+    setup: usize,
+    /// Its levels.
+    levels: Vec<MeasuredLevel>,
+    /// The spacing that is told, by that of the first level.
+    share: Option<f64>,
+}
+
 impl Runner<'_> {
     /// A level, run now or kept from before.
-    fn level(&mut self, setup: &SweepPoint, share: f64) -> Result<MeasuredLevel, String> {
+    fn level(&mut self, setup: &SweepPoint, share: f64) -> Result<MeasuredLevel, Ended> {
+        let lacking = |message: String| Ended { reason: None, message };
         let point = self.plan.spec.point_at(self.base, setup, share);
         let body = point_body(self.base, &point, allowance(), &NoSources).map_err(|error| {
-            error.violations().first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail))
+            lacking(error.violations().first().map_or_else(String::new, |v| format!("{}: {}", v.pointer, v.detail)))
         })?;
         let directory = self.workspace.run(&body.spec, Keep::Report)?;
         let relative = self.plan.spec.until.relative;
-        let (level, _) = measured_level::read(&directory, body.scene.as_ref(), &self.plan.quantity, relative)?;
+        let (mut level, _) =
+            measured_level::read(&directory, body.scene.as_ref(), &self.plan.quantity, relative).map_err(lacking)?;
+        if level.cpu_s < SHORT_S {
+            for _ in 0..AGAIN {
+                level.cpu_s = level.cpu_s.min(self.workspace.time_again(&body.spec)?);
+            }
+        }
         self.spent_s += level.cpu_s;
         Ok(level)
     }
 
-    /// Levels until the study ends or its levels tell a spacing: the set-up that went on, its levels, and the spacing.
-    fn refine(&mut self, serves: bool) -> Result<(usize, Vec<MeasuredLevel>, Option<f64>), String> {
+    /// Levels until the study ends, or until a spacing is told where it serves a job.
+    fn refine(&mut self, curves: Option<&Curves>, serves: bool) -> Result<Refined, String> {
         let mut setups = vec![Setup::default(); self.plan.setups.len()];
         let mut chosen = (setups.len() == 1).then_some(0);
         loop {
             let step = next_step(&self.plan.spec, &self.plan.quantity, &setups, chosen);
             let is_last = matches!(step, Step::End { .. });
-            if let Some(number) = chosen.filter(|_| serves) {
-                let levels: &[MeasuredLevel] = &setups[number].levels;
-                if let Some(told) = tell(self.plan, levels, is_last) {
-                    return Ok((number, levels.to_vec(), Some(told.share)));
-                }
+            let by_levels = |number: usize| Some((number, tell(self.plan, &setups[number], is_last)?.share));
+            let by_short_runs = |curves: &Curves| {
+                let found = short_runs::tell(self.plan, &setups, curves)?;
+                Some((found.setup, found.told.share))
+            };
+            let told = chosen.and_then(by_levels).or_else(|| curves.and_then(by_short_runs)).filter(|_| serves);
+            if let Some((setup, share)) = told {
+                return Ok(Refined { setup, levels: setups[setup].levels.clone(), share: Some(share) });
             }
             match step {
                 Step::Make { setup, level } => {
@@ -136,16 +161,19 @@ impl Runner<'_> {
                     let measured = self.level(&self.plan.setups[setup], share);
                     match measured {
                         Ok(measured) => setups[setup].levels.push(measured),
-                        Err(cause) => {
-                            setups[setup].obstacle = Some((crate::spec::study::RefinementOutcome::Failed, cause));
+                        Err(Ended { reason, message }) if serves => {
+                            setups[setup].pass_or_stop(&self.plan.spec, reason, message);
+                        }
+                        Err(Ended { message, .. }) => {
+                            setups[setup].obstacle = Some((RefinementOutcome::Failed, message));
                         }
                     }
                 }
                 Step::Choose { setup } => chosen = Some(setup),
                 Step::End { message, .. } if serves => return Err(message),
                 Step::End { .. } => {
-                    let number = chosen.unwrap_or(0);
-                    return Ok((number, setups[number].levels.clone(), None));
+                    let setup = chosen.unwrap_or(0);
+                    return Ok(Refined { setup, levels: setups[setup].levels.clone(), share: None });
                 }
             }
         }
@@ -158,8 +186,8 @@ fn of_order(workspace: &Workspace, title: &str, (base, sweep): (&Value, &Value),
         return outcome(title, bound, Err("the sweep is not understood".to_owned()), 0.0);
     };
     let mut runner = Runner { workspace, plan: &plan, base, spent_s: 0.0 };
-    let found = runner.refine(false).and_then(|(_, levels, _)| {
-        let judged = judge(&plan.spec, &plan.quantity, &levels);
+    let found = runner.refine(None, false).and_then(|refined| {
+        let judged = judge(&plan.spec, &plan.quantity, &refined.levels);
         judged.order.map(|order| order.value).ok_or_else(|| "the levels tell no order".to_owned())
     });
     outcome(&format!("{title}: observed order"), bound, found, runner.spent_s)
@@ -230,9 +258,10 @@ fn try_one(workspace: &Workspace, trials: &Trials, trial: &Trial) -> Result<Trie
     let base = for_accuracy::base_of(&body.spec);
     let plan = Plan::new(&sweep, &base).ok_or("the sweep is not understood")?;
     let mut runner = Runner { workspace, plan: &plan, base: &base, spent_s: 0.0 };
-    let (number, mut levels, share) = runner.refine(true)?;
+    let curves = Curves::of_plan(&plan, &base, allowance(), &NoSources, &known).map_err(|_| "no set-up is valid")?;
+    let Refined { setup, mut levels, share } = runner.refine(curves.as_ref(), true)?;
     let share = share.ok_or("no spacing was told")?;
-    let last = runner.level(&plan.setups[number], share)?;
+    let last = runner.level(&plan.setups[setup], share)?;
     let spent = runner.spent_s;
     levels.retain(|level| level.spacing > 1.001 * last.spacing);
     levels.push(last.clone());

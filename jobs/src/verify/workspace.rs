@@ -10,7 +10,7 @@ use crate::spec::work_precision::PrecisionMeasured;
 use crate::system::build;
 use crate::system::digest;
 use crate::worker::calibration;
-use crate::worker::local_run::{self, Keep, Refused};
+use crate::worker::local_run::{self, Ended, Keep, Refused};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -80,8 +80,16 @@ impl Workspace {
         self.directory.join(&digest::of_bytes(key.as_bytes())[..16])
     }
 
+    /// CPU seconds of a run that is made once more.
+    pub(super) fn time_again(&self, body: &Value) -> Result<f64, Ended> {
+        let directory = self.directory.join("again");
+        local_run::run(body, &directory, 1, Keep::Report)?;
+        let lacking = || Ended { reason: None, message: "the run left no report".to_owned() };
+        Ok(read_report(&directory).ok_or_else(lacking)?.cost.cpu_s)
+    }
+
     /// The directory of a run of this build: an earlier one, or one made now.
-    pub(super) fn run(&self, body: &Value, keep: Keep) -> Result<PathBuf, String> {
+    pub(super) fn run(&self, body: &Value, keep: Keep) -> Result<PathBuf, Ended> {
         let directory = self.directory_of(body, keep);
         if read_report(&directory).is_none() {
             local_run::run(body, &directory, 1, keep)?;

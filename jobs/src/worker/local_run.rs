@@ -4,6 +4,7 @@ use crate::spec::attempt_files;
 use crate::spec::attempt_spec::AttemptSpec;
 use crate::spec::body::{self, Allowance, JobBody, NoSources};
 use crate::spec::records::{Record, RecordSink, Usage, Verdict};
+use crate::spec::states::Reason;
 use crate::system::process;
 use crate::worker::attempt;
 use crate::worker::observers::Control;
@@ -38,16 +39,33 @@ impl From<io::Error> for Refused {
     }
 }
 
+/// Why a run came to no success.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct Ended {
+    /// The reason of one that has failed; None of one that was not begun.
+    pub reason: Option<Reason>,
+    /// A sentence.
+    pub message: String,
+}
+
+impl From<Ended> for String {
+    fn from(ended: Ended) -> Self {
+        ended.message
+    }
+}
+
 /// Runs a job body into a directory, which is emptied before, and returns how it was understood.
 ///
 /// # Errors
-/// A sentence.
-pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<JobBody, String> {
-    let (body, verdict) = run_to_verdict(body, directory, threads, keep).map_err(|refused| refused.message)?;
+/// [`Ended`].
+pub fn run(body: &Value, directory: &Path, threads: u64, keep: Keep) -> Result<JobBody, Ended> {
+    let refused = |refused: Refused| Ended { reason: None, message: refused.message };
+    let (body, verdict) = run_to_verdict(body, directory, threads, keep).map_err(refused)?;
     match verdict {
         Verdict::Succeeded => Ok(body),
-        Verdict::Failed { message, .. } => Err(message),
-        other => Err(format!("the run {other}")),
+        Verdict::Failed { reason, message, .. } => Err(Ended { reason: Some(reason), message }),
+        other => Err(Ended { reason: None, message: format!("the run {other}") }),
     }
 }
 

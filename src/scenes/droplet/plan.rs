@@ -5,7 +5,7 @@ use super::dimensionless;
 use super::flow::{FlowPlan, body_force};
 use super::formulation::{Scope, level_and_curvature, pressures};
 use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave};
-use super::numbers::SceneNumbers;
+use super::numbers::{SceneNumbers, smallest_radius};
 use super::own_motion::{StartMotion, motion_at_start};
 use super::spec::{
     Corners, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen, TensionWord,
@@ -341,6 +341,10 @@ impl<const D: usize> Scene for DropletScene<D> {
 
     fn spacing(&self) -> Option<f64> {
         Some(self.spec.spacing)
+    }
+
+    fn size(&self) -> Option<f64> {
+        smallest_radius(&self.shape, self.surface.as_ref())
     }
 
     fn resolved(&self) -> Value {

@@ -117,8 +117,11 @@ impl Found {
     fn new(store: &Store, study: &StudyRow) -> Result<Option<Self>, StoreError> {
         let Some((plan, refinement)) = plan_of(study).zip(study.refinement.as_ref()) else { return Ok(None) };
         let rows = store.levels(&study.id)?;
-        let setups = by_setup(&plan, &rows);
-        let shown = refinement.chosen.map_or(0, |chosen| chosen as usize).min(setups.len().saturating_sub(1));
+        let setups = by_setup(&plan, &rows, refinement.job.is_some());
+        // A set-up that short runs of other scenes told has no levels of its own.
+        let has_levels = |number: &usize| setups.get(*number).is_some_and(|setup| !setup.levels.is_empty());
+        let chosen = refinement.chosen.map(|chosen| chosen as usize).filter(has_levels);
+        let shown = chosen.or_else(|| (0..setups.len()).find(has_levels)).unwrap_or(0);
         Ok(Some(Self { plan, rows, setups, shown }))
     }
 
@@ -131,7 +134,8 @@ impl Found {
     }
 
     fn level_reports(&self, judged: &Assessment) -> Vec<LevelReport> {
-        let rows = self.rows.iter().filter(|row| row.setup as usize == self.shown);
+        let passed = self.setups[self.shown].passed as u64;
+        let rows = self.rows.iter().filter(|row| row.setup as usize == self.shown && row.level >= passed);
         rows.filter_map(|row| Some((row, row.measured.as_ref()?)))
             .zip(&judged.errors)
             .map(|((row, measured), error)| LevelReport {
@@ -168,9 +172,11 @@ pub fn compose(store: &Store, study: &StudyRow) -> Result<Option<RefinementRepor
     let Some(found) = Found::new(store, study)? else { return Ok(None) };
     let Some(refinement) = &study.refinement else { return Ok(None) };
     let judged = found.judge(found.levels());
+    let setup = &found.setups[found.shown];
     let first = found.levels().first().map_or(f64::NAN, |first| first.spacing);
+    let share = |spacing: f64| spacing / first * setup.first_share(found.plan.spec.ratio);
     let next = prediction(&judged, found.levels())
-        .map(|(spacing, cpu_s)| NextLevel { value: found.plan.spec.axis_at(spacing / first), cpu_s });
+        .map(|(spacing, cpu_s)| NextLevel { value: found.plan.spec.axis_at(share(spacing)), cpu_s });
     Ok(Some(RefinementReport {
         study: study.id.clone(),
         quantity: found.plan.quantity.label(),

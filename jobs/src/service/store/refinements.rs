@@ -63,6 +63,8 @@ pub struct LevelRow {
     pub measured: Option<MeasuredLevel>,
     /// State of the job; None where the job is gone.
     pub state: Option<State>,
+    /// Why the job is in its state.
+    pub reason: Option<Reason>,
     /// What failed, with numbers and places.
     pub message: Option<String>,
 }
@@ -135,7 +137,8 @@ impl Store {
     pub fn levels(&self, study: &str) -> Result<Vec<LevelRow>, StoreError> {
         let connection = self.read();
         let mut statement = connection.prepare_cached(
-            "SELECT levels.*, jobs.id AS job_id, jobs.state AS job_state, jobs.message AS job_message FROM levels
+            "SELECT levels.*, jobs.id AS job_id, jobs.state AS job_state, jobs.reason AS job_reason,
+                 jobs.message AS job_message FROM levels
                  LEFT JOIN jobs ON jobs.id = CASE WHEN is_reused THEN levels.job ELSE (SELECT id FROM jobs AS own
                      WHERE own.study = levels.study AND own.study_index = levels.number AND own.superseded = 0) END
              WHERE levels.study = ?1 ORDER BY number",
@@ -430,6 +433,7 @@ fn is_open(transaction: &Transaction, study: &str) -> rusqlite::Result<bool> {
 
 fn level_of(row: &Row) -> rusqlite::Result<LevelRow> {
     let state: Option<String> = row.get("job_state")?;
+    let reason: Option<String> = row.get("job_reason")?;
     let is_reused: bool = row.get("is_reused")?;
     let kept: Option<String> = row.get("job")?;
     Ok(LevelRow {
@@ -441,6 +445,7 @@ fn level_of(row: &Row) -> rusqlite::Result<LevelRow> {
         is_to_repeat: row.get("is_to_repeat")?,
         measured: rows::json(row, "measured")?,
         state: state.as_deref().and_then(State::from_word),
+        reason: reason.as_deref().and_then(Reason::from_word),
         message: row.get("job_message")?,
     })
 }
