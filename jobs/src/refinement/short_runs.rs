@@ -20,13 +20,15 @@ use serde_json::Value;
 /// Looks up what short runs said of an error, by the name of the runs, the quantity and the norm.
 pub type Known<'a, E> = &'a dyn Fn(&str, &str, &str) -> Result<Vec<Level>, E>;
 
-/// Short runs through which the power law goes that is nearest to an error.
-const NEAREST: usize = 4;
+/// Short runs through which the power law goes: those with the nearest spacings.
+const NEAREST: usize = 5;
 /// How far beyond the finest short run a spacing may be told, and beyond the coarsest one.
 const BEYOND: (f64, f64) = (3.0, 2.0);
 /// How much finer than the level, and how much coarser, the spacing may be that is told.
 const FARTHEST: (f64, f64) = (4.0, 2.0);
-/// Standard deviations by which the logarithm of the predicted error is below that of the tolerance: nine of ten runs meet it.
+/// Standard deviation of the logarithm of the length over which a scene varies, by its size, before a level is known.
+const LENGTH_DEVIATION: f64 = 0.25;
+/// Standard deviations of that logarithm which the predicted error covers: nine of ten runs meet their tolerance.
 const CONFIDENCE: f64 = 1.28;
 /// Order below which short runs tell nothing.
 const LEAST_ORDER: f64 = 0.5;
@@ -35,13 +37,17 @@ const LEAST_ORDER: f64 = 0.5;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve(Vec<Level>);
 
-/// A spacing on a curve.
+/// A place on a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// The spacing by the size.
     pub spacing: f64,
+    /// Order of the errors about there.
+    order: f64,
     /// Standard deviation of the logarithm of errors about the power law.
-    pub scatter: f64,
+    scatter: f64,
+    /// Largest logarithm of an error by the power law.
+    highest: f64,
 }
 
 impl Curve {
@@ -53,23 +59,30 @@ impl Curve {
         (usable.len() > 1).then_some(Self(usable))
     }
 
-    /// The spacing with an error, by the power law through the short runs nearest to it; None far beyond them.
+    /// The spacing with an error, by the power law through the short runs about there; None far beyond them.
     #[must_use]
     pub fn place(&self, error: f64) -> Option<Place> {
-        let mut near: Vec<&Level> = self.0.iter().collect();
-        let distance = |level: &Level| (level.value / error).ln().abs();
+        let about = Self::place_by(&self.0, error)?.spacing;
+        let mut near = self.0.clone();
+        let distance = |level: &Level| (level.spacing / about).ln().abs();
         near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         near.truncate(NEAREST);
+        let place = Self::place_by(&near, error)?;
+        let (coarsest, finest) = (self.0.first()?.spacing, self.0.last()?.spacing);
+        let is_near = place.spacing * BEYOND.0 >= finest && place.spacing <= coarsest * BEYOND.1;
+        is_near.then_some(place)
+    }
+
+    fn place_by(levels: &[Level], error: f64) -> Option<Place> {
         let points: Vec<(f64, f64, f64)> =
-            near.iter().map(|level| (level.spacing.ln(), level.value.ln(), 1.0)).collect();
+            levels.iter().map(|level| (level.spacing.ln(), level.value.ln(), 1.0)).collect();
         let Line { slope: order, mean: (x, y), scatter, .. } = Line::through(&points)?;
         if order < LEAST_ORDER {
             return None;
         }
         let spacing = (x + (error.ln() - y) / order).exp();
-        let (coarsest, finest) = (self.0.first()?.spacing, self.0.last()?.spacing);
-        let is_near = spacing * BEYOND.0 >= finest && spacing <= coarsest * BEYOND.1;
-        is_near.then_some(Place { spacing, scatter: scatter.unwrap_or(0.0) })
+        let above = points.iter().map(|point| point.1 - y - order * (point.0 - x));
+        Some(Place { spacing, order, scatter: scatter.unwrap_or(0.0), highest: above.fold(0.0, f64::max) })
     }
 
     /// CPU seconds of a short run with a spacing.
@@ -104,6 +117,9 @@ pub fn curve_of<E>(body: &JobBody, (quantity, norm): (&str, &str), known: Known<
 #[derive(Debug, Clone)]
 pub struct Curves {
     by_setup: Vec<Option<Curve>>,
+    /// The length that spacings go by.
+    size: f64,
+    /// The error that errors go by.
     error_scale: f64,
 }
 
@@ -123,7 +139,7 @@ impl Curves {
         if plan.spec.until.relative {
             return Ok(None);
         }
-        let (mut by_setup, mut scale) = (Vec::new(), None);
+        let (mut by_setup, mut scales) = (Vec::new(), None);
         for setup in &plan.setups {
             let body = match point_body(base, &plan.spec.point(base, setup, 0), allowance, sources) {
                 Ok(body) => body,
@@ -134,10 +150,10 @@ impl Curves {
                 Err(error) => return Err(error),
             };
             let size = body.scene.size();
-            scale = scale.or(size.map(|size| error_scale(body.scene.as_ref(), quantity, size)));
+            scales = scales.or(size.map(|size| (size, error_scale(body.scene.as_ref(), quantity, size))));
             by_setup.push(curve_of(&body, (quantity, norm), known).map_err(BodyError::Lookup)?);
         }
-        Ok(scale.map(|error_scale| Self { by_setup, error_scale }))
+        Ok(scales.map(|(size, error_scale)| Self { by_setup, size, error_scale }))
     }
 }
 
@@ -163,12 +179,14 @@ pub fn tell(plan: &Plan, setups: &[Setup], curves: &Curves) -> Option<Foretold> 
         Some((level.spacing, level.spacing / setup.finest_share(plan.spec.ratio), place))
     };
     let (level_spacing, first_spacing, pilot) = (0..setups.len()).find_map(known)?;
-    let length = level_spacing / pilot.spacing;
+    let Length { length, deviation } =
+        Length::by(level_spacing / pilot.spacing, pilot.scatter / pilot.order, curves.size);
     let tolerance = plan.spec.until.tolerance;
     let told = |number: usize| {
         let curve = curve(number).filter(|_| setups[number].obstacle.is_none())?;
-        let scatter = curve.place(tolerance / curves.error_scale)?.scatter.hypot(pilot.scatter);
-        let goal = tolerance / SAFETY / (CONFIDENCE * scatter).exp();
+        let about = curve.place(tolerance / curves.error_scale)?;
+        let margin = about.highest.hypot(CONFIDENCE * deviation * about.order).exp();
+        let goal = tolerance / SAFETY / margin;
         let place = curve.place(goal / curves.error_scale)?;
         let spacing = length * place.spacing;
         let is_near = spacing * FARTHEST.0 >= level_spacing && spacing <= level_spacing * FARTHEST.1;
@@ -185,6 +203,23 @@ pub fn tell(plan: &Plan, setups: &[Setup], curves: &Curves) -> Option<Foretold> 
     let mut levels: Vec<KnownLevel> = short_runs.chain(setups[setup].levels.iter().map(KnownLevel::from)).collect();
     levels.sort_by(|a, b| b.spacing.total_cmp(&a.spacing));
     Some(Foretold { setup, told, levels })
+}
+
+/// The length over which a scene varies.
+struct Length {
+    length: f64,
+    /// Standard deviation of its logarithm.
+    deviation: f64,
+}
+
+impl Length {
+    /// The mean of the length that a level tells, whose logarithm has a deviation, and of the size of the scene: where errors scatter
+    /// a single level says little.
+    fn by(told: f64, deviation: f64, size: f64) -> Self {
+        let (of_level, of_size) = (deviation.max(1e-3).powi(-2), LENGTH_DEVIATION.powi(-2));
+        let mean = (of_level * told.ln() + of_size * size.ln()) / (of_level + of_size);
+        Self { length: mean.exp(), deviation: (of_level + of_size).sqrt().recip() }
+    }
 }
 
 #[cfg(test)]
@@ -233,8 +268,11 @@ mod tests {
 
     #[test]
     fn one_level_tells_the_spacing_of_every_set_up() {
-        let curves =
-            Curves { by_setup: vec![Some(curve(4.0, 1.0, 0.0)), Some(curve(6.0, 1.5, 0.0))], error_scale: 1.0 };
+        let curves = Curves {
+            by_setup: vec![Some(curve(4.0, 1.0, 0.0)), Some(curve(6.0, 1.5, 0.0))],
+            size: 0.25,
+            error_scale: 1.0,
+        };
         // Order 4 is cheaper where little is asked for, order 6 where much is.
         for (tolerance, setup, order) in [(1e-2, 0, 4), (1e-5, 1, 6)] {
             let found = tell(&plan(tolerance), &setups(0.05), &curves).unwrap();
@@ -249,7 +287,7 @@ mod tests {
     #[test]
     fn where_errors_scatter_the_spacing_is_finer() {
         let told = |noise: f64| {
-            let curves = Curves { by_setup: vec![Some(curve(4.0, 1.0, noise)), None], error_scale: 1.0 };
+            let curves = Curves { by_setup: vec![Some(curve(4.0, 1.0, noise)), None], size: 0.25, error_scale: 1.0 };
             tell(&plan(1e-3), &setups(0.05), &curves).unwrap().told
         };
         let (smooth, rough) = (told(0.0), told(0.5));

@@ -8,6 +8,8 @@ use crate::spec::study::MeasuredLevel;
 
 /// How much finer than the finest level the spacing may be that is told: orders are not known to the last digit.
 const FARTHEST: f64 = 2.2;
+/// The same of values without an exact answer, whose errors are not known either.
+const FARTHEST_OF_VALUES: f64 = 1.5;
 /// How much smaller than the tolerance the predicted error is.
 pub(super) const SAFETY: f64 = 1.25;
 /// Uncertainty of an order: with it the safety grows by the distance over which it is used.
@@ -41,7 +43,8 @@ fn by_levels(plan: &Plan, levels: &[MeasuredLevel], is_last: bool) -> Option<Tol
     let order = judged.order.map(|order| order.value).into_iter().chain(theory).reduce(f64::min)?;
     let uncertainty = judged.uncertainty?;
     let distance = finest.spacing / judged.next_spacing?;
-    let is_near = distance <= FARTHEST && judged.convergence == Some(Convergence::Monotone);
+    let farthest = if plan.quantity.is_error() { FARTHEST } else { FARTHEST_OF_VALUES };
+    let is_near = distance <= farthest && judged.convergence == Some(Convergence::Monotone);
     if levels.len() < plan.spec.levels.least as usize || !(is_near || is_last) {
         return None;
     }
