@@ -2,7 +2,7 @@
 
 use meniscus_jobs::service::store::Store;
 use meniscus_jobs::spec::calibration::Measurements;
-use std::io;
+use std::io::{self, BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -37,19 +37,28 @@ fn measure(store: &Store, threads: usize) -> io::Result<usize> {
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()?;
-    // The process ends when its input closes, and `wait_with_output` would close it.
-    let input = child.stdin.take();
-    let output = child.wait_with_output()?;
-    drop(input);
-    let said = String::from_utf8_lossy(&output.stderr);
-    if !output.status.success() {
-        return Err(io::Error::other(format!("the measuring process failed: {}", said.trim())));
+    // The process ends when its input closes.
+    let _input = child.stdin.take();
+    let said = child.stderr.take().map(|said| std::thread::spawn(|| lines_of(said)));
+    let mut phases = 0;
+    for line in child.stdout.take().map(BufReader::new).into_iter().flat_map(BufRead::lines) {
+        let found: Measurements = serde_json::from_str(&line?)?;
+        phases += found.phases.len();
+        store.calibrate(&found.phases).map_err(io::Error::other)?;
+        store.keep_precision(&found.precision).map_err(io::Error::other)?;
     }
-    for line in said.lines() {
+    let status = child.wait()?;
+    let said = said.and_then(|said| said.join().ok()).unwrap_or_default();
+    if !status.success() {
+        return Err(io::Error::other(format!("the measuring process failed: {}", said.join("; "))));
+    }
+    for line in said {
         tracing::warn!(line, "the measuring process could not do all of its runs");
     }
-    let found: Measurements = serde_json::from_slice(&output.stdout)?;
-    store.calibrate(&found.phases).map_err(io::Error::other)?;
-    store.keep_precision(&found.precision).map_err(io::Error::other)?;
-    Ok(found.phases.len())
+    Ok(phases)
+}
+
+/// What the process says on its standard error.
+fn lines_of(said: impl Read) -> Vec<String> {
+    BufReader::new(said).lines().map_while(Result::ok).collect()
 }

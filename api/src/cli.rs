@@ -253,19 +253,19 @@ fn calibrate(scratch: &Path, threads: u64) -> ExitCode {
     if std::fs::read_dir(scratch).is_ok_and(|mut entries| entries.next().is_some()) {
         return fail(&format!("{} is not empty", scratch.display()));
     }
-    let measured = worker::calibration::measure_here(scratch, threads).and_then(|phases| {
-        let failed = |error: &str| {
-            fail(&error);
-        };
-        let precision = worker::calibration::precision_here(scratch, threads, &failed)?;
-        Ok(Measurements { phases, precision })
-    });
-    let found = match measured {
-        Ok(found) => found,
-        Err(error) => return fail(&error),
+    // Speeds are known long before errors are: each is a line of its own.
+    let hand_over = |found: &Measurements| {
+        let line = serde_json::to_string(found).map_err(|error| error.to_string())?;
+        writeln!(std::io::stdout().lock(), "{line}").map_err(|error| error.to_string())
     };
-    let written = serde_json::to_writer(std::io::stdout().lock(), &found);
-    written.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
+    let failed = |error: &str| {
+        fail(&error);
+    };
+    let measured = worker::calibration::measure_here(scratch, threads)
+        .and_then(|phases| hand_over(&Measurements { phases, ..Measurements::default() }))
+        .and_then(|()| worker::calibration::precision_here(scratch, threads, &failed))
+        .and_then(|precision| hand_over(&Measurements { precision, ..Measurements::default() }));
+    measured.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
 }
 
 fn fail(error: &dyn Display) -> ExitCode {

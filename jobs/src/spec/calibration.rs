@@ -30,7 +30,7 @@ pub struct PhaseMeasured {
     pub measured: Measured,
 }
 
-/// What `meniscus calibrate` hands over.
+/// What `meniscus calibrate` hands over, in a line each: first the speeds, then the errors.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurements {
     /// Speed of this machine, by phase.
