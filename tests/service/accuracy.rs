@@ -2,6 +2,8 @@
 
 use crate::service;
 use crate::support::{Service, eventually};
+use meniscus_jobs::service::store::Store;
+use meniscus_jobs::spec::work_precision::{PrecisionMeasured, reference_of};
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -86,6 +88,77 @@ fn a_job_that_waits_survives_a_crash_and_takes_its_study_along_when_it_is_cancel
     assert_eq!(job["reason"], "dependency.failed");
     assert!(service.stop());
     service.fsck();
+}
+
+/// What `meniscus calibrate` would say of the distance: errors hⁿ⁺¹ with the degree n, times a factor.
+fn precision(factor: f64) -> Vec<PrecisionMeasured> {
+    let scene = json!({"kind": "redistance", "shape": {"type": "circle", "radius": 1.0}});
+    let mut rows = Vec::new();
+    for degree in [3, 4, 5, 6] {
+        let method = json!({"type": "pcp", "degree": degree});
+        let mut scene = scene.clone();
+        scene["method"] = method.clone();
+        let scene = meniscus::scene::parse(&scene, meniscus::scenes::SCENES).unwrap();
+        let name = reference_of(scene.as_ref(), Some(("/method", &method)));
+        rows.extend([0.3, 0.2, 0.14, 0.1, 0.07, 0.05_f64].map(|spacing| PrecisionMeasured {
+            problem: name.clone(),
+            quantity: "phi".to_owned(),
+            norm: "rms".to_owned(),
+            spacing,
+            error: factor * spacing.powi(degree + 1),
+            cpu_s: 1e-4 * f64::from(degree) * spacing.powi(-2),
+        }));
+    }
+    rows
+}
+
+#[test]
+fn short_runs_and_one_level_tell_the_spacing_and_the_degree() {
+    let (directory, mut service) = service(&["--slots", "1"]);
+    assert!(service.stop());
+    let store = Store::open(directory.path()).unwrap();
+    store.keep_precision(&precision(0.1)).unwrap();
+    store.close();
+    service.restart();
+    let id = service.submit(&wanted(1e-8));
+    let job = service.wait_for(&id, &["succeeded"]);
+    let accuracy = &job["resolved"]["accuracy"];
+    assert!(accuracy["basis"].as_str().unwrap().contains("1 level of std_"), "{accuracy}");
+    assert!(accuracy["levels"].as_array().unwrap().len() >= 6, "{accuracy}");
+    let study = study_of(&service, &job);
+    assert_eq!(study["outcome"], "tolerance", "{study}");
+    let report = service.get(&format!("/v1/studies/{}/report", study["id"].as_str().unwrap())).json();
+    assert_eq!(report["levels"].as_array().map(Vec::len), Some(1), "{report}");
+    let chosen: Vec<&Value> =
+        report["alternatives"].as_array().unwrap().iter().filter(|one| one["chosen"] == true).collect();
+    assert_eq!(chosen.len(), 1, "{report}");
+    assert_eq!(chosen[0]["point"]["/scene/method"]["degree"], job["resolved"]["scene"]["method"]["degree"]);
+    let report = service.get(&format!("/v1/jobs/{id}/report")).json();
+    assert_eq!(report["accuracy"]["met"], true, "{report}");
+    assert!(service.stop());
+    service.fsck();
+}
+
+#[test]
+fn first_levels_that_a_check_ends_are_passed_over() {
+    let (_directory, service) = service(&["--slots", "1"]);
+    // The filament of this flow is finer than the first levels resolve.
+    let body = json!({"scene": {"kind": "vortex", "flow": {"type": "single_vortex", "period": 6}, "end_time": 3},
+        "accuracy": {"quantity": {"error": {"quantity": "phi", "norm": "rms"}}, "tolerance": 2e-3}});
+    let id = service.submit(&body);
+    let job = service.wait_for(&id, &["succeeded", "failed"]);
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let study = study_of(&service, &job);
+    let path = format!("/v1/studies/{}", study["id"].as_str().unwrap());
+    let jobs = service.get(&format!("/v1/jobs?study={}", study["id"].as_str().unwrap())).json();
+    let failed = jobs["items"].as_array().unwrap().iter().filter(|job| job["state"] == "failed").count();
+    assert!(failed >= 1, "{jobs}");
+    let report = service.get(&format!("{path}/report")).json();
+    assert!(report["levels"][0]["index"].as_u64().unwrap() >= failed as u64, "{report}");
+    let spacing = job["resolved"]["scene"]["spacing"].as_f64().unwrap();
+    let levels = report["levels"].as_array().unwrap();
+    let finest = levels.last().unwrap()["spacing"].as_f64().unwrap();
+    assert!(spacing < 1.001 * levels[0]["spacing"].as_f64().unwrap() && spacing > 0.3 * finest, "{spacing}: {report}");
 }
 
 #[test]
