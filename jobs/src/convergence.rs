@@ -13,7 +13,7 @@ mod order;
 
 pub use assessment::{Assessment, Convergence, Target, assess};
 pub use cost::Cost;
-pub use fits::Line;
+pub use fits::Parabola;
 pub use order::Order;
 
 /// What the values of the levels are.

@@ -2,6 +2,8 @@
 //!
 //! The weights are 1/h (Eça 2014, eq. 9): fine levels count more than coarse ones, where the leading term does not lead yet.
 
+use nalgebra::{DMatrix, DVector};
+
 /// Quantiles of Student's t for 95 % to both sides, for 1, 2, … degrees of freedom.
 const STUDENT_95: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
 
@@ -24,46 +26,72 @@ pub struct Fitted {
     pub degrees_of_freedom: usize,
 }
 
-/// A line fitted to points (x, y) with weights.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
-    /// Its slope.
-    pub slope: f64,
-    /// A place on it: the weighted mean of the points.
-    pub mean: (f64, f64),
-    /// Standard deviation of the points about it, where there are more than two.
-    pub scatter: Option<f64>,
-    /// Weighted sum of squares of x about the mean, by the mean weight.
-    spread: f64,
-    degrees_of_freedom: usize,
-}
-
-impl Line {
-    /// The line through points (x, y, weight); None for fewer than two places x.
-    #[must_use]
-    pub fn through(points: &[(f64, f64, f64)]) -> Option<Self> {
-        let total: f64 = points.iter().map(|(_, _, w)| w).sum();
-        let mean = |pick: fn(&(f64, f64, f64)) -> f64| points.iter().map(|p| p.2 * pick(p)).sum::<f64>() / total;
-        let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-        let spread: f64 = points.iter().map(|p| p.2 * (p.0 - x).powi(2)).sum();
-        if spread.is_nan() || spread <= 1e-12 * total {
-            return None;
-        }
-        let slope = points.iter().map(|p| p.2 * (p.0 - x) * (p.1 - y)).sum::<f64>() / spread;
-        let degrees_of_freedom = points.len().saturating_sub(2);
-        let mean_weight = total / points.len() as f64;
-        let squares: f64 = points.iter().map(|p| p.2 * (p.1 - y - slope * (p.0 - x)).powi(2)).sum();
-        let scatter = (degrees_of_freedom > 0).then(|| (squares / mean_weight / degrees_of_freedom as f64).sqrt());
-        Some(Self { slope, mean: (x, y), scatter, spread: spread / mean_weight, degrees_of_freedom })
-    }
-}
-
 /// The slope of the line through points (x, y) with weights; None for fewer than two places x.
 #[must_use]
 pub fn slope(points: &[(f64, f64, f64)]) -> Option<Fitted> {
-    let line = Line::through(points)?;
-    let deviation = line.scatter.map(|scatter| scatter / line.spread.sqrt());
-    Some(Fitted { value: line.slope, deviation, degrees_of_freedom: line.degrees_of_freedom })
+    let total: f64 = points.iter().map(|(_, _, w)| w).sum();
+    let mean = |pick: fn(&(f64, f64, f64)) -> f64| points.iter().map(|p| p.2 * pick(p)).sum::<f64>() / total;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let spread: f64 = points.iter().map(|p| p.2 * (p.0 - x).powi(2)).sum();
+    if spread.is_nan() || spread <= 1e-12 * total {
+        return None;
+    }
+    let value = points.iter().map(|p| p.2 * (p.0 - x) * (p.1 - y)).sum::<f64>() / spread;
+    let degrees_of_freedom = points.len().saturating_sub(2);
+    let squares: f64 = points.iter().map(|p| p.2 * (p.1 - y - value * (p.0 - x)).powi(2)).sum();
+    let deviation = (degrees_of_freedom > 0).then(|| (squares / degrees_of_freedom as f64 / spread).sqrt());
+    Some(Fitted { value, deviation, degrees_of_freedom })
+}
+
+/// The parabola, or the line, that is nearest to points by least squares; beyond the outermost points it goes on straight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parabola {
+    /// Mean place of the points.
+    middle: f64,
+    /// Value, slope and half the second derivative there.
+    coefficients: [f64; 3],
+    /// The outermost places.
+    ends: (f64, f64),
+}
+
+impl Parabola {
+    /// Through points (x, y) with two unknowns, a line, or three; None for fewer places.
+    #[must_use]
+    pub fn through(points: &[(f64, f64)], unknowns: usize) -> Option<Self> {
+        let unknowns = unknowns.min(3);
+        if points.len() < unknowns.max(1) {
+            return None;
+        }
+        let middle = points.iter().map(|(x, _)| x).sum::<f64>() / points.len() as f64;
+        let matrix = DMatrix::from_fn(points.len(), unknowns, |k, power| (points[k].0 - middle).powi(power as i32));
+        let values = DVector::from_iterator(points.len(), points.iter().map(|(_, y)| *y));
+        let decomposed = matrix.svd(true, true);
+        if decomposed.rank(1e-9 * decomposed.singular_values.max()) < unknowns {
+            return None;
+        }
+        let found = decomposed.solve(&values, 0.0).ok()?;
+        let mut coefficients = [0.0; 3];
+        coefficients[..found.len()].copy_from_slice(found.as_slice());
+        let end = |pick: fn(f64, f64) -> f64, from: f64| points.iter().fold(from, |end, (x, _)| pick(end, *x));
+        let ends = (end(f64::min, f64::INFINITY), end(f64::max, f64::NEG_INFINITY));
+        Some(Self { middle, coefficients, ends })
+    }
+
+    /// The value at a place.
+    #[must_use]
+    pub fn at(&self, x: f64) -> f64 {
+        let inside = x.clamp(self.ends.0, self.ends.1);
+        let [value, slope, bend] = self.coefficients;
+        let from_middle = inside - self.middle;
+        value + (slope + bend * from_middle) * from_middle + self.slope(x) * (x - inside)
+    }
+
+    /// The slope at a place.
+    #[must_use]
+    pub fn slope(&self, x: f64) -> f64 {
+        let [_, slope, bend] = self.coefficients;
+        slope + 2.0 * bend * (x.clamp(self.ends.0, self.ends.1) - self.middle)
+    }
 }
 
 /// Orders between which a power law is looked for.
@@ -142,7 +170,7 @@ fn minimum(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{power_law, slope, student_95};
+    use super::{Parabola, power_law, slope, student_95};
 
     #[test]
     fn exact_powers_come_back() {
@@ -157,6 +185,21 @@ mod tests {
             let line = slope(&lines).unwrap();
             assert!((line.value - p).abs() < 1e-10 && line.deviation.unwrap() < 1e-6);
         }
+    }
+
+    #[test]
+    fn a_parabola_comes_back_and_goes_on_straight() {
+        let value = |x: f64| 3.0 - 2.0 * x + 0.5 * x * x;
+        let points: Vec<(f64, f64)> = [-1.0, 0.2, 1.0, 1.5, 3.0].map(|x| (x, value(x))).to_vec();
+        let fit = Parabola::through(&points, 3).unwrap();
+        assert!((fit.at(2.2) - value(2.2)).abs() < 1e-12 && (fit.slope(2.2) - 0.2).abs() < 1e-12);
+        assert!((fit.at(5.0) - value(3.0) - 2.0).abs() < 1e-12, "the slope at 3 is 1");
+        let line = Parabola::through(&points[..2], 2).unwrap();
+        assert!((line.at(-1.0) - value(-1.0)).abs() < 1e-12);
+        for (count, unknowns) in [(0, 2), (1, 2), (2, 3)] {
+            assert!(Parabola::through(&points[..count], unknowns).is_none());
+        }
+        assert!(Parabola::through(&[(1.0, 1.0), (1.0, 2.0), (1.0, 3.0)], 2).is_none(), "one place tells no slope");
     }
 
     #[test]

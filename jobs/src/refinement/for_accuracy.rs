@@ -86,6 +86,12 @@ impl<S: Sources> Search<'_, S> {
         }
     }
 
+    /// Whether nothing is doubtful of a level before it runs that is not so of the body itself.
+    fn is_no_more_doubtful(&self, level: &JobBody) -> bool {
+        let known = self.body.scene.warnings();
+        level.scene.warnings().iter().all(|found| known.iter().any(|known| known.code == found.code))
+    }
+
     /// The value of the axis for a spacing.
     fn axis_value(&self, spacing: f64) -> Option<f64> {
         Some(self.axis_value_by_default(spacing / self.body.scene.spacing()?))
@@ -112,7 +118,7 @@ impl<S: Sources> Search<'_, S> {
             let Some(value) = self.axis_value(spacing * coarser) else { return Ok(None) };
             let given: Vec<Choice> = choice.iter().cloned().chain([(self.wanted.axis, json!(value))]).collect();
             let level = self.body_with(&given)?;
-            if level.is_some_and(|level| level.scene.warnings().is_empty()) {
+            if level.is_some_and(|level| self.is_no_more_doubtful(&level)) {
                 let mut open: Vec<OpenChoice> = Vec::new();
                 for (pointer, value) in begins.into_iter().filter_map(|begin| begin.choice) {
                     match open.iter_mut().find(|(known, _)| *known == pointer) {
@@ -168,7 +174,7 @@ impl<S: Sources> Search<'_, S> {
         for coarser in FIRST_SPACINGS {
             let value = self.axis_value_by_default(coarser);
             let level = self.body_with(&[(self.wanted.axis, json!(value))])?;
-            if level.is_some_and(|level| level.scene.warnings().is_empty()) {
+            if level.is_some_and(|level| self.is_no_more_doubtful(&level)) {
                 return Ok(value);
             }
         }

@@ -7,7 +7,7 @@
 use super::Plan;
 use super::decision::Setup;
 use super::spacing::{SAFETY, Told};
-use crate::convergence::{Level, Line};
+use crate::convergence::{Level, Parabola};
 use crate::spec::accuracy::KnownLevel;
 use crate::spec::body::{Allowance, BodyError, JobBody, Sources};
 use crate::spec::quantity::Quantity;
@@ -20,22 +20,30 @@ use serde_json::Value;
 /// Looks up what short runs said of an error, by the name of the runs, the quantity and the norm.
 pub type Known<'a, E> = &'a dyn Fn(&str, &str, &str) -> Result<Vec<Level>, E>;
 
-/// Short runs through which the power law goes: those with the nearest spacings.
-const NEAREST: usize = 5;
+/// Short runs from which on the order may change with the spacing.
+const BENT: usize = 5;
 /// How far beyond the finest short run a spacing may be told, and beyond the coarsest one.
 const BEYOND: (f64, f64) = (3.0, 2.0);
 /// How much finer than the level, and how much coarser, the spacing may be that is told.
 const FARTHEST: (f64, f64) = (4.0, 2.0);
 /// Standard deviation of the logarithm of the length over which a scene varies, by its size, before a level is known.
-const LENGTH_DEVIATION: f64 = 0.25;
+const LENGTH_DEVIATION: f64 = 0.35;
 /// Standard deviations of that logarithm which the predicted error covers: nine of ten runs meet their tolerance.
 const CONFIDENCE: f64 = 1.28;
 /// Order below which short runs tell nothing.
 const LEAST_ORDER: f64 = 0.5;
 
-/// Errors and costs of a set-up over the spacing, both by the size of the scene of the short runs; the coarsest comes first.
+/// Errors and costs of a set-up over the spacing, both by the size of the scene of the short runs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve(Vec<Level>);
+pub struct Curve {
+    /// The short runs, the coarsest first.
+    runs: Vec<Level>,
+    fit: Parabola,
+    /// Standard deviation of the logarithm of errors about the fit.
+    scatter: f64,
+    /// Largest logarithm of an error by the fit.
+    highest: f64,
+}
 
 /// A place on a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,51 +52,45 @@ pub struct Place {
     pub spacing: f64,
     /// Order of the errors about there.
     order: f64,
-    /// Standard deviation of the logarithm of errors about the power law.
-    scatter: f64,
-    /// Largest logarithm of an error by the power law.
-    highest: f64,
 }
 
 impl Curve {
-    /// Short runs with finite errors; None for fewer than two.
+    /// The curve of short runs, the coarsest first: a power law, and from five runs on one whose order changes with the logarithm of
+    /// the spacing. None for fewer than two runs with an error.
     #[must_use]
     pub fn new(levels: Vec<Level>) -> Option<Self> {
-        let usable: Vec<Level> =
-            levels.into_iter().filter(|level| level.value > 0.0 && level.value.is_finite()).collect();
-        (usable.len() > 1).then_some(Self(usable))
+        let is_usable = |level: &Level| level.value > 0.0 && level.value.is_finite();
+        let runs: Vec<Level> = levels.into_iter().filter(is_usable).collect();
+        let points: Vec<(f64, f64)> = runs.iter().map(|run| (run.spacing.ln(), run.value.ln())).collect();
+        let unknowns = if runs.len() < BENT { 2 } else { 3 };
+        let fit = Parabola::through(&points, unknowns)?;
+        let above = points.iter().map(|(x, y)| y - fit.at(*x));
+        let squares: f64 = above.clone().map(|above| above * above).sum();
+        let scatter = (squares / points.len().saturating_sub(unknowns).max(1) as f64).sqrt();
+        Some(Self { runs, fit, scatter, highest: above.fold(0.0, f64::max) })
     }
 
-    /// The spacing with an error, by the power law through the short runs about there; None far beyond them.
+    /// The place with an error; None far beyond the short runs, and where errors hardly fall.
     #[must_use]
     pub fn place(&self, error: f64) -> Option<Place> {
-        let about = Self::place_by(&self.0, error)?.spacing;
-        let mut near = self.0.clone();
-        let distance = |level: &Level| (level.spacing / about).ln().abs();
-        near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-        near.truncate(NEAREST);
-        let place = Self::place_by(&near, error)?;
-        let (coarsest, finest) = (self.0.first()?.spacing, self.0.last()?.spacing);
-        let is_near = place.spacing * BEYOND.0 >= finest && place.spacing <= coarsest * BEYOND.1;
-        is_near.then_some(place)
-    }
-
-    fn place_by(levels: &[Level], error: f64) -> Option<Place> {
-        let points: Vec<(f64, f64, f64)> =
-            levels.iter().map(|level| (level.spacing.ln(), level.value.ln(), 1.0)).collect();
-        let Line { slope: order, mean: (x, y), scatter, .. } = Line::through(&points)?;
-        if order < LEAST_ORDER {
+        let (coarsest, finest) = (self.runs.first()?.spacing, self.runs.last()?.spacing);
+        let (mut fine, mut coarse) = ((finest / BEYOND.0).ln(), (coarsest * BEYOND.1).ln());
+        let excess = |x: f64| self.fit.at(x) - error.ln();
+        if excess(fine) > 0.0 || excess(coarse) < 0.0 {
             return None;
         }
-        let spacing = (x + (error.ln() - y) / order).exp();
-        let above = points.iter().map(|point| point.1 - y - order * (point.0 - x));
-        Some(Place { spacing, order, scatter: scatter.unwrap_or(0.0), highest: above.fold(0.0, f64::max) })
+        for _ in 0..60 {
+            let middle = 0.5 * (fine + coarse);
+            if excess(middle) > 0.0 { coarse = middle } else { fine = middle }
+        }
+        let order = self.fit.slope(fine);
+        (order >= LEAST_ORDER).then_some(Place { spacing: fine.exp(), order })
     }
 
     /// CPU seconds of a short run with a spacing.
     #[must_use]
     pub fn cost(&self, spacing: f64) -> Option<f64> {
-        cost_at(&self.0, spacing)
+        cost_at(&self.runs, spacing)
     }
 }
 
@@ -176,16 +178,16 @@ pub fn tell(plan: &Plan, setups: &[Setup], curves: &Curves) -> Option<Foretold> 
         let (setup, curve) = (&setups[number], curve(number)?);
         let level = setup.levels.last()?;
         let place = curve.place(level.value / curves.error_scale)?;
-        Some((level.spacing, level.spacing / setup.finest_share(plan.spec.ratio), place))
+        let deviation = curve.scatter / place.order;
+        Some((level.spacing, level.spacing / setup.finest_share(plan.spec.ratio), (place.spacing, deviation)))
     };
-    let (level_spacing, first_spacing, pilot) = (0..setups.len()).find_map(known)?;
-    let Length { length, deviation } =
-        Length::by(level_spacing / pilot.spacing, pilot.scatter / pilot.order, curves.size);
+    let (level_spacing, first_spacing, (pilot, told_deviation)) = (0..setups.len()).find_map(known)?;
+    let Length { length, deviation } = Length::by(level_spacing / pilot, told_deviation, curves.size);
     let tolerance = plan.spec.until.tolerance;
     let told = |number: usize| {
         let curve = curve(number).filter(|_| setups[number].obstacle.is_none())?;
         let about = curve.place(tolerance / curves.error_scale)?;
-        let margin = about.highest.hypot(CONFIDENCE * deviation * about.order).exp();
+        let margin = curve.highest.hypot(CONFIDENCE * deviation * about.order).exp();
         let goal = tolerance / SAFETY / margin;
         let place = curve.place(goal / curves.error_scale)?;
         let spacing = length * place.spacing;
@@ -199,7 +201,7 @@ pub fn tell(plan: &Plan, setups: &[Setup], curves: &Curves) -> Option<Foretold> 
         value: run.value * curves.error_scale,
         cpu_s: run.cpu_s,
     };
-    let short_runs = curve(setup)?.0.iter().map(as_here);
+    let short_runs = curve(setup)?.runs.iter().map(as_here);
     let mut levels: Vec<KnownLevel> = short_runs.chain(setups[setup].levels.iter().map(KnownLevel::from)).collect();
     levels.sort_by(|a, b| b.spacing.total_cmp(&a.spacing));
     Some(Foretold { setup, told, levels })
@@ -250,12 +252,12 @@ mod tests {
     fn a_curve_tells_the_spacing_of_an_error_between_its_runs_and_beyond_them() {
         for spacing in [0.3, 0.15, 0.05_f64] {
             let place = curve(3.0, 1.0, 0.0).place(spacing.powi(3)).unwrap();
-            assert!((place.spacing / spacing - 1.0).abs() < 1e-12 && place.scatter < 1e-12, "{place:?}");
+            assert!((place.spacing / spacing - 1.0).abs() < 1e-9 && (place.order - 3.0).abs() < 1e-9, "{place:?}");
             assert!((curve(3.0, 2.0, 0.0).cost(spacing).unwrap() * spacing.powi(2) / 2.0 - 1.0).abs() < 1e-9);
         }
         assert!(curve(3.0, 1.0, 0.0).place(1e-9).is_none(), "far beyond");
         assert!(curve(0.0, 1.0, 0.0).place(0.5).is_none(), "no order");
-        assert!(curve(3.0, 1.0, 0.3).place(0.01).unwrap().scatter > 0.2);
+        assert!(curve(3.0, 1.0, 0.3).scatter > 0.2 && curve(3.0, 1.0, 0.0).scatter < 1e-9);
         let level = Level { spacing: 0.1, value: f64::NAN, cpu_s: 1.0 };
         assert!(Curve::new(vec![level, level]).is_none());
     }

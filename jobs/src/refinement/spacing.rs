@@ -56,17 +56,18 @@ fn by_levels(plan: &Plan, levels: &[MeasuredLevel], is_last: bool) -> Option<Tol
 /// A spacing among those of the levels, one of which meets the tolerance: between it and the one before it, where errors are powers.
 fn among(plan: &Plan, levels: &[MeasuredLevel], judged: &Assessment) -> Told {
     let first = levels.first().map_or(1.0, |first| first.spacing);
-    let known = |count: usize| judge(&plan.spec, &plan.quantity, &levels[..count]).uncertainty;
-    let uncertainty =
-        |k: usize| if plan.quantity.is_error() { known(k + 1) } else { known(k + 1).or(judged.errors[k]) };
-    let goal = plan.spec.until.tolerance / SAFETY;
+    let uncertainty = |k: usize| judge(&plan.spec, &plan.quantity, &levels[..=k]).uncertainty;
+    // The error of a value is known by the levels before it alone: the run has the spacing of a level.
+    let is_error = plan.quantity.is_error();
+    let goal = plan.spec.until.tolerance / if is_error { SAFETY } else { 1.0 };
     let is_good = |k: &usize| (*k..levels.len()).all(|k| uncertainty(k).is_some_and(|error| error <= goal));
     let Some(k) = (0..levels.len()).find(is_good) else {
         let finest = levels.last().map_or(1.0, |finest| finest.spacing);
         return Told { share: finest / first, predicted: judged.uncertainty.unwrap_or(goal) };
     };
     let here = (levels[k].spacing, uncertainty(k).unwrap_or(goal));
-    let before = k.checked_sub(1).and_then(|before| Some((levels[before].spacing, uncertainty(before)?)));
+    let before =
+        k.checked_sub(1).filter(|_| is_error).and_then(|before| Some((levels[before].spacing, uncertainty(before)?)));
     let between = before.filter(|(_, error)| *error > here.1).map(|(spacing, error)| {
         let order = (error / here.1).ln() / (spacing / here.0).ln();
         (here.0 * (goal / here.1).powf(order.recip())).clamp(here.0, spacing)
