@@ -73,6 +73,9 @@ impl Curve {
     /// The place with an error; None far beyond the short runs, and where errors hardly fall.
     #[must_use]
     pub fn place(&self, error: f64) -> Option<Place> {
+        if !(error > 0.0 && error.is_finite()) {
+            return None;
+        }
         let (coarsest, finest) = (self.runs.first()?.spacing, self.runs.last()?.spacing);
         let (mut fine, mut coarse) = ((finest / BEYOND.0).ln(), (coarsest * BEYOND.1).ln());
         let excess = |x: f64| self.fit.at(x) - error.ln();
@@ -95,8 +98,7 @@ impl Curve {
 }
 
 /// The choice that a scene has made among those that it could leave open.
-#[must_use]
-pub fn choice_of(scene: &dyn Scene, sent: &Json) -> Option<(&'static str, Json)> {
+fn choice_of(scene: &dyn Scene, sent: &Json) -> Option<(&'static str, Json)> {
     let made = |(pointer, values): (&'static str, Vec<Json>)| {
         let value = Value::pointer(sent, pointer)?;
         values.contains(value).then(|| (pointer, value.clone()))
@@ -256,6 +258,9 @@ mod tests {
             assert!((curve(3.0, 2.0, 0.0).cost(spacing).unwrap() * spacing.powi(2) / 2.0 - 1.0).abs() < 1e-9);
         }
         assert!(curve(3.0, 1.0, 0.0).place(1e-9).is_none(), "far beyond");
+        for error in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(curve(3.0, 1.0, 0.0).place(error).is_none(), "{error}");
+        }
         assert!(curve(0.0, 1.0, 0.0).place(0.5).is_none(), "no order");
         assert!(curve(3.0, 1.0, 0.3).scatter > 0.2 && curve(3.0, 1.0, 0.0).scatter < 1e-9);
         let level = Level { spacing: 0.1, value: f64::NAN, cpu_s: 1.0 };

@@ -67,11 +67,14 @@ pub fn of_report(problem: &str, spacing: f64, report: &RunReport) -> Vec<Precisi
     latest.into_iter().map(row).collect()
 }
 
+/// How names of short runs begin; those of other runs are digests.
+pub const REFERENCE: &str = "reference ";
+
 /// Under which name short runs of `meniscus calibrate` keep what they say of scenes like this one with a choice of its own.
 #[must_use]
 pub fn reference_of(scene: &dyn Scene, choice: Option<(&str, &Json)>) -> String {
     let choice = choice.map_or_else(String::new, |(pointer, value)| format!(" {pointer} = {}", sorted(value)));
-    format!("reference {}{choice}", scene.family())
+    format!("{REFERENCE}{}{choice}", scene.family())
 }
 
 /// What an error of a quantity is divided by when scenes of different sizes are compared.

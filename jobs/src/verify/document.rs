@@ -72,7 +72,8 @@ pub(super) fn compose_studies(cases: &[(&StudyCase, Vec<Outcome>, Vec<String>)])
          Written by `meniscus verify --only studies --full` on {}; machine: {machine} ({isa}), one core; build {build}.\n\
          {count} targets, {missed} missed. A trial is a scene without a spacing and a tolerance; a small study finds the spacing, and the run\n\
          follows. The best set-up by hand is the cheapest run that meets the tolerance, over the set-ups of the case and over spacings a tenth\n\
-         apart; what it cost to find it is not counted, and the start of a process is part of every run.\n",
+         apart; what it cost to find it is not counted. Frames and the last checkpoint are part of every run, and most of the cost of a run of\n\
+         some hundredths of a second. Runs under 0.3 s are timed five times, and the least time counts.\n",
         &date[..10.min(date.len())],
     );
     for (case, outcomes, lines) in cases {

@@ -2,7 +2,7 @@
 
 use super::{Store, StoreError};
 use crate::convergence::Level;
-use crate::spec::work_precision::PrecisionMeasured;
+use crate::spec::work_precision::{PrecisionMeasured, REFERENCE};
 use crate::system::build;
 use rusqlite::{Transaction, params};
 
@@ -13,6 +13,19 @@ impl Store {
     /// [`StoreError`].
     pub fn keep_precision(&self, found: &[PrecisionMeasured]) -> Result<(), StoreError> {
         self.write(|transaction| Ok(keep(transaction, found)?))
+    }
+
+    /// Whether the short runs of this build and instruction set were made.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn has_short_runs(&self) -> Result<bool, StoreError> {
+        let connection = self.read();
+        let mut statement = connection.prepare_cached(
+            "SELECT EXISTS (SELECT 1 FROM work_precision
+                 WHERE build = ?1 AND isa = ?2 AND substr(problem, 1, length(?3)) = ?3)",
+        )?;
+        Ok(statement.query_row(params![build::name(), build::isa(), REFERENCE], |row| row.get(0))?)
     }
 
     /// What runs of this build and instruction set said of an error of a problem, the coarsest first.
