@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
-.PHONY: help build demo test soak load estimates check check-deploy check-portable setup clean
+.PHONY: help build demo test test-cluster soak soak-cluster dist load estimates check check-deploy check-portable setup clean
 
 # Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
 ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
@@ -11,15 +11,19 @@ endif
 
 PACKAGES := gcc pkg-config libhdf5-dev curl jq python3-venv ca-certificates
 TEST_PACKAGES := nodejs npm
+CLUSTER_PACKAGES := slurm-wlm munge bindfs
 VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 
 help:
 	@echo "make demo   build, run the spiraling vortex as a job, show its errors and a picture"
 	@echo "make test   build and run all tests"
+	@echo "make test-cluster  the tests on a Slurm cluster of two nodes on this machine, which it installs"
 	@echo "make build  the release binary, $(TARGET)/release/meniscus"
+	@echo "make dist   an archive with the program, licences, a bill of materials and checksums"
 	@echo "make check  format and lints"
 	@echo "make soak   the promises by the hundred: COUNT=1000 is all, ONLY=name,name picks; counts add up over runs"
+	@echo "make soak-cluster  200 jobs under random kills of service, controller and nodes, late files, and 10,000 short jobs"
 	@echo "make load   how fast the service answers under load, beside what was promised"
 	@echo "make estimates  what runs were estimated to take beside what they took"
 	@echo "make check-portable  a build for any x86-64 agrees with that for this machine"
@@ -31,6 +35,11 @@ setup:
 
 build: setup
 	MENISCUS_COMMIT="$$(git rev-parse --short=12 HEAD 2> /dev/null || true)" cargo build --release --locked -p meniscus-api
+
+# The debug information stays here; the archive is the same bytes whenever the program is.
+dist: build
+	mkdir -p dist && objcopy --strip-debug "$(TARGET)/release/meniscus" dist/meniscus
+	python3 deploy/dist.py dist/meniscus dist && rm dist/meniscus
 
 demo: build
 	deploy/demo.sh $(TARGET)/release/meniscus
@@ -56,6 +65,18 @@ test: setup $(VENV)/ready $(VENV)/models/ready
 	MENISCUS_NODE_TOOLS="$(abspath $(VENV)/node/node_modules/.bin)" MENISCUS_MODELS="$(abspath $(VENV)/models)"; \
 	if cargo nextest --version > /dev/null 2>&1; then cargo nextest run --locked --workspace --no-fail-fast && cargo test --doc --locked --workspace; \
 	else cargo test --locked --workspace --no-fail-fast; fi
+
+# Two nodes of a real Slurm on loopback, with directory and ports of their own for each test; no process is left behind.
+test-cluster: setup
+	deploy/setup.sh $(CLUSTER_PACKAGES)
+	cargo build --profile test --locked -p meniscus-api
+	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" cargo test --locked --test cluster -- --ignored --test-threads 2 --skip soak::
+
+soak-cluster: setup
+	deploy/setup.sh $(CLUSTER_PACKAGES)
+	cargo build --profile test --locked -p meniscus-api
+	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_LATE_FILES=1 \
+	cargo test --locked --test cluster -- --ignored --test-threads 1 --nocapture soak:: files_that_come_late
 
 check:
 	cargo fmt --all --check

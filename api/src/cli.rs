@@ -17,10 +17,13 @@ use meniscus_jobs::system::digest;
 use meniscus_jobs::system::process;
 use meniscus_jobs::verify;
 use meniscus_jobs::worker;
+use meniscus_jobs::worker::bundle::{self, Bundle};
+use meniscus_jobs::worker::detached::Terms;
 use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::{Duration, TryFromFloatSecsError};
 
 #[derive(Debug, Parser)]
 #[command(name = "meniscus", version, about = "Simulation service for moving interfaces and the physics on them")]
@@ -123,12 +126,46 @@ enum Command {
         #[arg(long, default_value_t = 1)]
         threads: u64,
     },
+    /// Work through a list of short attempts (started by a cluster).
+    #[command(hide = true)]
+    Bundle {
+        /// File with a directory a line.
+        #[arg(long)]
+        list: PathBuf,
+        /// What claims the attempts.
+        #[arg(long)]
+        owner: String,
+        /// Attempts at once.
+        #[arg(long)]
+        lanes: usize,
+        /// Seconds between two signs of life of a worker.
+        #[arg(long)]
+        heartbeat_s: f64,
+        /// Seconds without one after which a worker ends itself.
+        #[arg(long)]
+        lease_s: f64,
+        /// Digest that the program must have.
+        #[arg(long)]
+        program_sha256: Option<String>,
+    },
     /// Run one attempt of a job (started by the service).
     #[command(hide = true)]
     Worker {
         /// Directory of the attempt.
         #[arg(long)]
         attempt: PathBuf,
+        /// Without a pipe to the service: requests and signs of life are files of the attempt.
+        #[arg(long, requires = "heartbeat_s", requires = "lease_s")]
+        detached: bool,
+        /// Seconds between two signs of life of a detached worker.
+        #[arg(long)]
+        heartbeat_s: Option<f64>,
+        /// Seconds without one after which a detached worker ends itself.
+        #[arg(long)]
+        lease_s: Option<f64>,
+        /// Digest that the program must have.
+        #[arg(long)]
+        program_sha256: Option<String>,
     },
 }
 
@@ -178,15 +215,51 @@ pub fn main() -> ExitCode {
         Command::Token { name, scopes } => make_token(&name, &scopes),
         Command::Inspect { purpose, file } => inspect(&purpose, &file),
         Command::Calibrate { scratch, threads } => calibrate(&scratch, threads),
-        Command::Worker { attempt } => match worker::process::run(&attempt) {
-            Ok(Verdict::Unstarted { .. }) => ExitCode::from(NOT_STARTED_CODE),
-            Ok(_) => ExitCode::SUCCESS,
-            Err(error) if process::is_shortage(&error) => {
-                fail(&error);
-                ExitCode::from(NOT_STARTED_CODE)
-            }
-            Err(error) => fail(&error),
-        },
+        Command::Bundle { list, owner, lanes, heartbeat_s, lease_s, program_sha256 } => {
+            let done = match terms(heartbeat_s, lease_s, program_sha256) {
+                Ok(terms) => work_through(&list, owner, lanes, terms),
+                Err(error) => return fail(&error),
+            };
+            done.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
+        }
+        Command::Worker { attempt, detached, heartbeat_s, lease_s, program_sha256 } => {
+            let ran = if detached {
+                match terms(heartbeat_s.unwrap_or_default(), lease_s.unwrap_or_default(), program_sha256) {
+                    Ok(terms) => worker::detached::run(&attempt, &terms),
+                    Err(error) => return fail(&error),
+                }
+            } else {
+                worker::process::run(&attempt)
+            };
+            worker_code(ran)
+        }
+    }
+}
+
+/// How a worker without a pipe lives.
+fn terms(heartbeat_s: f64, lease_s: f64, program_sha256: Option<String>) -> Result<Terms, TryFromFloatSecsError> {
+    let (heartbeat, lease) = (Duration::try_from_secs_f64(heartbeat_s)?, Duration::try_from_secs_f64(lease_s)?);
+    Ok(Terms { heartbeat, lease, program_sha256 })
+}
+
+fn work_through(list: &Path, owner: String, lanes: usize, terms: Terms) -> std::io::Result<()> {
+    let attempts = bundle::read_list(list)?;
+    bundle::run(&Bundle { attempts, owner, lanes, terms })
+}
+
+/// The exit code of a worker.
+fn worker_code(ran: std::io::Result<Verdict>) -> ExitCode {
+    match ran {
+        Ok(Verdict::Unstarted { cause }) => {
+            fail(&cause);
+            ExitCode::from(NOT_STARTED_CODE)
+        }
+        Ok(_) => ExitCode::SUCCESS,
+        Err(error) if process::is_shortage(&error) => {
+            fail(&error);
+            ExitCode::from(NOT_STARTED_CODE)
+        }
+        Err(error) => fail(&error),
     }
 }
 

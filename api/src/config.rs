@@ -1,5 +1,9 @@
 //! Configuration of the service: flags of the command line, else a TOML file with the same names, else defaults.
 
+mod executor;
+
+pub use executor::{ExecutorChoices, ExecutorError, SlurmConfig};
+
 use crate::access::{AccessRules, AccessSources, SharedAccess, TokenFileError};
 use crate::base_path;
 use crate::rate_limit::RateLimiter;
@@ -61,6 +65,13 @@ pub struct Choices {
     /// Seconds without a heartbeat after which a worker is killed, 30 by default.
     #[arg(long)]
     pub lease_s: Option<u64>,
+    /// At a stop, let workers on a cluster write a checkpoint and return to the queue; else they go on.
+    #[arg(long)]
+    #[serde(default)]
+    pub drain: bool,
+    /// What runs the jobs; the table `[executor]` of the configuration file.
+    #[arg(skip)]
+    pub executor: Option<Box<ExecutorChoices>>,
     /// Bring jobs and uploads that a lost or older database does not know back from their own files.
     #[arg(long)]
     #[serde(skip)]
@@ -100,6 +111,8 @@ pub struct Config {
     pub disk_reserve_bytes: u64,
     /// Time without a heartbeat after which a worker is killed.
     pub lease: Duration,
+    /// The cluster that runs the jobs; None where this machine does.
+    pub slurm: Option<SlurmConfig>,
     /// Whether what a lost database does not know is brought back.
     pub adopt: bool,
     /// Whether an unknown machine is measured at the start of the service.
@@ -129,6 +142,9 @@ pub enum ConfigError {
     /// The token file cannot be used.
     #[error(transparent)]
     Tokens(#[from] TokenFileError),
+    /// The table `[executor]` cannot be used.
+    #[error("{0}")]
+    Executor(#[from] ExecutorError),
     /// The configuration file cannot be used.
     #[error("{path}: {cause}")]
     File {
@@ -139,6 +155,9 @@ pub enum ConfigError {
     },
 }
 
+/// Times that a worker on a cluster has to follow a request before it is ended: its files come late.
+const CLUSTER_CANCEL_GRACE: Duration = Duration::from_secs(3);
+const CLUSTER_PAUSE_GRACE: Duration = Duration::from_secs(60);
 /// Default of the largest upload in bytes.
 const UPLOAD_BYTES: u64 = 2 << 30;
 
@@ -171,6 +190,8 @@ impl Choices {
             upload_bytes: self.upload_bytes.or(other.upload_bytes),
             disk_reserve_bytes: self.disk_reserve_bytes.or(other.disk_reserve_bytes),
             lease_s: self.lease_s.or(other.lease_s),
+            drain: self.drain || other.drain,
+            executor: self.executor.or(other.executor),
             adopt: self.adopt,
             no_calibration: self.no_calibration || other.no_calibration,
         }
@@ -212,6 +233,13 @@ impl Config {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = threads.unwrap_or_else(|| slots.map_or(1, |slots| (cores / slots.max(1)).max(1))).max(1);
         let slots = slots.unwrap_or((cores / threads).max(1)).max(1);
+        let slurm = choices.executor.as_ref().map(|given| given.slurm(choices.drain)).transpose()?.flatten();
+        let (slots, threads) = match &slurm {
+            // The cluster's cores are not this machine's.
+            Some(slurm) => (slurm.settings.window, small(choices.threads).unwrap_or(1)),
+            None => (slots, threads),
+        };
+        let own_lease = Duration::from_secs(choices.lease_s.unwrap_or(30).max(3));
         Ok(Self {
             data: choices.data.clone().ok_or(ConfigError::NoData)?,
             bind,
@@ -226,7 +254,8 @@ impl Config {
             most_unfinished: choices.most_unfinished,
             upload_bytes: choices.upload_bytes.unwrap_or(UPLOAD_BYTES),
             disk_reserve_bytes: choices.disk_reserve_bytes.unwrap_or(DISK_RESERVE_BYTES),
-            lease: Duration::from_secs(choices.lease_s.unwrap_or(30).max(3)),
+            lease: slurm.as_ref().map_or(own_lease, |slurm| slurm.settings.lease),
+            slurm,
             adopt: choices.adopt,
             calibrate: !choices.no_calibration,
         })
@@ -241,21 +270,31 @@ impl Config {
         Ok(())
     }
 
-    /// What a job may ask for: four fifths of the memory shared among the slots.
+    /// What a job may ask for: what a node gives, or four fifths of this machine's memory shared among the slots.
     #[must_use]
     pub fn allowance(&self) -> Allowance {
         let memory = process::total_memory().unwrap_or(4 << 30);
-        Allowance { threads: self.threads as u64, memory_bytes: memory / 5 * 4 / self.slots as u64, local_files: false }
+        let own = memory / 5 * 4 / self.slots as u64;
+        let memory_bytes = self.slurm.as_ref().map_or(own, |slurm| slurm.memory_bytes);
+        Allowance { threads: self.threads as u64, memory_bytes, local_files: false }
     }
 
     /// The supervisor's rules.
     #[must_use]
     pub fn settings(&self) -> Settings {
+        // A cluster's window counts its jobs; what may be in line for it is the executor's to say.
+        let own = Settings::with_slots(if self.slurm.is_some() { usize::MAX } else { self.slots });
+        let (cancel_grace, pause_grace) = match self.slurm {
+            Some(_) => (CLUSTER_CANCEL_GRACE, CLUSTER_PAUSE_GRACE),
+            None => (own.cancel_grace, own.pause_grace),
+        };
         Settings {
             lease: self.lease,
+            cancel_grace,
+            pause_grace,
             disk_reserve_bytes: self.disk_reserve_bytes,
             retention_days: self.retention_days,
-            ..Settings::with_slots(self.slots)
+            ..own
         }
     }
 }
@@ -307,5 +346,22 @@ mod tests {
             .fold(String::new(), |all, line| all + line + "\n");
         let choices: Choices = toml::from_str(&whole).unwrap();
         assert!(choices.token_file.is_some() && choices.most_unfinished.is_some());
+    }
+
+    #[test]
+    fn the_sample_configuration_of_a_cluster_is_one() {
+        let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/../deploy/slurm/config.toml");
+        let text = std::fs::read_to_string(sample).unwrap();
+        let whole: String = text
+            .lines()
+            .map(|line| line.strip_prefix("# ").filter(|l| l.contains(" = ")).unwrap_or(line))
+            .fold(String::new(), |all, line| all + line + "\n");
+        // This machine has no such path.
+        for text in [text, whole].map(|text| text.replace("/shared/meniscus-bin/meniscus", "/bin/true")) {
+            let choices: Choices = toml::from_str(&text).unwrap();
+            let config = Config::new(&choices).unwrap();
+            let slurm = config.slurm.unwrap();
+            assert_eq!((config.slots, slurm.settings.options.len()), (200, 2));
+        }
     }
 }

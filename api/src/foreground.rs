@@ -130,6 +130,7 @@ fn start(resolved: &ResolvedBody, checkpoints: Vec<StartCheckpoint>, out: &Path)
         inputs: BTreeMap::new(),
         time: None,
         reserve_bytes: 0,
+        late_files_s: 0.0,
         usage: Usage::default(),
         submission: None,
     };

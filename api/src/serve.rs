@@ -9,9 +9,12 @@ use crate::signals::{Asked, Signals};
 use crate::state::{AppState, Handles, ServicePhase};
 use crate::telemetry;
 use meniscus_jobs::service::data_directory::{DataDirectory, DataDirectoryError};
+use meniscus_jobs::service::executor::Executor;
 use meniscus_jobs::service::executor::local::LocalExecutor;
+use meniscus_jobs::service::executor::slurm::{SettingsError, SlurmExecutor};
 use meniscus_jobs::service::found_folders::{self, DatabaseLost};
 use meniscus_jobs::service::inspector;
+use meniscus_jobs::service::shared_directory::{self, SharedDirectoryError};
 use meniscus_jobs::service::store::{self, Store, StoreError};
 use meniscus_jobs::service::supervisor::Supervisor;
 use metrics_exporter_prometheus::PrometheusHandle;
@@ -49,6 +52,12 @@ pub enum ServeError {
         /// What the system said.
         error: io::Error,
     },
+    /// The directory that nodes see cannot be used.
+    #[error(transparent)]
+    Shared(#[from] SharedDirectoryError),
+    /// The cluster cannot be used.
+    #[error(transparent)]
+    Cluster(#[from] SettingsError),
     /// A call of the operating system failed, such as binding the address.
     #[error("{0}")]
     Io(#[from] io::Error),
@@ -85,6 +94,7 @@ pub async fn serve(config: Config, reloading: Reloading) -> Result<(), ServeErro
     let config = Config { data: directory.path().to_owned(), ..config };
     let bind = config.bind;
     let listener = TcpListener::bind(bind).await.map_err(|error| ServeError::Bind { address: bind, error })?;
+    let config = share(config, &directory)?;
     let store = Arc::new(open_store(&directory, config.adopt)?);
     let (stop, stopping) = watch::channel(false);
     let (state, supervisor) = build(config, &store, stopping)?;
@@ -159,6 +169,15 @@ fn open_store(directory: &DataDirectory, adopt: bool) -> Result<Store, ServeErro
     Ok(store)
 }
 
+/// Puts what the nodes of a cluster see into the shared directory, where there is one.
+fn share(mut config: Config, directory: &DataDirectory) -> Result<Config, ServeError> {
+    if let Some(slurm) = &mut config.slurm {
+        slurm.shared = shared_directory::link(directory, &slurm.shared, config.adopt)?;
+        slurm.settings.service_id = directory.id().to_owned();
+    }
+    Ok(config)
+}
+
 /// Makes everything that handlers need, and the supervisor, which does not run yet.
 fn build(
     config: Config,
@@ -166,8 +185,11 @@ fn build(
     stopping: watch::Receiver<bool>,
 ) -> Result<(AppState, Supervisor), ServeError> {
     let store = Arc::clone(store);
-    // The running program, even if an upgrade has replaced its file: all workers of a service are of one build.
-    let executor = Box::new(LocalExecutor::new("/proc/self/exe".into()));
+    let executor: Box<dyn Executor> = match &config.slurm {
+        Some(slurm) => Box::new(SlurmExecutor::new(slurm.settings.clone(), &slurm.shared)?),
+        // The running program, even if an upgrade has replaced its file: all workers of a service are of one build.
+        None => Box::new(LocalExecutor::new("/proc/self/exe".into())),
+    };
     let supervisor = Supervisor::new(Arc::clone(&store), executor, config.settings());
     let inspector = inspector::start(Arc::clone(&store), "/proc/self/exe".into())?;
     let handles = Handles { store, supervisor: supervisor.handle(), inspector, metrics: telemetry::metrics()? };

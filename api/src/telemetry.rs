@@ -39,5 +39,11 @@ pub fn metrics() -> std::io::Result<PrometheusHandle> {
     describe_gauge!("meniscus_connections", "open connections of clients");
     describe_gauge!("meniscus_cpu_seconds", "CPU seconds of the service so far");
     describe_counter!("meniscus_transitions_total", "changes of the state of jobs, by new state and reason");
+    describe_gauge!("meniscus_slurm_table_age_seconds", "age of the cluster's last answer");
+    describe_gauge!("meniscus_slurm_jobs", "jobs of this service in the cluster, waiting and running");
+    describe_gauge!("meniscus_slurm_unsure", "submissions of which it is not known whether the cluster has them");
+    describe_counter!("meniscus_slurm_evictions_total", "attempts that the cluster took away, by cause");
+    describe_histogram!("meniscus_slurm_sbatch_seconds", "seconds that a submission took");
+    describe_histogram!("meniscus_slurm_squeue_seconds", "seconds that a look at the cluster's table took");
     Ok(handle)
 }

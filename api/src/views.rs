@@ -69,7 +69,7 @@ pub struct JobView {
     pub attempt: u64,
     /// Resources used so far.
     pub usage: UsageView,
-    /// What a queued job waits for; the id of a study where that finds its spacing.
+    /// What a job waits for, in the queue or in that of a cluster (`slurm (Priority)`); the id of a study where that finds its spacing.
     pub waiting_for: Option<String>,
     /// Ids of jobs that must have succeeded before it starts.
     pub after: Vec<String>,
@@ -335,8 +335,11 @@ fn links(base: String, parts: &[&'static str]) -> BTreeMap<&'static str, String>
     links
 }
 
-/// What a queued job waits for.
+/// What a job waits for in the queue, or in that of a cluster.
 fn waiting_for(job: &JobRow) -> Option<String> {
+    if job.state.has_worker() {
+        return job.waiting_for.clone();
+    }
     let study = job.awaits.clone().filter(|_| job.resolved.is_null());
     (job.state == State::Queued).then(|| match (job.waits_for, &job.hint) {
         (1.., _) if study.is_some() => study.unwrap_or_default(),

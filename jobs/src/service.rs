@@ -7,6 +7,7 @@ pub mod found_folders;
 pub mod fsck;
 pub mod inspector;
 pub mod refinement;
+pub mod shared_directory;
 pub mod accuracy;
 pub mod store;
 pub mod study_report;

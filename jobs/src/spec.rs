@@ -8,6 +8,7 @@ pub mod body;
 pub mod calibration;
 pub mod forecast;
 pub mod health;
+pub mod heartbeat;
 mod json_numbers;
 pub mod quantity;
 pub mod records;

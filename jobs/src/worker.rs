@@ -2,7 +2,9 @@
 
 pub mod accuracy;
 pub mod attempt;
+pub mod bundle;
 pub mod calibration;
+pub mod detached;
 pub mod inputs;
 pub mod local_run;
 pub mod log;

@@ -35,6 +35,7 @@ struct Marker {
 #[derive(Debug)]
 pub struct DataDirectory {
     path: PathBuf,
+    id: String,
     _lock: DirectoryLock,
 }
 
@@ -110,8 +111,8 @@ impl DataDirectory {
         let marker = recognize(&path)?;
         let lock =
             DirectoryLock::take(&path).map_err(|cause| DataDirectoryError::Lock { directory: path.clone(), cause })?;
-        mark(&path, marker)?;
-        Ok(Self { path, _lock: lock })
+        let id = mark(&path, marker)?;
+        Ok(Self { path, id, _lock: lock })
     }
 
     /// Takes a directory that is ours already, without making one.
@@ -125,6 +126,12 @@ impl DataDirectory {
             return Err(DataDirectoryError::NotOurs { directory: path.to_owned(), found });
         }
         Self::open(path)
+    }
+
+    /// Its id.
+    #[must_use]
+    pub fn id(&self) -> &str {
+        &self.id
     }
 
     /// The absolute path.
@@ -197,17 +204,18 @@ fn is_our_database(path: &Path) -> bool {
     count().is_ok_and(|count| count == TABLES.len())
 }
 
-/// Writes the marker where it is missing or of an older program.
-fn mark(directory: &Path, marker: Option<Marker>) -> Result<(), DataDirectoryError> {
+/// Writes the marker where it is missing or of an older program; the id in it.
+fn mark(directory: &Path, marker: Option<Marker>) -> Result<String, DataDirectoryError> {
     let schema = store::migrations::known();
     let id = match marker {
-        Some(marker) if marker.schema == schema => return Ok(()),
+        Some(marker) if marker.schema == schema => return Ok(marker.id),
         Some(marker) => marker.id,
         None => format!("data_{}", Ulid::generate()),
     };
     let path = directory.join(MARKER);
-    let text = serde_json::to_vec_pretty(&Marker { id, schema }).map_err(io::Error::from);
-    text.and_then(|text| artifacts::write(&path, &text)).map_err(|error| DataDirectoryError::Io { path, error })
+    let text = serde_json::to_vec_pretty(&Marker { id: id.clone(), schema }).map_err(io::Error::from);
+    text.and_then(|text| artifacts::write(&path, &text)).map_err(|error| DataDirectoryError::Io { path, error })?;
+    Ok(id)
 }
 
 #[cfg(test)]

@@ -1,17 +1,31 @@
-//! Executors start workers and know whether they live. [`local`] starts child processes of the service; a cluster's queue is
-//! another implementation of the same traits.
+//! Executors start workers and know whether they live. [`local`] starts child processes of the service; [`slurm`] hands attempts
+//! to a cluster.
 //!
 //! The supervisor knows a worker by its handle, a text that the executor gives and that the store keeps. What a handle
 //! means, where the program lies and how much memory there is belongs to the executor.
 
 mod cgroup;
 pub mod local;
+pub mod slurm;
 
 use crate::spec::requests::Request;
 use crate::system::process;
+use std::fmt;
 use std::io;
-use std::path::Path;
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
+
+/// One attempt at a job, as an executor sees it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AttemptPlace {
+    /// Id of the job.
+    pub job: String,
+    /// The attempt's number.
+    pub epoch: u64,
+    /// Its directory.
+    pub directory: PathBuf,
+}
 
 /// What an attempt needs of the machine that it runs on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +36,8 @@ pub struct Needs {
     pub threads: u64,
     /// Running time at most, in seconds.
     pub wall_s: Option<f64>,
+    /// Running time that is forecast, in seconds, where it is known.
+    pub forecast_s: Option<f64>,
 }
 
 /// Called, from any thread, when a worker may have written something or has ended.
@@ -33,14 +49,33 @@ pub trait Executor: Send {
     ///
     /// # Errors
     /// [`NotStarted`].
-    fn start(&self, attempt_directory: &Path, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted>;
+    fn start(&self, attempt: &AttemptPlace, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted>;
 
-    /// Looks for the worker that an earlier service started under a handle. A worker that cannot be taken over is ended.
-    fn adopt(&self, attempt_directory: &Path, handle: &str, notify: Notify) -> Adoption;
+    /// Looks for the worker of an earlier service. It has a handle where the service had written it down before it ended. A
+    /// worker that cannot be taken over is ended.
+    fn adopt(&self, attempt: &AttemptPlace, handle: Option<&str>, needs: &Needs, notify: Notify) -> Adoption;
 
     /// What new workers can have beside those that run.
     fn capacity(&self, reservations: &[Reservation]) -> Capacity;
+
+    /// Time that files of an ended worker may take to be seen here.
+    fn late_files(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    /// Whether workers go on when the service stops.
+    fn outlives_service(&self) -> bool {
+        false
+    }
+
+    /// Tells which attempts may still have a process that writes, though they have ended here; None where there can be none.
+    fn orphans(&self) -> Option<Orphans> {
+        None
+    }
 }
+
+/// Whether an attempt of a job may still have a process that writes into its directory.
+pub type Orphans = Arc<dyn Fn(&str, u64) -> bool + Send + Sync>;
 
 /// A running worker.
 pub trait Worker: Send {
@@ -55,6 +90,16 @@ pub trait Worker: Send {
 
     /// Whether it runs, or waits in the executor's queue. Limits of time count while it runs.
     fn phase(&self) -> Phase;
+
+    /// What it waits for, while it does.
+    fn waits_for(&self) -> Option<String> {
+        None
+    }
+
+    /// Whether it may have written records since the last call.
+    fn has_news(&mut self) -> bool {
+        true
+    }
 
     /// What it uses now.
     fn usage(&self) -> WorkerUsage;
@@ -100,6 +145,68 @@ pub enum EndCause {
     },
     /// The kernel ended it for lack of memory.
     OutOfMemory,
+    /// The executor took it away, or never got it going. The job has not died of it.
+    Evicted(Eviction),
+}
+
+/// Why an executor took a worker away.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Eviction {
+    /// The node failed.
+    NodeLost,
+    /// Another job took its place.
+    Preempted,
+    /// The cluster's limit of time was reached.
+    TimeLimit,
+    /// The cluster does not know it any more, and it gives no sign of life.
+    Forgotten,
+    /// Somebody took it out of the cluster's queue.
+    Revoked,
+    /// The node did not grant what a worker needs to begin.
+    NotBegun,
+    /// It shared a job of the cluster with others, which ended before its turn.
+    Unreached,
+}
+
+impl Eviction {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::NodeLost,
+        Self::Preempted,
+        Self::TimeLimit,
+        Self::Forgotten,
+        Self::Revoked,
+        Self::NotBegun,
+        Self::Unreached,
+    ];
+
+    /// Its word in metrics.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NodeLost => "node_lost",
+            Self::Preempted => "preempted",
+            Self::TimeLimit => "time_limit",
+            Self::Forgotten => "forgotten",
+            Self::Revoked => "revoked",
+            Self::NotBegun => "not_begun",
+            Self::Unreached => "unreached",
+        }
+    }
+}
+
+impl fmt::Display for Eviction {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::NodeLost => "the node failed",
+            Self::Preempted => "another job took its place on the node",
+            Self::TimeLimit => "the cluster's limit of time was reached",
+            Self::Forgotten => "the cluster does not know the job any more, and its worker gives no sign of life",
+            Self::Revoked => "the job was taken out of the cluster's queue",
+            Self::NotBegun => "the node did not grant what a worker needs to begin",
+            Self::Unreached => "the bundle of short jobs ended before its turn",
+        })
+    }
 }
 
 /// Why a worker was not started.
@@ -147,4 +254,6 @@ pub struct Reservation {
 pub struct Capacity {
     /// Memory for new workers, in bytes.
     pub memory_bytes: u64,
+    /// Number of new workers.
+    pub workers: usize,
 }

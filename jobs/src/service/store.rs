@@ -42,6 +42,7 @@ pub use submission::{NewJob, START_CHECKPOINT, scene_sha256};
 pub use transitions::{Change, ChangeError};
 pub use uploads::{NewUpload, UploadRow};
 
+use crate::service::executor::Orphans;
 use crate::spec::body::{JobSource, Origin, RestartSource, resolved_scene};
 use crate::spec::states::State;
 use ids::RisingIds;
@@ -50,7 +51,7 @@ use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
 use service_clock::ServiceClock;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 use tokio::sync::watch;
 use ulid::Ulid;
@@ -73,6 +74,11 @@ const READERS: usize = 4;
 /// The store of a data directory.
 pub struct Store {
     directory: PathBuf,
+    /// Folders of jobs and uploads, as every machine sees them: in the data directory they may be links to a shared one.
+    jobs: PathBuf,
+    uploads: PathBuf,
+    /// Tells which attempts may still have a process that writes.
+    orphans: OnceLock<Orphans>,
     writer: Arc<Mutex<Connection>>,
     /// Small transactions that wait for the writer.
     waiting: Mutex<Sender<group_commit::Waiting>>,
@@ -127,8 +133,12 @@ impl Store {
     /// # Errors
     /// [`StoreError`].
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
-        std::fs::create_dir_all(directory.join(JOBS))?;
-        std::fs::create_dir_all(directory.join(UPLOADS))?;
+        let folder = |name: &str| {
+            let path = directory.join(name);
+            std::fs::create_dir_all(&path)?;
+            std::fs::canonicalize(path)
+        };
+        let (jobs, uploads) = (folder(JOBS)?, folder(UPLOADS)?);
         let path = directory.join(FILE_NAME);
         let mut writer = connect(&path)?;
         migrations::apply(&mut writer)?;
@@ -137,6 +147,9 @@ impl Store {
         let readers = (0..READERS).map(|_| connect(&path).map(Mutex::new)).collect::<Result<_, _>>()?;
         Ok(Self {
             directory: directory.to_owned(),
+            jobs,
+            uploads,
+            orphans: OnceLock::new(),
             waiting: group_commit::start(Arc::clone(&writer), changes.clone())?,
             writer,
             readers,
@@ -151,7 +164,18 @@ impl Store {
     /// The directory of a job.
     #[must_use]
     pub fn job_directory(&self, job: &str) -> PathBuf {
-        self.directory.join(JOBS).join(job)
+        self.jobs.join(job)
+    }
+
+    /// The folder of uploads.
+    pub(super) fn uploads_directory(&self) -> &Path {
+        &self.uploads
+    }
+
+    /// Files of attempts of which a process may still write are deleted later. Only the first call counts.
+    pub fn spare_orphans(&self, orphans: Orphans) {
+        // There is one executor.
+        let _ = self.orphans.set(orphans);
     }
 
     /// The data directory.

@@ -7,12 +7,13 @@ mod patience;
 mod recovery;
 mod starting;
 
-use crate::service::executor::{EndCause, Executor, Worker};
+use crate::service::executor::{EndCause, Eviction, Executor, Orphans, Phase, Worker};
 use crate::service::refinement;
-use crate::service::store::finish_attempt::LossCause;
+use crate::service::store::finish_attempt::{LossCause, LossKind};
 use crate::service::store::import::{Imported, ProgressPace};
 use crate::service::store::{Change, ChangeError, Store, StoreError};
 use crate::spec::attempt_files::attempt_directory;
+use crate::spec::heartbeat::Heartbeat;
 use crate::spec::records::Usage;
 use crate::spec::requests::{NOT_STARTED_CODE, Request};
 use crate::spec::run_options::RunOptions;
@@ -111,6 +112,9 @@ struct Running {
     reserved_bytes: u64,
     disk_checked: Instant,
     lease_renewed: Instant,
+    /// What was last known of its executor's queue.
+    phase: Phase,
+    waits_for: Option<String>,
 }
 
 /// The supervisor's state.
@@ -132,12 +136,16 @@ pub struct Supervisor {
     start_pause: GrowingPause,
     clock: PatientClock,
     clock_saved: Instant,
+    /// Whether an attempt may still have a process though it has ended here.
+    orphans: Option<Orphans>,
 }
 
 /// Time between two rounds without messages.
 const TICK: Duration = Duration::from_millis(100);
 /// Least time between two rounds.
 const ROUND_INTERVAL: Duration = Duration::from_millis(10);
+/// Time that a round spends on starting workers: those that run are to be heard, too.
+const START_TIME: Duration = Duration::from_millis(200);
 /// Time that running jobs have to checkpoint at a shutdown.
 const DRAIN: Duration = Duration::from_secs(15);
 /// Time that a worker has to end after its verdict.
@@ -148,6 +156,14 @@ const VERDICT_BYTES: u64 = 1 << 20;
 const FAILURE_PAUSE: Duration = Duration::from_millis(400);
 /// Time between two times at which the clock of the data directory is saved.
 const CLOCK_INTERVAL: Duration = Duration::from_secs(60);
+/// The hint of a job whose worker could not be started.
+fn not_started_hint(cause: &str, pause: Duration) -> String {
+    format!(
+        "a worker could not be started ({cause}); the queue tries again by itself, next time in {} s",
+        pause.as_secs()
+    )
+}
+
 /// Time between two searches for jobs that are kept no longer.
 const EXPIRY_INTERVAL: Duration = Duration::from_secs(600);
 
@@ -157,7 +173,12 @@ impl Supervisor {
     pub fn new(store: Arc<Store>, executor: Box<dyn Executor>, settings: Settings) -> Self {
         let (sender, receiver) = channel();
         let now = Instant::now();
+        let orphans = executor.orphans();
+        if let Some(orphans) = &orphans {
+            store.spare_orphans(Arc::clone(orphans));
+        }
         Self {
+            orphans,
             store,
             executor,
             settings,
@@ -192,7 +213,8 @@ impl Supervisor {
                 // What failed once a tenth of a second ago fails again now.
                 std::thread::sleep(FAILURE_PAUSE);
             }
-            if self.drain_until.is_some_and(|end| self.running.is_empty() || Instant::now() >= end) {
+            let may_leave = || self.running.is_empty() || self.executor.outlives_service();
+            if self.drain_until.is_some_and(|end| may_leave() || Instant::now() >= end) {
                 return;
             }
         }
@@ -254,7 +276,8 @@ impl Supervisor {
         }
         if !self.is_draining() && !self.start_pause.is_on() {
             self.resume_when_space_is_back()?;
-            while self.running.len() < self.settings.slots && self.start_next()? {}
+            let began = Instant::now();
+            while self.running.len() < self.settings.slots && began.elapsed() < START_TIME && self.start_next()? {}
         }
         Ok(())
     }
@@ -280,10 +303,14 @@ impl Supervisor {
         // The end is noted before the last import, so that nothing written before it is missed.
         let end = running.worker.poll()?;
         // Records that cannot be read are as good as none; limits and the end are watched all the same.
-        let imported = self.store.import(&running.job, running.epoch, &mut running.pace).unwrap_or_else(|error| {
-            tracing::error!(job = running.job, %error, "records could not be imported");
-            Imported { is_whole: false, ..Imported::default() }
-        });
+        let imported = if running.worker.has_news() || end.is_some() {
+            self.store.import(&running.job, running.epoch, &mut running.pace).unwrap_or_else(|error| {
+                tracing::error!(job = running.job, %error, "records could not be imported");
+                Imported { is_whole: false, ..Imported::default() }
+            })
+        } else {
+            Imported::default()
+        };
         if imported.has_checkpoint {
             self.prune_checkpoints(running)?;
         }
@@ -294,6 +321,7 @@ impl Supervisor {
         if imported.any {
             self.start_pause.reset();
         }
+        self.note_phase(running)?;
         let now = self.clock.now();
         if imported.verdict.is_some() {
             running.verdict_since = Some(now);
@@ -314,18 +342,50 @@ impl Supervisor {
         // On a full device a worker cannot leave a verdict either.
         let is_full = process::free_space(self.store.directory()).is_some_and(|free| free < VERDICT_BYTES);
         let loss = match cause {
-            EndCause::OutOfMemory => LossCause { reason: Reason::WorkerOom, is_death: true },
-            _ if is_full => LossCause { reason: Reason::StorageEnospc, is_death: false },
-            EndCause::Exited { .. } | EndCause::Signaled { .. } => {
-                LossCause { reason: Reason::WorkerCrash, is_death: true }
-            }
+            EndCause::OutOfMemory => LossCause::new(Reason::WorkerOom, LossKind::Death),
+            EndCause::Evicted(why) => self.eviction(running, why),
+            _ if is_full => LossCause::new(Reason::StorageEnospc, LossKind::Harmless),
+            EndCause::Exited { .. } | EndCause::Signaled { .. } => LossCause::new(Reason::WorkerCrash, LossKind::Death),
         };
         if is_whole {
-            leftovers::remove(&self.store, &running.job, running.epoch)?;
+            leftovers::remove(&self.store, &running.job, running.epoch, self.orphans.as_ref())?;
         }
         self.book_disk(running)?;
-        self.store.finish_attempt(&running.job, running.epoch, loss)?;
+        self.store.finish_attempt(&running.job, running.epoch, &loss)?;
         tracing::info!(job = running.job, attempt = running.epoch, ?cause, "worker ended");
+        Ok(())
+    }
+
+    /// What an eviction counts as, and what is said about it. What could not begin has not died: the queue tries again after a
+    /// pause.
+    fn eviction(&mut self, running: &Running, why: Eviction) -> LossCause {
+        let last = Heartbeat::read(&attempt_directory(&self.store.job_directory(&running.job), running.epoch));
+        let cause = last.and_then(|last| last.cause);
+        let message = cause.as_ref().map_or_else(|| why.to_string(), |cause| format!("{why}: {cause}"));
+        let (kind, hint) = match why {
+            Eviction::NotBegun => {
+                let pause = self.start_pause.begin();
+                tracing::error!(job = running.job, message, pause_s = pause.as_secs(), "a worker could not be started");
+                (LossKind::Harmless, Some(not_started_hint(&message, pause)))
+            }
+            Eviction::Unreached => (LossKind::Harmless, None),
+            _ => (LossKind::Eviction, None),
+        };
+        LossCause { message: Some(message), hint, ..LossCause::new(Reason::WorkerEvicted, kind) }
+    }
+
+    /// Notes what a worker waits for in its executor's queue, and begins to count its time when it begins to work.
+    fn note_phase(&self, running: &mut Running) -> Result<(), StoreError> {
+        let phase = running.worker.phase();
+        if phase == Phase::Running && running.phase == Phase::Waiting {
+            (running.began, running.heard) = (Instant::now(), self.clock.now());
+        }
+        running.phase = phase;
+        let waits_for = running.worker.waits_for();
+        if waits_for != running.waits_for {
+            self.store.note_waiting(&running.job, running.epoch, waits_for.as_deref())?;
+            running.waits_for = waits_for;
+        }
         Ok(())
     }
 

@@ -25,6 +25,19 @@ pub const FRAME_ENDING: &str = "vtkhdf";
 /// Ending of a checkpoint's name, which is otherwise its step.
 pub const CHECKPOINT_ENDING: &str = "h5";
 
+/// Requests to a worker without a pipe, a word a line, appended by the service.
+pub const CONTROL: &str = "control";
+/// Sign of life of a worker without a pipe, written anew by it: [`super::heartbeat::Heartbeat`].
+pub const HEARTBEAT: &str = "heartbeat.json";
+/// The script that a cluster runs.
+pub const SCRIPT: &str = "slurm.sh";
+/// In which bundle of short attempts it is.
+pub const BUNDLE: &str = "bundle.json";
+/// Folder that the one process which may work on the attempt makes before anything else.
+pub const CLAIM: &str = "claim";
+/// File in it: which cluster job made it.
+pub const CLAIM_OWNER: &str = "owner";
+
 /// Mark in the name of a checkpoint that was written before the measurements and the output of its step.
 pub const UNMEASURED: &str = "-unmeasured";
 

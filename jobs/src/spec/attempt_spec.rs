@@ -33,6 +33,9 @@ pub struct AttemptSpec {
     /// Free space that the worker leaves untouched: the service needs it to write down what happened.
     #[serde(default)]
     pub reserve_bytes: u64,
+    /// Time in seconds that a file of an earlier attempt may take to be seen on the machine that runs this one.
+    #[serde(default)]
+    pub late_files_s: f64,
     /// Cost of the attempts before.
     pub usage: Usage,
     /// What the worker does not need: by it the job comes back into a database that was lost.

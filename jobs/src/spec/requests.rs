@@ -10,15 +10,19 @@ pub enum Request {
     Pause,
     /// The same because the service stops: the job goes back to the queue.
     Drain,
+    /// The same because the machine is taken back: the job goes back to the queue.
+    Evict,
     /// Drop the step and end.
     Cancel,
     /// Write a checkpoint at the end of the step and go on.
     Checkpoint,
+    /// End at once: another worker has the job.
+    Stop,
 }
 
 impl Request {
     /// All requests.
-    pub const ALL: [Self; 4] = [Self::Pause, Self::Drain, Self::Cancel, Self::Checkpoint];
+    pub const ALL: [Self; 6] = [Self::Pause, Self::Drain, Self::Evict, Self::Cancel, Self::Checkpoint, Self::Stop];
 
     /// Its word on the way to a worker.
     #[must_use]
@@ -26,8 +30,10 @@ impl Request {
         match self {
             Self::Pause => "pause",
             Self::Drain => "drain",
+            Self::Evict => "evict",
             Self::Cancel => "cancel",
             Self::Checkpoint => "checkpoint",
+            Self::Stop => "stop",
         }
     }
 

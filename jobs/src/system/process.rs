@@ -20,6 +20,20 @@ pub fn be_nice() {
     }
 }
 
+/// Ends this process without exit handlers, which could wait for a library that another thread is inside of. A file in the
+/// making has an unfinished name.
+pub fn end_at_once() {
+    let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::KILL);
+}
+
+/// Name of this machine; that of the node where a cluster started this process.
+#[must_use]
+pub fn host_name() -> String {
+    let node = std::env::var("SLURMD_NODENAME").ok();
+    let read = || std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned();
+    node.unwrap_or_else(read)
+}
+
 /// A line `Name:  1234 kB` of `/proc/PID/status` in bytes.
 fn status_bytes(pid: u32, name: &str) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;

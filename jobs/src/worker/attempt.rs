@@ -29,6 +29,10 @@ use meniscus::simulation::{CpuClock, LoadError, Measures, RunError, Section, Sim
 use serde::Deserialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Time between two tries to read a checkpoint that another machine wrote.
+const LATE_FILE_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Runs one attempt to its verdict, which is also its last record. Panics become a verdict.
 pub fn run_attempt(spec: &AttemptSpec, directory: &Path, control: &Control, sink: &mut dyn RecordSink) -> Verdict {
@@ -257,8 +261,9 @@ fn restore(
     sink: &mut dyn RecordSink,
     log: &Log,
 ) -> Result<Start, Failure> {
+    let began = Instant::now();
     for candidate in &spec.checkpoints {
-        match open_start(spec, candidate) {
+        match open_when_there(spec, candidate, began) {
             Ok((meta, state)) => match load(simulation, &meta, state) {
                 Ok(()) => {
                     log.line(&format!("restored {} at step {}", candidate.id, meta.step));
@@ -296,6 +301,22 @@ fn load(simulation: &mut dyn Simulation, meta: &Meta, state: Section) -> Result<
 enum Refusal {
     Damaged(String),
     Incompatible(String),
+}
+
+/// Opens a checkpoint. One that another machine wrote may not be whole here yet: it is tried again for a while.
+fn open_when_there(
+    spec: &AttemptSpec,
+    candidate: &StartCheckpoint,
+    began: Instant,
+) -> Result<(Meta, Section), Refusal> {
+    loop {
+        match open_start(spec, candidate) {
+            Err(Refusal::Damaged(_)) if began.elapsed().as_secs_f64() < spec.late_files_s => {
+                std::thread::sleep(LATE_FILE_INTERVAL);
+            }
+            opened => return opened,
+        }
+    }
 }
 
 fn open_start(spec: &AttemptSpec, candidate: &StartCheckpoint) -> Result<(Meta, Section), Refusal> {

@@ -100,6 +100,7 @@ pub fn run_to_verdict(body: &Value, directory: &Path, threads: u64, keep: Keep) 
         inputs: BTreeMap::new(),
         time: None,
         reserve_bytes: 0,
+        late_files_s: 0.0,
         usage: Usage::default(),
         submission: None,
     };

@@ -38,7 +38,7 @@ fn receive_requests(control: Control) -> io::Result<()> {
                 control.receive(request);
             }
         }
-        end_at_once();
+        process::end_at_once();
     })?;
     Ok(())
 }
@@ -56,7 +56,7 @@ fn give_heartbeats() -> io::Result<()> {
         loop {
             std::thread::sleep(HEARTBEAT_INTERVAL);
             if heartbeat().is_err() {
-                end_at_once();
+                process::end_at_once();
             }
         }
     })?;
@@ -68,12 +68,6 @@ fn heartbeat() -> io::Result<()> {
     let mut output = io::stdout().lock();
     output.write_all(b"\n")?;
     output.flush()
-}
-
-/// Ends without exit handlers, which could wait for a library that another thread is inside of. A file in the making has an
-/// unfinished name.
-fn end_at_once() {
-    let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::KILL);
 }
 
 /// Records each of which is followed by a sign of life.

@@ -3,7 +3,8 @@
 
 use super::cgroup::MemoryGroup;
 use super::{
-    Adoption, Capacity, EndCause, Executor, Needs, NotStarted, Notify, Phase, Reservation, Worker, WorkerUsage,
+    Adoption, AttemptPlace, Capacity, EndCause, Executor, Needs, NotStarted, Notify, Phase, Reservation, Worker,
+    WorkerUsage,
 };
 use crate::spec::attempt_files;
 use crate::spec::requests::Request;
@@ -32,13 +33,13 @@ impl LocalExecutor {
 }
 
 impl Executor for LocalExecutor {
-    fn start(&self, attempt_directory: &Path, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted> {
-        let errors = OpenOptions::new().create(true).append(true).open(attempt_directory.join(attempt_files::LOG))?;
+    fn start(&self, attempt: &AttemptPlace, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted> {
+        let errors = OpenOptions::new().create(true).append(true).open(attempt.directory.join(attempt_files::LOG))?;
         let mut child = Command::new(&self.program)
             .arg0("meniscus")
             .arg("worker")
             .arg("--attempt")
-            .arg(attempt_directory)
+            .arg(&attempt.directory)
             // No file that it reads may bring code along.
             .env("HDF5_PLUGIN_PRELOAD", "::")
             .stdin(Stdio::piped())
@@ -62,9 +63,9 @@ impl Executor for LocalExecutor {
 
     /// A child of an earlier service has lost its pipes. Its records could not be believed any more, but it would use the
     /// machine: it is ended.
-    fn adopt(&self, attempt_directory: &Path, handle: &str, _: Notify) -> Adoption {
-        if let Ok(pid) = handle.parse::<i32>()
-            && is_worker_of(pid, attempt_directory)
+    fn adopt(&self, attempt: &AttemptPlace, handle: Option<&str>, _: &Needs, _: Notify) -> Adoption {
+        if let Some(pid) = handle.and_then(|handle| handle.parse::<i32>().ok())
+            && is_worker_of(pid, &attempt.directory)
             && let Some(pid) = Pid::from_raw(pid)
         {
             // It may have gone by itself in between.
@@ -76,7 +77,8 @@ impl Executor for LocalExecutor {
     fn capacity(&self, reservations: &[Reservation]) -> Capacity {
         // Workers that have just started have not taken their memory yet.
         let promised: u64 = reservations.iter().map(|one| one.reserved_bytes.saturating_sub(one.used_bytes)).sum();
-        Capacity { memory_bytes: process::available_memory().unwrap_or(u64::MAX).saturating_sub(promised) }
+        let available = process::available_memory().unwrap_or(u64::MAX);
+        Capacity { memory_bytes: available.saturating_sub(promised), workers: usize::MAX }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Adoption: jobs and uploads come back from their own files into a database that does not know them, or not all of their
 //! attempts. The records of an attempt are taken as they are from a running worker.
 
-use super::finish_attempt::LossCause;
+use super::finish_attempt::{LossCause, LossKind};
 use super::import::ProgressPace;
 use super::submission::{self, NewJob};
 use super::transitions::apply;
@@ -99,7 +99,7 @@ impl Store {
             // Other errors say that it was canceled before.
             return Err(error);
         }
-        self.finish_attempt(job, attempt, LossCause { reason: Reason::ServerRestart, is_death: false })
+        self.finish_attempt(job, attempt, &LossCause::new(Reason::ServerRestart, LossKind::Harmless))
     }
 
     /// Takes checkpoints and files out of the database that are not there any more: records tell of all that were written.

@@ -34,6 +34,10 @@ impl Store {
 
     /// Deletes one folder whose deletion was intended.
     pub(super) fn delete_folder(&self, folder: &str) -> Result<(), StoreError> {
+        if self.is_written_to(folder) {
+            tracing::info!(folder, "a process may still write there; the folder is deleted later");
+            return Ok(());
+        }
         if let Err(error) = remove_directory(&self.directory().join(folder)) {
             tracing::warn!(folder, %error, "a folder could not be deleted; it is tried again later");
             return Ok(());
@@ -42,5 +46,14 @@ impl Store {
             transaction.prepare_cached("DELETE FROM deletions WHERE folder = ?1")?.execute([folder])?;
             Ok(())
         })
+    }
+
+    /// Whether an attempt of a job's folder may still have a process.
+    fn is_written_to(&self, folder: &str) -> bool {
+        let (Some(writes), Some(job)) = (self.orphans.get(), folder.strip_prefix(super::JOBS)) else { return false };
+        let job = job.trim_start_matches('/');
+        let entries = std::fs::read_dir(self.job_directory(job).join("attempts")).into_iter().flatten().flatten();
+        let mut epochs = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+        epochs.any(|epoch| writes(job, epoch))
     }
 }

@@ -8,16 +8,41 @@ use crate::spec::states::{Reason, State, Trigger};
 use rusqlite::Transaction;
 
 /// Why a worker that left no verdict was lost.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct LossCause {
     /// Reason, unless the service noted another one before it killed the worker.
     pub reason: Reason,
-    /// Whether the loss counts as one of the three deaths in a row that fail a job.
-    pub is_death: bool,
+    /// What the loss counts as.
+    pub kind: LossKind,
+    /// What happened, in a sentence.
+    pub message: Option<String>,
+    /// What a user can do, where it is not the hint of the reason.
+    pub hint: Option<String>,
+}
+
+/// What the loss of a worker counts as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LossKind {
+    /// One of the three deaths in a row that fail a job.
+    Death,
+    /// One of the five evictions in a row that fail a job.
+    Eviction,
+    /// Nothing: the job had no part in it.
+    Harmless,
+}
+
+impl LossCause {
+    /// A loss without a message.
+    #[must_use]
+    pub fn new(reason: Reason, kind: LossKind) -> Self {
+        Self { reason, kind, message: None, hint: None }
+    }
 }
 
 /// Deaths in a row without a new checkpoint that fail a job.
 const MOST_DEATHS: u32 = 3;
+/// Evictions in a row without a new checkpoint that fail a job.
+const MOST_EVICTIONS: u32 = 5;
 
 impl Store {
     /// Moves a job whose worker has ended to the state to which its verdict or its loss leads. A job at another attempt, or
@@ -25,7 +50,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub fn finish_attempt(&self, job: &str, epoch: u64, lost: LossCause) -> Result<(), StoreError> {
+    pub fn finish_attempt(&self, job: &str, epoch: u64, lost: &LossCause) -> Result<(), StoreError> {
         let finished = self.write(|transaction| {
             let row = rows::job(transaction, job)?.filter(|row| row.attempt == epoch);
             row.map_or(Ok(()), |row| decide(transaction, &row, lost))
@@ -42,7 +67,7 @@ impl Store {
     }
 }
 
-fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
+fn decide(transaction: &Transaction, row: &JobRow, lost: &LossCause) -> Result<(), ChangeError> {
     let step = |trigger: Trigger, reason: Option<Reason>, message: Option<String>| {
         apply(transaction, &row.id, trigger, &Change { reason, message, epoch: Some(row.attempt), ..Change::default() })
     };
@@ -61,8 +86,16 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<()
                     step(Trigger::Pause, why, None)?;
                 }
                 // A pause on request is kept; after a drain or a limit the reason of the verdict is the newer one.
-                let is_restart = |reason: Option<Reason>| reason == Some(Reason::ServerRestart);
-                let drained = is_restart(why) && (reason.is_none() || is_restart(reason));
+                let is_drain =
+                    |reason: Option<Reason>| matches!(reason, Some(Reason::ServerRestart | Reason::WorkerEvicted));
+                let drained = is_drain(why) && (reason.is_none() || is_drain(reason));
+                if drained && reason == Some(Reason::WorkerEvicted) {
+                    let evictions = count_loss(transaction, row, LossKind::Eviction)?;
+                    if evictions >= MOST_EVICTIONS {
+                        let message = Some(too_many(evictions, LossKind::Eviction));
+                        return step(Trigger::Fail, reason, message).map(|_| ());
+                    }
+                }
                 let kept = if why == Some(Reason::UserPause) { why } else { reason.or(why) };
                 step(if drained { Trigger::Drain } else { Trigger::Rest }, kept, None).map(|_| ())
             }
@@ -73,7 +106,7 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<()
     }
 }
 
-fn lose(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), ChangeError> {
+fn lose(transaction: &Transaction, row: &JobRow, lost: &LossCause) -> Result<(), ChangeError> {
     let reason = row.kill_reason.unwrap_or(lost.reason);
     let step = |trigger: Trigger, reason: Reason, message: Option<String>| {
         let change = Change { reason: Some(reason), message, epoch: Some(row.attempt), ..Change::default() };
@@ -93,22 +126,56 @@ fn lose(transaction: &Transaction, row: &JobRow, lost: LossCause) -> Result<(), 
     let was_pausing = row.state == State::Pausing;
     let reason = if was_pausing { row.reason.unwrap_or(reason) } else { reason };
     step(Trigger::Lose, reason, None)?;
-    if lost.is_death && !was_pausing {
-        transaction.execute(
-            "UPDATE jobs SET deaths = CASE WHEN checkpoint_since THEN 0 ELSE deaths + 1 END, checkpoint_since = 0
-             WHERE id = ?1",
-            [&row.id],
-        )?;
-        let deaths: u32 =
-            transaction.query_row("SELECT deaths FROM jobs WHERE id = ?1", [&row.id], |row| row.get(0))?;
-        if deaths >= MOST_DEATHS {
-            let message = format!("{deaths} workers in a row ended without a new checkpoint");
-            return step(Trigger::Fail, reason, Some(message)).map(|_| ());
+    if !was_pausing {
+        let count = count_loss(transaction, row, lost.kind)?;
+        let most = match lost.kind {
+            LossKind::Death => MOST_DEATHS,
+            LossKind::Eviction => MOST_EVICTIONS,
+            LossKind::Harmless => u32::MAX,
+        };
+        if count >= most {
+            return step(Trigger::Fail, reason, Some(too_many(count, lost.kind))).map(|_| ());
         }
     }
-    step(Trigger::Requeue, reason, None)?;
+    let change = Change {
+        reason: Some(reason),
+        message: lost.message.clone(),
+        hint: lost.hint.clone(),
+        epoch: Some(row.attempt),
+    };
+    apply(transaction, &row.id, Trigger::Requeue, &change)?;
     if was_pausing && reason != Reason::ServerRestart {
         step(Trigger::Pause, reason, None)?;
     }
     Ok(())
+}
+
+fn too_many(count: u32, kind: LossKind) -> String {
+    match kind {
+        LossKind::Eviction => format!("the cluster took {count} workers in a row away without a new checkpoint"),
+        _ => format!("{count} workers in a row ended without a new checkpoint"),
+    }
+}
+
+/// Counts a loss of a kind; the number in a row without a new checkpoint.
+fn count_loss(transaction: &Transaction, row: &JobRow, kind: LossKind) -> Result<u32, ChangeError> {
+    let column = match kind {
+        LossKind::Death => "deaths",
+        LossKind::Eviction => "evictions",
+        LossKind::Harmless => return Ok(0),
+    };
+    transaction.execute(
+        "UPDATE jobs SET deaths = CASE WHEN checkpoint_since THEN 0 ELSE deaths END,
+             evictions = CASE WHEN checkpoint_since THEN 0 ELSE evictions END, checkpoint_since = 0 WHERE id = ?1",
+        [&row.id],
+    )?;
+    // The loss right after a new checkpoint begins a new row.
+    let counted = if row.has_new_checkpoint { 0 } else { 1 };
+    transaction.execute(
+        &format!("UPDATE jobs SET {column} = {column} + ?2 WHERE id = ?1"),
+        rusqlite::params![row.id, counted],
+    )?;
+    let count =
+        transaction.query_row(&format!("SELECT {column} FROM jobs WHERE id = ?1"), [&row.id], |row| row.get(0))?;
+    Ok(count)
 }

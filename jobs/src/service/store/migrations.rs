@@ -251,6 +251,11 @@ const MIGRATIONS: &[&str] = &[
     ) STRICT, WITHOUT ROWID;
     CREATE INDEX jobs_by_scene ON jobs (scene_sha256, id) WHERE scene_sha256 IS NOT NULL;
 ",
+    // Executors with queues of their own.
+    "
+    ALTER TABLE jobs ADD COLUMN waiting_for TEXT;
+    ALTER TABLE jobs ADD COLUMN evictions INTEGER NOT NULL DEFAULT 0;
+",
 ];
 
 /// Number of schema changes that this program knows.

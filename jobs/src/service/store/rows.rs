@@ -52,6 +52,8 @@ pub struct JobRow {
     pub attempt: u64,
     /// Workers that died in a row without a new checkpoint.
     pub deaths: u32,
+    /// What the latest attempt waits for in its executor's queue.
+    pub waiting_for: Option<String>,
     /// Bytes of the attempt's records that are imported.
     pub records_offset: u64,
     /// Whether this attempt has made a checkpoint.
@@ -207,6 +209,7 @@ pub(super) fn job_of(row: &Row) -> rusqlite::Result<JobRow> {
         finished_at: row.get("finished_at")?,
         attempt: row.get::<_, i64>("attempt")? as u64,
         deaths: row.get("deaths")?,
+        waiting_for: row.get("waiting_for")?,
         records_offset: row.get::<_, i64>("records_offset")? as u64,
         has_new_checkpoint: row.get::<_, i64>("checkpoint_since")? != 0,
         worker_handle: row.get("worker_handle")?,

@@ -1,6 +1,6 @@
 //! Properties of the store on a real file.
 
-use super::finish_attempt::LossCause;
+use super::finish_attempt::{LossCause, LossKind};
 use super::import::ProgressPace;
 use super::{Change, ChangeError, JobFilter, JobRow, Store};
 use crate::service::found_folders;
@@ -107,8 +107,8 @@ fn progress_never_falls_and_deaths_count_only_without_checkpoints() {
         assert!((store.job(&job.id).unwrap().unwrap().progress.fraction - 0.5).abs() < 1e-15);
     }
     let die = |epoch: u64| {
-        let loss = LossCause { reason: Reason::WorkerCrash, is_death: true };
-        store.finish_attempt(&job.id, epoch, loss).unwrap();
+        let loss = LossCause::new(Reason::WorkerCrash, LossKind::Death);
+        store.finish_attempt(&job.id, epoch, &loss).unwrap();
         let row = store.job(&job.id).unwrap().unwrap();
         assert_eq!(row.state, State::Queued);
         store.claim(|_, _| true).unwrap();
@@ -197,27 +197,27 @@ fn a_verdict_survives_the_crash_between_import_and_end_of_attempt() {
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
     drop(store);
     let store = Store::open(directory.path()).unwrap();
-    store.finish_attempt(&job.id, 1, LossCause { reason: Reason::ServerRestart, is_death: false }).unwrap();
+    store.finish_attempt(&job.id, 1, &LossCause::new(Reason::ServerRestart, LossKind::Harmless)).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Succeeded);
 }
 
 #[test]
 fn requests_that_come_while_a_worker_ends_are_kept() {
     let (_directory, store) = store();
-    let loss = LossCause { reason: Reason::WorkerCrash, is_death: true };
+    let loss = LossCause::new(Reason::WorkerCrash, LossKind::Death);
     // A cancellation before the end of a successful attempt.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     records(&store, &job, 1).put(&Record::Verdict(Verdict::Succeeded), true).unwrap();
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
     store.change(&job.id, Trigger::Cancel, &Change::because(Reason::UserCancel)).unwrap();
-    store.finish_attempt(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, &loss).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Canceled);
     // A pause whose worker had to be killed: the job is paused, and no death counts.
     let job = submit(&store, &json!({}));
     store.claim(|_, _| true).unwrap();
     store.change(&job.id, Trigger::Pause, &Change::because(Reason::UserPause)).unwrap();
-    store.finish_attempt(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, &loss).unwrap();
     let row = store.job(&job.id).unwrap().unwrap();
     assert_eq!((row.state, row.reason, row.deaths), (State::Paused, Some(Reason::UserPause), 0));
     // A drain whose service was killed before it imported the verdict.
@@ -226,7 +226,7 @@ fn requests_that_come_while_a_worker_ends_are_kept() {
     store.change(&job.id, Trigger::Pause, &Change::because(Reason::ServerRestart)).unwrap();
     records(&store, &job, 1).put(&Record::Verdict(Verdict::Paused { reason: None }), true).unwrap();
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
-    store.finish_attempt(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, &loss).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().state, State::Queued);
     // A full disk during a person's pause does not make it go on by itself.
     let job = submit(&store, &json!({"priority": 9}));
@@ -235,6 +235,6 @@ fn requests_that_come_while_a_worker_ends_are_kept() {
     let verdict = Verdict::Paused { reason: Some(Reason::StorageEnospc) };
     records(&store, &job, 1).put(&Record::Verdict(verdict), true).unwrap();
     store.import(&job.id, 1, &mut ProgressPace::default()).unwrap();
-    store.finish_attempt(&job.id, 1, loss).unwrap();
+    store.finish_attempt(&job.id, 1, &loss).unwrap();
     assert_eq!(store.job(&job.id).unwrap().unwrap().reason, Some(Reason::UserPause));
 }

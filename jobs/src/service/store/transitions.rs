@@ -173,6 +173,21 @@ impl Store {
         })
     }
 
+    /// Notes what an attempt waits for in its executor's queue; None once it works.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn note_waiting(&self, id: &str, epoch: u64, waiting_for: Option<&str>) -> Result<(), StoreError> {
+        self.write(|transaction| {
+            transaction
+                .prepare_cached(
+                    "UPDATE jobs SET waiting_for = ?3, progress_count = progress_count + 1 WHERE id = ?1 AND attempt = ?2",
+                )?
+                .execute(params![id, epoch as i64, waiting_for])?;
+            Ok(())
+        })
+    }
+
     /// Notes the handle of an attempt's worker and the end of its lease.
     ///
     /// # Errors
@@ -212,6 +227,7 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
                  verdict = CASE WHEN ?7 = 1 THEN NULL ELSE verdict END,
                  kill_reason = CASE WHEN ?7 = 1 THEN NULL ELSE kill_reason END,
                  worker_handle = CASE WHEN ?7 = 1 THEN NULL ELSE worker_handle END,
+                 waiting_for = CASE WHEN ?14 THEN waiting_for ELSE NULL END, evictions = CASE WHEN ?13 THEN 0 ELSE evictions END,
                  started_at = CASE WHEN ?7 = 1 THEN COALESCE(started_at, ?8) ELSE started_at END,
                  finished_at = CASE WHEN ?9 THEN ?8 ELSE NULL END,
                  ended_s = CASE WHEN ?9 THEN (SELECT seconds FROM service_clock) ELSE NULL END, deaths = ?10, leg_wall_s = ?11
@@ -230,6 +246,8 @@ pub(super) fn apply(transaction: &Transaction, id: &str, trigger: Trigger, chang
             deaths,
             if trigger == Trigger::Resume { job.wall_s } else { job.leg_wall_s },
             attempt as i64,
+            trigger == Trigger::Resume,
+            to.has_worker() && !is_claim,
         ])?;
     if changed != 1 {
         return Err(ChangeError::Stale);

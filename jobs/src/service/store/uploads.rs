@@ -98,7 +98,7 @@ impl Store {
     /// The directory of an upload.
     #[must_use]
     pub fn upload_directory(&self, id: &str) -> PathBuf {
-        self.directory().join(super::UPLOADS).join(id)
+        self.uploads_directory().join(id)
     }
 
     /// An id and a directory for a file that is about to come in.

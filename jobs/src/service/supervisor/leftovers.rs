@@ -1,6 +1,7 @@
 //! What killed attempts leave behind: half-written files, frames that were written again, checkpoints whose record did
 //! not get out. While no worker runs, nothing reads them.
 
+use crate::service::executor::Orphans;
 use crate::service::store::{Store, StoreError};
 use crate::spec::attempt_files::{self, attempt_directory};
 use std::collections::HashSet;
@@ -14,17 +15,22 @@ const NUMBERED: [(&str, &str); 2] = [
 ];
 
 /// Removes frames and checkpoints of a job that the store does not list. Only for jobs without a worker whose records
-/// are all imported. Attempts after `last_attempt` and files that no worker names so stay where they are.
+/// are all imported. Attempts after `last_attempt`, those of which a process may still write, and files that no worker names so
+/// stay where they are.
 ///
 /// # Errors
 /// [`StoreError`].
-pub(super) fn remove(store: &Store, job: &str, last_attempt: u64) -> Result<(), StoreError> {
+pub(super) fn remove(store: &Store, job: &str, last_attempt: u64, orphans: Option<&Orphans>) -> Result<(), StoreError> {
     let directory = store.job_directory(job);
     let files = store.files(job)?.into_iter().map(|file| (file.attempt, file.path));
     let checkpoints = store.checkpoints(job)?.into_iter().map(|row| (row.attempt, row.path));
     let listed: HashSet<PathBuf> =
         files.chain(checkpoints).map(|(attempt, path)| attempt_directory(&directory, attempt).join(path)).collect();
     for attempt in 1..=last_attempt {
+        // The last one has ended: that is why this is called.
+        if attempt < last_attempt && orphans.is_some_and(|writes| writes(job, attempt)) {
+            continue;
+        }
         for (folder, ending) in NUMBERED {
             let folder = attempt_directory(&directory, attempt).join(folder);
             for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

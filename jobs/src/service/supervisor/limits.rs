@@ -23,7 +23,7 @@ impl Supervisor {
     /// Passes on requests, kills workers that do not follow them or give no sign of life, pauses jobs at their limits.
     pub(super) fn hold_to_limits(&self, running: &mut Running) -> Result<(), StoreError> {
         let state = self.store.state(&running.job)?;
-        if self.is_draining() && state == Some(State::Running) {
+        if self.is_draining() && state == Some(State::Running) && !self.executor.outlives_service() {
             self.pause(running, Reason::ServerRestart)?;
         }
         let settings = self.settings;
@@ -42,8 +42,9 @@ impl Supervisor {
             if state == Some(State::Running) {
                 self.watch_time_and_disk(running)?;
             }
+            self.renew_lease(running)?;
         }
-        self.renew_lease(running)
+        Ok(())
     }
 
     fn watch_heartbeat(&self, running: &mut Running) -> Result<(), StoreError> {

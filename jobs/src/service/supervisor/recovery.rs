@@ -1,8 +1,9 @@
 //! Recovery when the service starts. A restart of the service never counts as a death of a worker.
 
+use super::starting::needs;
 use super::{Supervisor, leftovers};
-use crate::service::executor::Adoption;
-use crate::service::store::finish_attempt::LossCause;
+use crate::service::executor::{Adoption, AttemptPlace};
+use crate::service::store::finish_attempt::{LossCause, LossKind};
 use crate::service::store::import::ProgressPace;
 use crate::service::store::{JobRow, StoreError};
 use crate::spec::attempt_files::attempt_directory;
@@ -23,12 +24,13 @@ impl Supervisor {
             // What the worker wrote before counts, its verdict above all. Records that cannot be read are as good as none:
             // the job goes on from its last checkpoint.
             let imported = self.store.import(&job.id, job.attempt, &mut ProgressPace::default());
-            let cleared = imported.and_then(|_| leftovers::remove(&self.store, &job.id, job.attempt));
+            let cleared =
+                imported.and_then(|_| leftovers::remove(&self.store, &job.id, job.attempt, self.orphans.as_ref()));
             if let Err(error) = cleared {
                 tracing::error!(job = job.id, %error, "records could not be imported or leftovers not removed");
             }
-            let lost = LossCause { reason: Reason::ServerRestart, is_death: false };
-            self.store.finish_attempt(&job.id, job.attempt, lost)?;
+            let lost = LossCause::new(Reason::ServerRestart, LossKind::Harmless);
+            self.store.finish_attempt(&job.id, job.attempt, &lost)?;
             tracing::info!(job = job.id, attempt = job.attempt, "recovered");
         }
         self.store.delete_intended()?;
@@ -37,9 +39,10 @@ impl Supervisor {
 
     /// Takes the worker of an earlier service over; false where there is none.
     fn adopt(&mut self, job: &JobRow) -> Result<bool, StoreError> {
-        let Some(handle) = &job.worker_handle else { return Ok(false) };
         let directory = attempt_directory(&self.store.job_directory(&job.id), job.attempt);
-        match self.executor.adopt(&directory, handle, self.notify()) {
+        let place = AttemptPlace { job: job.id.clone(), epoch: job.attempt, directory };
+        let options = RunOptions::from_resolved(&job.resolved)?;
+        match self.executor.adopt(&place, job.worker_handle.as_deref(), &needs(job, &options), self.notify()) {
             Adoption::Gone => Ok(false),
             // The job is about to go back to the queue already.
             Adoption::Running(mut worker) if !job.state.has_worker() => {
@@ -47,8 +50,8 @@ impl Supervisor {
                 Ok(false)
             }
             Adoption::Running(worker) => {
-                tracing::info!(job = job.id, attempt = job.attempt, handle, "worker adopted");
-                self.keep_watch(job, worker, RunOptions::from_resolved(&job.resolved)?);
+                tracing::info!(job = job.id, attempt = job.attempt, handle = worker.handle(), "worker adopted");
+                self.keep_watch(job, worker, options);
                 Ok(true)
             }
         }

@@ -1,7 +1,7 @@
 //! Starting workers: which job is next, what its attempt needs, and the specification that its worker reads.
 
-use super::{Message, Running, Supervisor, limits};
-use crate::service::executor::{Needs, NotStarted, Notify, Reservation, Worker};
+use super::{Message, Running, Supervisor, limits, not_started_hint};
+use crate::service::executor::{AttemptPlace, Needs, NotStarted, Notify, Phase, Reservation, Worker};
 use crate::service::store::import::ProgressPace;
 use crate::service::store::{Change, JobRow, START_CHECKPOINT, StoreError};
 use crate::spec::attempt_files::{self, attempt_directory};
@@ -19,6 +19,9 @@ impl Supervisor {
         let free = process::free_space(self.store.directory()).unwrap_or(u64::MAX);
         let disk_left = free.saturating_sub(self.settings.disk_reserve_bytes);
         let capacity = self.executor.capacity(&self.reservations());
+        if capacity.workers == 0 {
+            return Ok(false);
+        }
         // A job that alone is too large for this machine was refused at submission; it is not left waiting for ever.
         let is_alone = self.running.is_empty();
         let fits = |memory: u64, disk: u64| disk <= disk_left && (is_alone || memory <= capacity.memory_bytes);
@@ -49,10 +52,7 @@ impl Supervisor {
     pub(super) fn miss(&mut self, job: &str, epoch: u64, cause: &str) -> Result<(), StoreError> {
         let pause = self.start_pause.begin();
         tracing::error!(job, cause, pause_s = pause.as_secs(), "a worker could not be started");
-        let hint = Some(format!(
-            "a worker could not be started ({cause}); the queue tries again by itself, next time in {} s",
-            pause.as_secs()
-        ));
+        let hint = Some(not_started_hint(cause, pause));
         self.change(job, Trigger::Miss, &Change { hint, epoch: Some(epoch), ..Change::default() })
     }
 
@@ -80,9 +80,8 @@ impl Supervisor {
         let spec = self.attempt_spec(job).map_err(io::Error::other)?;
         let text = serde_json::to_vec_pretty(&spec).map_err(io::Error::from)?;
         artifacts::write(&directory.join(attempt_files::ATTEMPT_SPEC), &text)?;
-        let limits = &options.limits;
-        let needs = Needs { memory_bytes: limits.memory_bytes, threads: limits.threads, wall_s: limits.wall_s };
-        let worker = self.executor.start(&directory, &needs, self.notify())?;
+        let place = AttemptPlace { job: job.id.clone(), epoch: job.attempt, directory };
+        let worker = self.executor.start(&place, &needs(job, &options), self.notify())?;
         tracing::info!(job = job.id, attempt = job.attempt, handle = worker.handle(), "worker started");
         let until = limits::lease_end(self.settings.lease);
         self.store.lease(&job.id, job.attempt, worker.handle(), &until).map_err(io::Error::other)?;
@@ -118,6 +117,8 @@ impl Supervisor {
             reserved_bytes: job.forecast.memory_bytes,
             disk_checked: now,
             lease_renewed: now,
+            phase: Phase::Running,
+            waits_for: None,
         });
     }
 
@@ -148,6 +149,7 @@ impl Supervisor {
             inputs: self.store.inputs(&job.id)?,
             time: job.forecast.time.clone(),
             reserve_bytes: self.settings.disk_reserve_bytes,
+            late_files_s: self.executor.late_files().as_secs_f64(),
             usage: job.usage,
             submission: Some(Submission {
                 spec: job.spec.clone(),
@@ -161,6 +163,13 @@ impl Supervisor {
             }),
         })
     }
+}
+
+/// What an attempt of a job needs.
+pub(super) fn needs(job: &JobRow, options: &RunOptions) -> Needs {
+    let limits = &options.limits;
+    let forecast_s = job.forecast.time.as_ref().map(|time| time.wall_s);
+    Needs { memory_bytes: limits.memory_bytes, threads: limits.threads, wall_s: limits.wall_s, forecast_s }
 }
 
 /// The part of a body as sent that says whether a restart may compute on another instruction set.

@@ -2,7 +2,8 @@
 
 use super::{Settings, Supervisor};
 use crate::service::executor::{
-    Adoption, Capacity, EndCause, Executor, Needs, NotStarted, Notify, Phase, Reservation, Worker, WorkerUsage,
+    Adoption, AttemptPlace, Capacity, EndCause, Executor, Needs, NotStarted, Notify, Phase, Reservation, Worker,
+    WorkerUsage,
 };
 use crate::service::store::{JobRow, Store};
 use crate::spec::body::{self, Allowance, NoSources};
@@ -12,7 +13,6 @@ use crate::system::process;
 use serde_json::json;
 use std::io;
 use std::os::unix::process::ExitStatusExt;
-use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -31,7 +31,7 @@ struct StandInWorker {
 }
 
 impl Executor for StandIn {
-    fn start(&self, _: &Path, _: &Needs, _: Notify) -> Result<Box<dyn Worker>, NotStarted> {
+    fn start(&self, _: &AttemptPlace, _: &Needs, _: Notify) -> Result<Box<dyn Worker>, NotStarted> {
         let child = Command::new(self.command[0])
             .args(&self.command[1..])
             .stdin(Stdio::null())
@@ -41,15 +41,14 @@ impl Executor for StandIn {
         Ok(Box::new(StandInWorker { child, handle, time_since_heartbeat: self.time_since_heartbeat }))
     }
 
-    fn adopt(&self, attempt_directory: &Path, handle: &str, notify: Notify) -> Adoption {
+    fn adopt(&self, attempt: &AttemptPlace, handle: Option<&str>, needs: &Needs, notify: Notify) -> Adoption {
         // It finds every worker again, as a cluster does.
-        assert!(attempt_directory.ends_with("attempts/1") && handle == "queued-17");
-        let needs = Needs { memory_bytes: 0, threads: 1, wall_s: None };
-        Adoption::Running(self.start(attempt_directory, &needs, notify).unwrap())
+        assert!(attempt.directory.ends_with("attempts/1") && handle == Some("queued-17"));
+        Adoption::Running(self.start(attempt, needs, notify).unwrap())
     }
 
     fn capacity(&self, _: &[Reservation]) -> Capacity {
-        Capacity { memory_bytes: u64::MAX }
+        Capacity { memory_bytes: u64::MAX, workers: usize::MAX }
     }
 }
 
@@ -160,15 +159,15 @@ struct Refusing {
 }
 
 impl Executor for Refusing {
-    fn start(&self, directory: &Path, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted> {
+    fn start(&self, attempt: &AttemptPlace, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted> {
         if self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok() {
             return Err(io::Error::from_raw_os_error(libc::EMFILE).into());
         }
-        self.then.start(directory, needs, notify)
+        self.then.start(attempt, needs, notify)
     }
 
-    fn adopt(&self, directory: &Path, handle: &str, notify: Notify) -> Adoption {
-        self.then.adopt(directory, handle, notify)
+    fn adopt(&self, attempt: &AttemptPlace, handle: Option<&str>, needs: &Needs, notify: Notify) -> Adoption {
+        self.then.adopt(attempt, handle, needs, notify)
     }
 
     fn capacity(&self, reservations: &[Reservation]) -> Capacity {

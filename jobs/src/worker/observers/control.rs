@@ -2,9 +2,10 @@
 
 use crate::spec::requests::Request;
 use crate::spec::states::Reason;
+use crate::system::process;
 use meniscus::parallel::Interrupt;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Time that a run has to come to the end of its step after a request to pause. Then the step, or the measurement, is
@@ -16,7 +17,7 @@ const PATIENCE: Duration = Duration::from_millis(1000);
 pub struct Control {
     interrupt: Interrupt,
     canceled: Arc<AtomicBool>,
-    draining: Arc<AtomicBool>,
+    pause_reason: Arc<Mutex<Option<Reason>>>,
     pausing: Arc<AtomicBool>,
     checkpoint: Arc<AtomicBool>,
 }
@@ -29,13 +30,20 @@ impl Control {
                 self.canceled.store(true, Ordering::Relaxed);
                 self.interrupt.raise();
             }
-            Request::Pause | Request::Drain => {
-                self.draining.store(request == Request::Drain, Ordering::Relaxed);
-                self.pausing.store(true, Ordering::Relaxed);
-                self.lose_patience_later();
-            }
+            Request::Pause => self.pause(None),
+            Request::Drain => self.pause(Some(Reason::ServerRestart)),
+            // What was asked before holds.
+            Request::Evict if self.is_pausing() => {}
+            Request::Evict => self.pause(Some(Reason::WorkerEvicted)),
             Request::Checkpoint => self.checkpoint.store(true, Ordering::Relaxed),
+            Request::Stop => process::end_at_once(),
         }
+    }
+
+    fn pause(&self, reason: Option<Reason>) {
+        *self.pause_reason.lock().unwrap_or_else(PoisonError::into_inner) = reason;
+        self.pausing.store(true, Ordering::Relaxed);
+        self.lose_patience_later();
     }
 
     /// Raises the interrupt after a while.
@@ -59,7 +67,7 @@ impl Control {
     /// Why the run pauses, where it is not on a client's request.
     #[must_use]
     pub fn pause_reason(&self) -> Option<Reason> {
-        self.draining.load(Ordering::Relaxed).then_some(Reason::ServerRestart)
+        *self.pause_reason.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether the run is to end with its state kept.

@@ -1,0 +1,81 @@
+//! Calls of `scancel`, on a thread of their own.
+
+use super::command;
+use std::io;
+use std::path::PathBuf;
+use std::sync::mpsc::{Sender, channel};
+use std::time::Duration;
+
+/// Time that `scancel` has to answer.
+const TIME_LIMIT: Duration = Duration::from_secs(20);
+
+/// What to tell the cluster about a job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Errand {
+    /// Its worker has a request to read.
+    Hint {
+        /// Its name.
+        name: String,
+        /// Its number.
+        id: String,
+    },
+    /// It is to end.
+    End {
+        /// Its name. Numbers are used again: only a job of this name is ended.
+        name: String,
+        /// Its number, where it is known.
+        id: Option<String>,
+    },
+}
+
+impl Errand {
+    fn arguments(&self) -> Vec<String> {
+        match self {
+            Self::Hint { name, id } => {
+                vec!["--batch".to_owned(), "--signal=USR1".to_owned(), format!("--name={name}"), id.clone()]
+            }
+            Self::End { name, id: Some(id) } => vec![format!("--name={name}"), id.clone()],
+            Self::End { name, id: None } => vec!["--me".to_owned(), format!("--name={name}")],
+        }
+    }
+}
+
+/// Takes errands.
+#[derive(Debug)]
+pub(super) struct Errands(Sender<Errand>);
+
+impl Errands {
+    /// Starts the thread; it ends when this is dropped.
+    pub(super) fn start(scancel: PathBuf) -> io::Result<Self> {
+        let (sender, receiver) = channel::<Errand>();
+        std::thread::Builder::new().name("slurm-cancel".to_owned()).spawn(move || {
+            for errand in receiver {
+                if let Err(error) = command::run(&scancel, errand.arguments(), TIME_LIMIT, None) {
+                    // Whoever sent it sends it again while the job is there.
+                    tracing::debug!(?errand, %error, "scancel gave no answer");
+                }
+            }
+        })?;
+        Ok(Self(sender))
+    }
+
+    /// Does an errand soon.
+    pub(super) fn send(&self, errand: Errand) {
+        // Without a thread nothing can be told.
+        let _ = self.0.send(errand);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Errand;
+
+    #[test]
+    fn nothing_is_ended_by_its_number_alone() {
+        let name = "mns-job_1-1".to_owned();
+        for id in [None, Some("7".to_owned())] {
+            let arguments = Errand::End { name: name.clone(), id }.arguments();
+            assert!(arguments.contains(&"--name=mns-job_1-1".to_owned()), "{arguments:?}");
+        }
+    }
+}

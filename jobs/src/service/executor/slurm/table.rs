@@ -1,0 +1,206 @@
+//! The table of the cluster's jobs, as `squeue` answers.
+
+use std::collections::HashMap;
+use std::time::Instant;
+
+/// What `squeue` is asked for: id, name, state, reason, nodes.
+pub const FORMAT: &str = "%i|%j|%T|%r|%N";
+
+/// A line of `squeue`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Row {
+    /// The cluster's number of the job. It is neither durable nor unique.
+    pub id: String,
+    /// Its name, which is the key.
+    pub name: String,
+    /// Its state.
+    pub state: JobState,
+    /// Why it is in its state.
+    pub reason: String,
+    /// Where it runs.
+    pub nodes: String,
+}
+
+/// What the cluster's words for states say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JobState {
+    /// In the queue.
+    Waiting,
+    /// On a node.
+    Running,
+    /// On a node, stopped for a while.
+    Suspended,
+    /// Over.
+    Ended(Ending),
+}
+
+/// How the cluster says that a job ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// With exit code 0.
+    Completed,
+    /// With another exit code, or by a signal.
+    Failed,
+    /// By `scancel`.
+    Canceled,
+    /// By its limit of time.
+    TimeLimit,
+    /// With its node.
+    NodeLost,
+    /// For another job.
+    Preempted,
+    /// By its limit of memory.
+    OutOfMemory,
+    /// By another cluster of a federation.
+    Revoked,
+}
+
+impl JobState {
+    /// The state of a word. A word that is not known is of a job that is still there: ends are believed only when they are known.
+    #[must_use]
+    pub fn from_word(word: &str) -> Self {
+        match word {
+            "PENDING" | "CONFIGURING" | "REQUEUED" | "REQUEUE_FED" | "REQUEUE_HOLD" | "RESV_DEL_HOLD"
+            | "SPECIAL_EXIT" => Self::Waiting,
+            "SUSPENDED" | "STOPPED" => Self::Suspended,
+            "COMPLETED" => Self::Ended(Ending::Completed),
+            "FAILED" => Self::Ended(Ending::Failed),
+            "CANCELLED" => Self::Ended(Ending::Canceled),
+            "TIMEOUT" | "DEADLINE" => Self::Ended(Ending::TimeLimit),
+            "NODE_FAIL" | "BOOT_FAIL" | "LAUNCH_FAILED" | "RECONFIG_FAIL" => Self::Ended(Ending::NodeLost),
+            "PREEMPTED" => Self::Ended(Ending::Preempted),
+            "OUT_OF_MEMORY" => Self::Ended(Ending::OutOfMemory),
+            "REVOKED" => Self::Ended(Ending::Revoked),
+            _ => Self::Running,
+        }
+    }
+
+    /// Whether the job is not over.
+    #[must_use]
+    pub fn is_alive(self) -> bool {
+        !matches!(self, Self::Ended(_))
+    }
+}
+
+impl Row {
+    /// A row of a line; None where the line is none, such as a warning of the cluster.
+    #[must_use]
+    pub fn parse(line: &str) -> Option<Self> {
+        let mut parts = line.trim_end().split('|');
+        let (id, name, state, reason, nodes) =
+            (parts.next()?, parts.next()?, parts.next()?, parts.next()?, parts.next()?);
+        let is_id = !id.is_empty() && id.starts_with(|c: char| c.is_ascii_digit());
+        let is_word =
+            !state.is_empty() && state.bytes().all(|b| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'_');
+        (is_id && is_word && parts.next().is_none()).then(|| Self {
+            id: id.to_owned(),
+            name: name.to_owned(),
+            state: JobState::from_word(state),
+            reason: reason.to_owned(),
+            nodes: nodes.to_owned(),
+        })
+    }
+}
+
+/// The last answer, and how old it is.
+#[derive(Debug, Clone)]
+pub struct Table {
+    rows: HashMap<String, Vec<Row>>,
+    /// Number of answers so far.
+    pub round: u64,
+    /// When the command of the last answer was started.
+    pub asked: Instant,
+    /// What stands in the way of an answer since then.
+    pub trouble: Option<String>,
+}
+
+impl Table {
+    /// The table before the first answer.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { rows: HashMap::new(), round: 0, asked: Instant::now(), trouble: None }
+    }
+
+    /// Takes an answer. Only rows whose names begin with the prefix are kept: the user may have other jobs.
+    pub fn take(&mut self, answer: &str, prefix: &str, asked: Instant) {
+        self.rows.clear();
+        for row in answer.lines().filter_map(Row::parse).filter(|row| row.name.starts_with(prefix)) {
+            self.rows.entry(row.name.clone()).or_default().push(row);
+        }
+        self.round += 1;
+        self.asked = asked;
+        self.trouble = None;
+    }
+
+    /// The row of a name that counts: that of the owner of the claim, else one that is alive, else the last.
+    #[must_use]
+    pub fn row(&self, name: &str, owner: Option<&str>) -> Option<&Row> {
+        let rows = self.rows.get(name)?;
+        let owned = owner.and_then(|owner| rows.iter().find(|row| row.id == owner));
+        owned.or_else(|| rows.iter().find(|row| row.state.is_alive())).or_else(|| rows.last())
+    }
+
+    /// All rows of a name.
+    #[must_use]
+    pub fn rows(&self, name: &str) -> &[Row] {
+        self.rows.get(name).map_or(&[], Vec::as_slice)
+    }
+
+    /// Every row.
+    pub fn all(&self) -> impl Iterator<Item = &Row> {
+        self.rows.values().flatten()
+    }
+
+    /// Numbers of waiting and of running jobs.
+    #[must_use]
+    pub fn counts(&self) -> (usize, usize) {
+        let alive = self.all().filter(|row| row.state.is_alive()).count();
+        let running = self.all().filter(|row| row.state == JobState::Running).count();
+        (alive - running, running)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Ending, JobState, Row, Table};
+    use std::time::Instant;
+
+    fn table(answer: &str) -> Table {
+        let mut table = Table::new();
+        table.take(answer, "mns-", Instant::now());
+        table
+    }
+
+    #[test]
+    fn lines_that_are_no_rows_and_jobs_of_others_are_left_out() {
+        let answer = "slurm_load_jobs error: Unable to contact\n\
+                      12|mns-a-1|RUNNING|None|node1\n13|my own job|RUNNING|None|node1\n\
+                      x|mns-b-1|RUNNING|None|\n14|mns-b-1|\n15|mns-c-1|PENDING|(Resources|held)|\n16|mns-c-1|PENDING|Priority|\n";
+        let table = table(answer);
+        assert_eq!(table.all().count(), 2);
+        assert_eq!(table.counts(), (1, 1));
+        assert_eq!(table.row("mns-c-1", None).unwrap().reason, "Priority");
+        assert!(table.row("mns-b-1", None).is_none());
+    }
+
+    #[test]
+    fn of_several_rows_the_owner_counts_then_the_living_then_the_last() {
+        let table = table(
+            "7|mns-a-1|FAILED|NonZeroExitCode|node1\n8|mns-a-1|RUNNING|None|node2\n9|mns-a-1|FAILED|NonZeroExitCode|node2\n",
+        );
+        let id = |owner| table.row("mns-a-1", owner).unwrap().id.clone();
+        assert_eq!(id(Some("7")), "7");
+        assert_eq!(id(None), "8");
+        // The owner has left the table.
+        assert_eq!(id(Some("6")), "8");
+    }
+
+    #[test]
+    fn an_end_is_believed_only_when_its_word_is_known() {
+        let state = |word: &str| Row::parse(&format!("1|mns-a-1|{word}|None|node1")).unwrap().state;
+        assert_eq!(state("NODE_FAIL"), JobState::Ended(Ending::NodeLost));
+        assert_eq!(state("COMPLETING"), JobState::Running);
+        assert_eq!(state("SOMETHING_OF_2031"), JobState::Running);
+        assert_eq!(state("CONFIGURING"), JobState::Waiting);
+    }
+}

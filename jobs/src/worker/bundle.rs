@@ -1,0 +1,134 @@
+//! The process of a bundle: one job of a cluster that works through a fixed list of short attempts, some at a time. Each attempt has
+//! its own directory, claim and worker, as if it were alone; whoever claimed an attempt before keeps it.
+
+use super::detached::{self, Terms};
+use crate::spec::attempt_files;
+use crate::spec::heartbeat::Heartbeat;
+use crate::spec::requests::NOT_STARTED_CODE;
+use crate::system::process;
+use rustix::process::{Pid, Signal, kill_process};
+use signal_hook::consts::{SIGTERM, SIGUSR1};
+use signal_hook::iterator::Signals;
+use std::fs::{self, OpenOptions};
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// What a bundle works through.
+#[derive(Debug, Clone)]
+pub struct Bundle {
+    /// Directories of the attempts, in order.
+    pub attempts: Vec<PathBuf>,
+    /// What claims the attempts: number and count of restarts of the cluster's job.
+    pub owner: String,
+    /// Attempts at once.
+    pub lanes: usize,
+    /// How its workers live.
+    pub terms: Terms,
+}
+
+/// Time between two looks at workers and signals.
+const LOOK: Duration = Duration::from_millis(5);
+
+/// Reads the list of a bundle: a directory a line.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn read_list(file: &Path) -> io::Result<Vec<PathBuf>> {
+    Ok(fs::read_to_string(file)?.lines().map(PathBuf::from).collect())
+}
+
+/// Works through a bundle. At the first SIGTERM its workers are told to write their checkpoints, and no other attempt is begun.
+///
+/// # Errors
+/// When signals cannot be received, or this is another program than the one that was ordered.
+pub fn run(bundle: &Bundle) -> io::Result<()> {
+    if let Some(cause) = detached::foreign_build(&bundle.terms)? {
+        return Err(io::Error::other(cause));
+    }
+    let mut signals = Signals::new([SIGTERM, SIGUSR1])?;
+    let mut waiting = bundle.attempts.iter();
+    let mut workers: Vec<Child> = Vec::new();
+    let mut is_over = false;
+    loop {
+        if signals.pending().any(|signal| signal == SIGTERM) {
+            is_over = true;
+            workers.iter().filter_map(|worker| Pid::from_raw(worker.id().cast_signed())).for_each(|pid| {
+                // It may have ended in between.
+                let _ = kill_process(pid, Signal::TERM);
+            });
+        }
+        let mut left = Vec::new();
+        for mut worker in workers {
+            if worker.try_wait()?.is_none() {
+                left.push(worker);
+            }
+        }
+        workers = left;
+        while !is_over && workers.len() < bundle.lanes.max(1) {
+            let Some(attempt) = waiting.next() else { break };
+            if claim(attempt, &bundle.owner) {
+                workers.extend(start(attempt, &bundle.terms));
+            }
+        }
+        if workers.is_empty() && (is_over || waiting.len() == 0) {
+            return Ok(());
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Claims an attempt; false where somebody has it, the service that took it back included.
+fn claim(attempt: &Path, owner: &str) -> bool {
+    let claim = attempt.join(attempt_files::CLAIM);
+    fs::create_dir(&claim).is_ok() && fs::write(claim.join(attempt_files::CLAIM_OWNER), format!("{owner}\n")).is_ok()
+}
+
+/// Starts the worker of an attempt. One that cannot be started says so in its sign of life.
+fn start(attempt: &Path, terms: &Terms) -> Option<Child> {
+    let log = OpenOptions::new().create(true).append(true).open(attempt.join(attempt_files::LOG));
+    let started = log.and_then(|log| {
+        Command::new("/proc/self/exe")
+            .arg0("meniscus")
+            .args(["worker", "--detached", "--heartbeat-s", &terms.heartbeat.as_secs_f64().to_string()])
+            .args(["--lease-s", &terms.lease.as_secs_f64().to_string(), "--attempt"])
+            .arg(attempt)
+            .stdin(Stdio::null())
+            .stdout(log.try_clone()?)
+            .stderr(log)
+            .spawn()
+    });
+    match started {
+        Ok(worker) => Some(worker),
+        Err(error) => {
+            let host = process::host_name();
+            let exit_code = Some(NOT_STARTED_CODE.into());
+            let last = Heartbeat { count: 1, memory_bytes: None, host, exit_code, cause: Some(error.to_string()) };
+            // Without it the attempt is given up when its lease is over.
+            let _ = last.write(attempt);
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{claim, read_list};
+
+    #[test]
+    fn an_attempt_is_claimed_once() {
+        let directory = tempfile::tempdir().unwrap();
+        assert!(claim(directory.path(), "7.0"));
+        assert!(!claim(directory.path(), "8.0"));
+        assert_eq!(std::fs::read_to_string(directory.path().join("claim/owner")).unwrap(), "7.0\n");
+    }
+
+    #[test]
+    fn a_list_has_a_directory_a_line() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "/a/b\n/c\n").unwrap();
+        assert_eq!(read_list(file.path()).unwrap(), [std::path::PathBuf::from("/a/b"), "/c".into()]);
+    }
+}
