@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
-.PHONY: help build demo test test-cluster soak soak-cluster dist load estimates check check-deploy check-portable setup clean
+.PHONY: help build page demo test test-cluster screenshots soak soak-cluster dist load estimates check check-deploy check-portable setup clean
 
 # Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
 ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
@@ -10,7 +10,8 @@ export HDF5_DIR ?= $(firstword $(wildcard /usr/lib/*/hdf5/serial))
 endif
 
 PACKAGES := gcc pkg-config libhdf5-dev curl jq python3-venv ca-certificates
-TEST_PACKAGES := nodejs npm
+NODE_PACKAGES := nodejs npm
+TEST_PACKAGES := $(NODE_PACKAGES) chromium
 CLUSTER_PACKAGES := slurm-wlm munge bindfs
 VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
@@ -18,6 +19,8 @@ TARGET := $(or $(CARGO_TARGET_DIR),target)
 help:
 	@echo "make demo   build, run the spiraling vortex as a job, show its errors and a picture"
 	@echo "make test   build and run all tests"
+	@echo "make page   the web page alone, api/page/dist"
+	@echo "make screenshots  pictures of every view of the page for docs/guide"
 	@echo "make test-cluster  the tests on a Slurm cluster of two nodes on this machine, which it installs"
 	@echo "make build  the release binary, $(TARGET)/release/meniscus"
 	@echo "make dist   an archive with the program, licences, a bill of materials and checksums"
@@ -33,7 +36,21 @@ help:
 setup:
 	@deploy/setup.sh $(PACKAGES)
 
-build: setup
+# The page is bundled from api/page and becomes a part of the program.
+PAGE := api/page
+PAGE_SOURCES := $(shell find $(PAGE)/src -type f -not -name api-types.ts) $(PAGE)/build.mjs $(PAGE)/package.json
+
+page: $(PAGE)/dist/index.html
+
+$(PAGE)/node_modules/ready: $(PAGE)/package.json $(PAGE)/package-lock.json
+	deploy/setup.sh $(NODE_PACKAGES)
+	npm ci --prefix $(PAGE) --silent --no-audit --no-fund
+	touch $@
+
+$(PAGE)/dist/index.html: $(PAGE)/node_modules/ready $(PAGE_SOURCES)
+	cd $(PAGE) && node build.mjs
+
+build: setup page
 	MENISCUS_COMMIT="$$(git rev-parse --short=12 HEAD 2> /dev/null || true)" cargo build --release --locked -p meniscus-api
 
 # The debug information stays here; the archive is the same bytes whenever the program is.
@@ -59,7 +76,7 @@ $(VENV)/models/ready: tests/python/models.py $(VENV)/ready
 	touch $@
 
 # The binary under test has debug assertions, like the tests.
-test: setup $(VENV)/ready $(VENV)/models/ready
+test: setup page $(VENV)/ready $(VENV)/models/ready
 	cargo build --profile test --locked -p meniscus-api
 	export MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)" \
 	MENISCUS_NODE_TOOLS="$(abspath $(VENV)/node/node_modules/.bin)" MENISCUS_MODELS="$(abspath $(VENV)/models)"; \
@@ -104,5 +121,11 @@ check-portable: setup
 check-deploy:
 	deploy/check.sh
 
+# Pictures of every view for docs/guide.
+screenshots: page $(VENV)/ready
+	cargo build --profile test --locked -p meniscus-api
+	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_NODE_TOOLS="$(abspath $(VENV)/node/node_modules/.bin)" \
+	MENISCUS_PICTURES="$(abspath docs/guide/pictures)" cargo test --locked --test browser -- --ignored pictures_of_every_view
+
 clean:
-	rm -rf $(TARGET) $(VENV) demo-output soak-output
+	rm -rf $(TARGET) $(VENV) $(PAGE)/dist $(PAGE)/node_modules demo-output soak-output dist

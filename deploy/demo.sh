@@ -23,7 +23,7 @@ mkfifo "$data/announcement"
 service=$!
 read -r announcement < "$data/announcement"
 url=${announcement#listening on }
-echo "service at $url"
+echo "service at $url: open it in a browser and watch"
 until curl -sf "$url/readyz" > /dev/null; do sleep 0.05; done
 
 # Submits one scene, watches it to its end and fetches everything into a directory of its own.
@@ -33,6 +33,7 @@ run() {
     echo "curl -X POST $url/v1/jobs -d '$body'"
     local job status state fraction eta filled bar
     job=$(curl -sf -X POST "$url/v1/jobs" -H 'content-type: application/json' -d "$body" | jq -r .id)
+    echo "$url/#/jobs/$job"
     while :; do
         status=$(curl -sf "$url/v1/jobs/$job")
         read -r state fraction eta < <(jq -r '[.state, .progress.fraction, (.progress.eta_s // "?")] | @tsv' <<< "$status")
@@ -81,3 +82,11 @@ echo "frames    frames.vtkhdf.series (open it in ParaView)"
 echo "picture   picture.svg (particles by distance, zero level, t = 0, 4, 8)"
 echo "report    report.json"
 echo "series    series.csv"
+echo
+if [ -t 0 ] && [ "${DEMO_KEEP:-1}" != 0 ]; then
+    echo "the page is at $url/; Ctrl-C ends the service"
+    trap exit INT
+    wait "$service"
+else
+    echo "the page was at $url/; with a terminal, and without DEMO_KEEP=0, the service goes on"
+fi

@@ -176,30 +176,7 @@ const BLOCKING_THREADS: usize = 16;
 #[must_use]
 pub fn main() -> ExitCode {
     match Arguments::parse().command {
-        Command::Serve { config, choices } => {
-            telemetry::start();
-            let reloading = Reloading { flags: choices.clone(), file: config.clone() };
-            let choices = match config.map(|path| Choices::from_file(&path)).transpose() {
-                Ok(file) => choices.or(file.unwrap_or_default()),
-                Err(error) => return fail(&error),
-            };
-            let config = match Config::new(&choices) {
-                Ok(config) => config,
-                Err(error) => return fail(&error),
-            };
-            let runtime = match tokio::runtime::Builder::new_multi_thread()
-                .max_blocking_threads(BLOCKING_THREADS)
-                .enable_all()
-                .build()
-            {
-                Ok(runtime) => runtime,
-                Err(error) => return fail(&error),
-            };
-            let served = runtime.block_on(serve::serve(config, reloading));
-            // Handlers that still wait for a disk do not delay the end.
-            runtime.shutdown_background();
-            served.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
-        }
+        Command::Serve { config, choices } => run_service(config, choices),
         Command::Run { file, out, threads } => foreground::run(&file, &out, threads).unwrap_or_else(|e| fail(&e)),
         Command::Resume { checkpoint, out, threads } => {
             foreground::resume(&checkpoint, &out, threads).unwrap_or_else(|error| fail(&error))
@@ -234,6 +211,29 @@ pub fn main() -> ExitCode {
             worker_code(ran)
         }
     }
+}
+
+/// Runs the service until it is told to stop.
+fn run_service(config: Option<PathBuf>, choices: Choices) -> ExitCode {
+    telemetry::start();
+    let reloading = Reloading { flags: choices.clone(), file: config.clone() };
+    let choices = match config.map(|path| Choices::from_file(&path)).transpose() {
+        Ok(file) => choices.or(file.unwrap_or_default()),
+        Err(error) => return fail(&error),
+    };
+    let config = match Config::new(&choices) {
+        Ok(config) => config,
+        Err(error) => return fail(&error),
+    };
+    let runtime =
+        match tokio::runtime::Builder::new_multi_thread().max_blocking_threads(BLOCKING_THREADS).enable_all().build() {
+            Ok(runtime) => runtime,
+            Err(error) => return fail(&error),
+        };
+    let served = runtime.block_on(serve::serve(config, reloading));
+    // Handlers that still wait for a disk do not delay the end.
+    runtime.shutdown_background();
+    served.map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS)
 }
 
 /// How a worker without a pipe lives.

@@ -75,7 +75,7 @@ pub fn spend(state: &AppState, client: &Client) -> Result<Option<Budget>, ApiErr
 /// Bytes that are free on the disk beyond the reserve.
 #[must_use]
 pub fn free_bytes(state: &AppState) -> u64 {
-    let free = process::free_space(state.store.directory()).unwrap_or(u64::MAX);
+    let free = process::free_space(state.store.jobs_directory()).unwrap_or(u64::MAX);
     free.saturating_sub(state.config.disk_reserve_bytes)
 }
 

@@ -17,6 +17,7 @@ pub mod foreground;
 pub mod idempotency;
 pub mod layers;
 pub mod openapi;
+pub mod page;
 pub mod pagination;
 pub mod path;
 pub mod problems;

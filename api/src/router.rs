@@ -5,6 +5,7 @@ use crate::error::ApiError;
 use crate::layers::encoding::IsText;
 use crate::layers::{access, encoding, readiness, request_id, request_log, security_headers};
 use crate::openapi::{self, Document};
+use crate::page;
 use crate::routes::{
     checkpoints, estimates, events, files, job_changes, jobs, metrics, problems, results, scenes, service, studies,
     tickets, uploads,
@@ -12,6 +13,7 @@ use crate::routes::{
 use crate::state::AppState;
 use axum::Router;
 use axum::body::Bytes;
+use axum::extract::Request;
 use axum::http::request::Parts;
 use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::{from_fn, from_fn_with_state};
@@ -22,6 +24,7 @@ use tower_http::compression::CompressionLayer;
 use tower_http::cors::{AllowHeaders, AllowOrigin, CorsLayer};
 use tower_http::decompression::RequestDecompressionLayer;
 use tower_http::timeout::RequestBodyTimeoutLayer;
+use tower_service::Service;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -78,7 +81,7 @@ pub fn router(state: AppState) -> Router {
     let document = ([(header::CONTENT_TYPE, "application/json")], document);
     let routes = routes
         .route("/openapi.json", axum::routing::get(move || async move { document }))
-        .fallback(|| async { ApiError::NotFound("resource") })
+        .fallback(page::get)
         .method_not_allowed_fallback(|| async { ApiError::MethodNotAllowed })
         .layer(from_fn_with_state(state.clone(), readiness::check))
         .layer(from_fn_with_state(state.clone(), access::check))
@@ -95,11 +98,15 @@ pub fn router(state: AppState) -> Router {
     if base_path::get().is_empty() {
         return routes;
     }
+    // The folder itself is the page.
+    let whole = routes.clone();
+    let folder = move |request: Request| Service::call(&mut whole.clone(), request);
     // Probes come without the proxy and do not know its path.
     Router::new()
         .route("/healthz", axum::routing::get(service::health))
         .route("/readyz", axum::routing::get(service::ready))
         .with_state(state)
+        .route(&format!("{}/", base_path::get()), axum::routing::any(folder))
         .nest(base_path::get(), routes)
         .fallback(|| async { ApiError::NotFound("resource; the service answers below its base path") })
 }

@@ -11,3 +11,4 @@ pub mod log;
 pub mod observers;
 pub mod process;
 pub mod report;
+mod start_checkpoint;

@@ -208,6 +208,8 @@ fn a_signal_to_the_worker_is_an_eviction_and_a_kill_a_death() {
     eventually("there is a second attempt", Duration::from_secs(30), || {
         (service.job(&id)["attempt"] == 2).then_some(())
     });
+    let heartbeat = attempt_directory(&cluster, &id, 2).join("heartbeat.json");
+    eventually("it gives signs of life", Duration::from_secs(30), || heartbeat.exists().then_some(()));
     signal(service.worker_eventually(&id), Signal::KILL);
     let job = service.wait_for(&id, &["succeeded"]);
     assert_eq!(job["attempt"], 3, "{job}");

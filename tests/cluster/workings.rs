@@ -156,7 +156,7 @@ fn another_build_on_a_node_is_named_and_nothing_is_lost() {
 
 /// A job of half a second, whose running time is known from one before.
 fn short_body() -> serde_json::Value {
-    json!({"scene": {"kind": "redistance", "spacing": 0.05, "repeat": 100}, "checkpoint": {"every_steps": 20}})
+    json!({"scene": {"kind": "redistance", "spacing": 0.05, "repeat": 600}, "checkpoint": {"every_steps": 20}})
 }
 
 #[test]
@@ -234,6 +234,26 @@ fn a_bundle_that_the_cluster_ends_gives_its_attempts_back() {
     cluster.ask("scancel", &["--me", &format!("--name={name}")]).unwrap();
     for id in &ids {
         service.wait_for(id, &["succeeded"]);
+        assert_eq!((service.frames(id), service.series(id)), expected, "{id}");
+    }
+}
+
+#[test]
+#[ignore = "needs Slurm: make test-cluster"]
+fn a_worker_of_a_bundle_that_dies_is_tried_again_while_the_others_go_on() {
+    let cluster = Cluster::start();
+    let service = serve(&cluster);
+    let mut short = short_body();
+    short["scene"]["spacing"] = json!(0.02);
+    short["scene"]["repeat"] = json!(100);
+    let first = service.submit(&short);
+    service.wait_for(&first, &["succeeded"]);
+    let expected = (service.frames(&first), service.series(&first));
+    let ids: Vec<String> = (0..6).map(|_| service.submit(&short)).collect();
+    crate::service::signal(service.worker_eventually(&ids[0]), rustix::process::Signal::KILL);
+    for id in &ids {
+        let job = service.wait_for(id, &["succeeded"]);
+        assert_eq!(job["attempt"].as_u64(), Some(if *id == ids[0] { 2 } else { 1 }), "{job}");
         assert_eq!((service.frames(id), service.series(id)), expected, "{id}");
     }
 }

@@ -97,6 +97,8 @@ pub enum ExecutorError {
 
 /// Memory of a job by default.
 const MEMORY_BYTES: u64 = 4 << 30;
+/// Time between the start of a job and the signal before its limit, in seconds.
+const LEAST_WORK_S: f64 = 5.0;
 /// Signs of life that a lease must outlast.
 const HEARTBEATS: f64 = 2.0;
 
@@ -138,6 +140,10 @@ impl ExecutorChoices {
         let heartbeat = time("heartbeat-s", self.heartbeat_s, default.heartbeat, 0.1)?;
         let late_files = time("settle-grace-s", self.settle_grace_s, default.late_files, 0.0)?;
         let least_lease = HEARTBEATS * heartbeat.as_secs_f64() + late_files.as_secs_f64();
+        let grace = time("grace-s", self.grace_s, default.grace, 1.0)?;
+        // A job must have time to work before it is told to stop.
+        let least_limit = grace.as_secs_f64() + LEAST_WORK_S;
+        let limit = self.time_limit_s.map(|given| time("time-limit-s", Some(given), Duration::ZERO, least_limit));
         let settings = Settings {
             commands: self.commands.clone(),
             options: self.options.clone(),
@@ -153,11 +159,8 @@ impl ExecutorChoices {
             late_files,
             heartbeat,
             lease: time("lease-s", self.lease_s, default.lease, least_lease)?,
-            time_limit: self
-                .time_limit_s
-                .map(|given| time("time-limit-s", Some(given), Duration::ZERO, 60.0))
-                .transpose()?,
-            grace: time("grace-s", self.grace_s, default.grace, 1.0)?,
+            time_limit: limit.transpose()?,
+            grace,
             drains,
             ..default
         };

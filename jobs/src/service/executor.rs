@@ -160,7 +160,7 @@ pub enum Eviction {
     TimeLimit,
     /// The cluster does not know it any more, and it gives no sign of life.
     Forgotten,
-    /// Somebody took it out of the cluster's queue.
+    /// It was taken out of the cluster's queue by hand.
     Revoked,
     /// The node did not grant what a worker needs to begin.
     NotBegun,

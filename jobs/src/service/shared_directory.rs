@@ -20,7 +20,7 @@ struct Marker {
 /// Why a shared directory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SharedDirectoryError {
-    /// It belongs to another data directory, or to somebody else.
+    /// It belongs to another data directory, or is none of ours.
     #[error("{} cannot be shared: {found}. Nothing there was changed; give executor.shared a new or empty directory", directory.display())]
     NotOurs {
         /// The directory.
@@ -28,6 +28,9 @@ pub enum SharedDirectoryError {
         /// What is in it.
         found: String,
     },
+    /// It was used before, and is not there now.
+    #[error("{} has no {MARKER}, though the jobs of this data directory lie there: is it mounted? Nothing was changed", .0.display())]
+    Missing(PathBuf),
     /// The data directory has files of its own, or a link to another place.
     #[error("{} {found}. Stop the service, move its content to {}, and start again", folder.display(), wanted.display())]
     InTheWay {
@@ -58,6 +61,11 @@ pub fn link(data: &DataDirectory, shared: &Path, adopt: bool) -> Result<PathBuf,
         let path = path.to_owned();
         move |error| SharedDirectoryError::Io { path, error }
     };
+    let is_linked = std::fs::symlink_metadata(data.path().join(store::JOBS)).is_ok_and(|meta| meta.is_symlink());
+    if is_linked && !shared.join(MARKER).is_file() {
+        // An empty mount point must not pass for a new directory: everything in it would be taken for lost.
+        return Err(SharedDirectoryError::Missing(shared.to_owned()));
+    }
     std::fs::create_dir_all(shared).map_err(failed(shared))?;
     let shared = std::fs::canonicalize(shared).map_err(failed(shared))?;
     recognize(&shared, data.id(), adopt)?;
@@ -149,6 +157,12 @@ mod tests {
             store.close();
         }
         assert!(data.path().join("meniscus.sqlite").is_file() && !shared.join("meniscus.sqlite").exists());
+        // It is not mounted: nothing passes for new.
+        std::fs::rename(&shared, place.path().join("elsewhere")).unwrap();
+        std::fs::create_dir(&shared).unwrap();
+        let error = link(&DataDirectory::open(data.path()).unwrap(), &shared, false).unwrap_err();
+        assert!(error.to_string().contains("is it mounted"), "{error}");
+        assert_eq!(std::fs::read_dir(&shared).unwrap().count(), 0);
     }
 
     #[test]

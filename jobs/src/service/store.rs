@@ -167,12 +167,18 @@ impl Store {
         self.jobs.join(job)
     }
 
+    /// The folder of all jobs, on whichever file system it lies.
+    #[must_use]
+    pub fn jobs_directory(&self) -> &Path {
+        &self.jobs
+    }
+
     /// The folder of uploads.
     pub(super) fn uploads_directory(&self) -> &Path {
         &self.uploads
     }
 
-    /// Files of attempts of which a process may still write are deleted later. Only the first call counts.
+    /// Attempts run on a cluster: files of those of which a process may still write are deleted later. Only the first call counts.
     pub fn spare_orphans(&self, orphans: Orphans) {
         // There is one executor.
         let _ = self.orphans.set(orphans);
@@ -188,6 +194,11 @@ impl Store {
     #[must_use]
     pub fn watch(&self) -> watch::Receiver<u64> {
         self.changes.subscribe()
+    }
+
+    /// Whether attempts run on a cluster.
+    fn is_on_cluster(&self) -> bool {
+        self.orphans.get().is_some()
     }
 
     pub(crate) fn read(&self) -> MutexGuard<'_, Connection> {

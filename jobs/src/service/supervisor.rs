@@ -108,6 +108,10 @@ struct Running {
     heard: Duration,
     /// Time at which its verdict came; the process is to end soon after.
     verdict_since: Option<Duration>,
+    /// Time at which its end was first seen.
+    ended: Option<Duration>,
+    /// Whether it was noted why it is killed.
+    is_kill_noted: bool,
     /// Memory that was reserved for it.
     reserved_bytes: u64,
     disk_checked: Instant,
@@ -314,7 +318,13 @@ impl Supervisor {
         if imported.has_checkpoint {
             self.prune_checkpoints(running)?;
         }
+        if imported.verdict.is_some() {
+            running.verdict_since.get_or_insert(self.clock.now());
+        }
         if let Some(cause) = end {
+            if self.has_words_to_come(running, cause, imported.is_whole)? {
+                return Ok(false);
+            }
             self.finish(running, cause, imported.is_whole)?;
             return Ok(true);
         }
@@ -323,9 +333,6 @@ impl Supervisor {
         }
         self.note_phase(running)?;
         let now = self.clock.now();
-        if imported.verdict.is_some() {
-            running.verdict_since = Some(now);
-        }
         match running.verdict_since {
             Some(since) if now - since >= TIME_TO_EXIT => running.worker.kill(),
             Some(_) => {}
@@ -334,13 +341,24 @@ impl Supervisor {
         Ok(false)
     }
 
+    /// Whether a worker that ended in good order has left a verdict that is not seen here yet.
+    fn has_words_to_come(&self, running: &mut Running, cause: EndCause, is_whole: bool) -> Result<bool, StoreError> {
+        let late = self.executor.late_files();
+        if late.is_zero() || cause != (EndCause::Exited { code: 0 }) {
+            return Ok(false);
+        }
+        let has_verdict = is_whole && self.store.job(&running.job)?.is_none_or(|row| row.verdict.is_some());
+        let since = *running.ended.get_or_insert(self.clock.now());
+        Ok(!has_verdict && self.clock.now() - since < late)
+    }
+
     /// Finishes the attempt of a worker that has ended.
     fn finish(&mut self, running: &Running, cause: EndCause, is_whole: bool) -> Result<(), StoreError> {
         if cause == (EndCause::Exited { code: i32::from(NOT_STARTED_CODE) }) {
             return self.miss(&running.job, running.epoch, "the system did not grant what a worker needs");
         }
         // On a full device a worker cannot leave a verdict either.
-        let is_full = process::free_space(self.store.directory()).is_some_and(|free| free < VERDICT_BYTES);
+        let is_full = process::free_space(self.store.jobs_directory()).is_some_and(|free| free < VERDICT_BYTES);
         let loss = match cause {
             EndCause::OutOfMemory => LossCause::new(Reason::WorkerOom, LossKind::Death),
             EndCause::Evicted(why) => self.eviction(running, why),

@@ -88,7 +88,8 @@ impl Calibration {
     }
 
     /// Seconds of a unit: of this family, else of the same kind in the same dimension, else over all.
-    fn seconds_per_unit(&self, family: &str, phase: &str) -> Option<f64> {
+    #[must_use]
+    pub fn seconds_per_unit(&self, family: &str, phase: &str) -> Option<f64> {
         let ratio = |m: Measured| (m.work > 0.0).then_some(m.seconds / m.work);
         if let Some(found) = self.known.get(&(family.to_owned(), phase.to_owned())).and_then(|m| ratio(*m)) {
             return Some(found);

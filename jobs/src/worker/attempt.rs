@@ -1,6 +1,6 @@
 //! One attempt at a job: build, restore, run under observers, finish, say how it ended.
 
-use crate::formats::checkpoint::{self, CheckpointError, Counters, Meta};
+use crate::formats::checkpoint::{CheckpointError, Counters};
 use crate::formats::{frame_view, operator_files, picture};
 use crate::spec::accuracy::ChosenAccuracy;
 use crate::spec::attempt_files;
@@ -22,17 +22,15 @@ use crate::worker::observers::progress::ProgressMeter;
 use crate::worker::observers::series::Series;
 use crate::worker::observers::{Control, Observers};
 use crate::worker::report;
+use crate::worker::start_checkpoint::{Refusal, load, open_when_there};
 use meniscus::scene::{self, BuildContext, Scene};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::run::{Ending, ObserverError};
-use meniscus::simulation::{CpuClock, LoadError, Measures, RunError, Section, Simulation, StepError, run};
+use meniscus::simulation::{CpuClock, Measures, RunError, Simulation, StepError, run};
 use serde::Deserialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::time::{Duration, Instant};
-
-/// Time between two tries to read a checkpoint that another machine wrote.
-const LATE_FILE_INTERVAL: Duration = Duration::from_millis(500);
+use std::time::Instant;
 
 /// Runs one attempt to its verdict, which is also its last record. Panics become a verdict.
 pub fn run_attempt(spec: &AttemptSpec, directory: &Path, control: &Control, sink: &mut dyn RecordSink) -> Verdict {
@@ -291,49 +289,6 @@ fn restore(
         return Ok(Start::default());
     }
     Err(Failure::Known(Reason::CheckpointNoneValid, format!("{} checkpoints were tried", spec.checkpoints.len())))
-}
-
-fn load(simulation: &mut dyn Simulation, meta: &Meta, state: Section) -> Result<(), LoadError> {
-    let state = checkpoint::state_for(simulation, meta, state)?;
-    simulation.load(&state)
-}
-
-enum Refusal {
-    Damaged(String),
-    Incompatible(String),
-}
-
-/// Opens a checkpoint. One that another machine wrote may not be whole here yet: it is tried again for a while.
-fn open_when_there(
-    spec: &AttemptSpec,
-    candidate: &StartCheckpoint,
-    began: Instant,
-) -> Result<(Meta, Section), Refusal> {
-    loop {
-        match open_start(spec, candidate) {
-            Err(Refusal::Damaged(_)) if began.elapsed().as_secs_f64() < spec.late_files_s => {
-                std::thread::sleep(LATE_FILE_INTERVAL);
-            }
-            opened => return opened,
-        }
-    }
-}
-
-fn open_start(spec: &AttemptSpec, candidate: &StartCheckpoint) -> Result<(Meta, Section), Refusal> {
-    let (meta, state) = checkpoint::read(&candidate.path, candidate.sha256.as_deref())
-        .map_err(|error| Refusal::Damaged(error.to_string()))?;
-    if !checkpoint::is_same_scene(&meta.body, &spec.body) {
-        let message = "the checkpoint is of another scene: fields that are not restart-safe differ";
-        return Err(Refusal::Incompatible(message.to_owned()));
-    }
-    let isa = crate::system::build::isa();
-    if meta.isa != isa && !candidate.allow_other_isa {
-        return Err(Refusal::Incompatible(format!(
-            "the checkpoint was written on {}, this worker computes on {isa}",
-            meta.isa
-        )));
-    }
-    Ok((meta, state))
 }
 
 fn refuse(

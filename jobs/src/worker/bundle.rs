@@ -1,5 +1,5 @@
 //! The process of a bundle: one job of a cluster that works through a fixed list of short attempts, some at a time. Each attempt has
-//! its own directory, claim and worker, as if it were alone; whoever claimed an attempt before keeps it.
+//! its own directory, claim and worker, as if it were alone; an attempt that was claimed before is passed over.
 
 use super::detached::{self, Terms};
 use crate::spec::attempt_files;
@@ -29,6 +29,8 @@ pub struct Bundle {
     pub terms: Terms,
 }
 
+/// Exit code of a worker that a signal has ended, as shells have it for SIGKILL.
+const KILLED_CODE: i32 = 137;
 /// Time between two looks at workers and signals.
 const LOOK: Duration = Duration::from_millis(5);
 
@@ -46,31 +48,40 @@ pub fn read_list(file: &Path) -> io::Result<Vec<PathBuf>> {
 /// When signals cannot be received, or this is another program than the one that was ordered.
 pub fn run(bundle: &Bundle) -> io::Result<()> {
     if let Some(cause) = detached::foreign_build(&bundle.terms)? {
+        // Each says why it did not begin.
+        for attempt in bundle.attempts.iter().filter(|attempt| claim(attempt, &bundle.owner)) {
+            say_last(attempt, NOT_STARTED_CODE.into(), Some(cause.clone()));
+        }
         return Err(io::Error::other(cause));
     }
     let mut signals = Signals::new([SIGTERM, SIGUSR1])?;
     let mut waiting = bundle.attempts.iter();
-    let mut workers: Vec<Child> = Vec::new();
+    let mut workers: Vec<(&PathBuf, Child)> = Vec::new();
     let mut is_over = false;
     loop {
         if signals.pending().any(|signal| signal == SIGTERM) {
             is_over = true;
-            workers.iter().filter_map(|worker| Pid::from_raw(worker.id().cast_signed())).for_each(|pid| {
+            workers.iter().filter_map(|(_, worker)| Pid::from_raw(worker.id().cast_signed())).for_each(|pid| {
                 // It may have ended in between.
                 let _ = kill_process(pid, Signal::TERM);
             });
         }
         let mut left = Vec::new();
-        for mut worker in workers {
-            if worker.try_wait()?.is_none() {
-                left.push(worker);
+        for (attempt, mut worker) in workers {
+            match worker.try_wait()? {
+                None => left.push((attempt, worker)),
+                // No other process sees how it ended.
+                Some(status) if !has_said_last(attempt) => {
+                    say_last(attempt, status.code().unwrap_or(KILLED_CODE), None);
+                }
+                Some(_) => {}
             }
         }
         workers = left;
         while !is_over && workers.len() < bundle.lanes.max(1) {
             let Some(attempt) = waiting.next() else { break };
             if claim(attempt, &bundle.owner) {
-                workers.extend(start(attempt, &bundle.terms));
+                workers.extend(start(attempt, &bundle.terms).map(|worker| (attempt, worker)));
             }
         }
         if workers.is_empty() && (is_over || waiting.len() == 0) {
@@ -80,10 +91,28 @@ pub fn run(bundle: &Bundle) -> io::Result<()> {
     }
 }
 
-/// Claims an attempt; false where somebody has it, the service that took it back included.
+/// Claims an attempt; false where it is claimed already, also by the service that took it back.
 fn claim(attempt: &Path, owner: &str) -> bool {
     let claim = attempt.join(attempt_files::CLAIM);
-    fs::create_dir(&claim).is_ok() && fs::write(claim.join(attempt_files::CLAIM_OWNER), format!("{owner}\n")).is_ok()
+    let is_claimed = fs::create_dir(&claim).is_ok();
+    if is_claimed {
+        // A claim without an owner holds as well.
+        let _ = fs::write(claim.join(attempt_files::CLAIM_OWNER), format!("{owner}\n"));
+    }
+    is_claimed
+}
+
+fn has_said_last(attempt: &Path) -> bool {
+    Heartbeat::read(attempt).is_some_and(|last| last.exit_code.is_some())
+}
+
+/// Says in a worker's place how it ended.
+fn say_last(attempt: &Path, exit_code: i32, cause: Option<String>) {
+    let before = Heartbeat::read(attempt);
+    let count = before.map_or(1, |last| last.count + 1);
+    let last = Heartbeat { count, memory_bytes: None, host: process::host_name(), exit_code: Some(exit_code), cause };
+    // Without it the attempt is given up when its lease is over.
+    let _ = last.write(attempt);
 }
 
 /// Starts the worker of an attempt. One that cannot be started says so in its sign of life.
@@ -103,11 +132,7 @@ fn start(attempt: &Path, terms: &Terms) -> Option<Child> {
     match started {
         Ok(worker) => Some(worker),
         Err(error) => {
-            let host = process::host_name();
-            let exit_code = Some(NOT_STARTED_CODE.into());
-            let last = Heartbeat { count: 1, memory_bytes: None, host, exit_code, cause: Some(error.to_string()) };
-            // Without it the attempt is given up when its lease is over.
-            let _ = last.write(attempt);
+            say_last(attempt, NOT_STARTED_CODE.into(), Some(error.to_string()));
             None
         }
     }

@@ -15,6 +15,7 @@ mod poller;
 mod script;
 mod submission;
 mod table;
+mod ticket;
 mod tracking;
 mod worker;
 
@@ -22,7 +23,7 @@ use super::{Adoption, AttemptPlace, Capacity, Executor, Needs, NotStarted, Notif
 use crate::spec::attempt_files;
 use crate::system::breakpoints::pass;
 use crate::system::{artifacts, digest};
-use errands::Errands;
+use errands::{Errand, Errands};
 use files::Files;
 use std::collections::{HashMap, HashSet};
 use std::fs::OpenOptions;
@@ -30,8 +31,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use submission::{ClusterJob, Stage, Submitter, Ticket};
+use submission::Submitter;
 use table::Table;
+use ticket::{ClusterJob, Order, Stage, Ticket};
 use worker::SlurmWorker;
 
 /// How the cluster is used.
@@ -41,7 +43,7 @@ pub struct Settings {
     pub program: PathBuf,
     /// Digest of the program.
     pub program_sha256: String,
-    /// Id of the service, for people who look at the cluster's table.
+    /// Id of the service, for people looking at the cluster's table.
     pub service_id: String,
     /// Directory of the cluster's commands; they are looked for as usual where there is none.
     pub commands: Option<PathBuf>,
@@ -155,6 +157,8 @@ struct Cluster {
     losses: Mutex<HashMap<String, Vec<Instant>>>,
     /// Tickets of all attempts that are watched, by their names.
     tickets: Mutex<HashMap<String, Ticket>>,
+    /// Bundles of which no attempt is left.
+    left_over: Mutex<HashSet<String>>,
     /// Whether the next look at the table is wanted soon.
     poll_soon: (Mutex<bool>, Condvar),
 }
@@ -207,16 +211,29 @@ impl Cluster {
         self.tickets().insert(name.to_owned(), ticket.clone());
     }
 
-    fn forget(&self, name: &str) {
+    /// Watches an attempt no longer. A bundle whose last attempt has ended is left over; at a stop of the service nothing has.
+    fn forget(&self, name: &str, has_ended: bool) {
         let mut tickets = self.tickets();
         let job = tickets.remove(name).map(|ticket| ticket.job()).filter(ClusterJob::is_bundled);
-        let last = job.filter(|job| !tickets.values().any(|ticket| ticket.job().name == job.name));
+        let last = job.filter(|job| has_ended && !tickets.values().any(|ticket| ticket.job().name == job.name));
         drop(tickets);
         self.files.forget(name);
-        // At a stop of the service its attempts go on.
-        if let Some(job) = last.filter(|job| !self.table().rows(&job.name).iter().any(|row| row.state.is_alive())) {
-            bundling::remove(&self.shared, &job.name);
+        if let Some(job) = last {
+            self.left_over.lock().unwrap_or_else(PoisonError::into_inner).insert(job.name);
         }
+    }
+
+    /// Ends bundles of which no attempt is left, and removes their lists once the cluster does not have them any more.
+    fn clear_bundles(&self, table: &Table) {
+        let mut left_over = self.left_over.lock().unwrap_or_else(PoisonError::into_inner);
+        left_over.retain(|name| {
+            let alive = table.rows(name).iter().find(|row| row.state.is_alive());
+            match alive {
+                Some(row) => self.errands.send(Errand::End { name: name.clone(), id: Some(row.id.clone()) }),
+                None => bundling::remove(&self.shared, name),
+            }
+            alive.is_some()
+        });
     }
 
     /// Where in the cluster an attempt is looked for.
@@ -278,6 +295,7 @@ impl SlurmExecutor {
             errands: Errands::start(settings.command("scancel"))?,
             losses: Mutex::default(),
             tickets: Mutex::default(),
+            left_over: Mutex::default(),
             poll_soon: (Mutex::new(false), Condvar::new()),
             settings,
         });
@@ -293,7 +311,7 @@ impl SlurmExecutor {
         let ticket = Ticket::new(stage, job, bundling::short_s(needs));
         self.cluster.watch(&name, &ticket);
         self.cluster.files.watch(&name, &attempt.directory, notify);
-        let order = submission::Order { attempt: attempt.clone(), needs: *needs, ticket };
+        let order = Order { attempt: attempt.clone(), needs: *needs, ticket };
         SlurmWorker::new(name, order, Arc::clone(&self.cluster), self.submitter.clone())
     }
 }
@@ -314,7 +332,8 @@ impl Executor for SlurmExecutor {
 
     /// An attempt that has a script may have been submitted, whether the service wrote that down or not.
     fn adopt(&self, attempt: &AttemptPlace, _: Option<&str>, needs: &Needs, notify: Notify) -> Adoption {
-        if !attempt.directory.join(attempt_files::SCRIPT).is_file() {
+        let script = std::fs::metadata(attempt.directory.join(attempt_files::SCRIPT));
+        if script.is_err_and(|error| error.kind() == io::ErrorKind::NotFound) {
             return Adoption::Gone;
         }
         self.cluster.poll_soon();

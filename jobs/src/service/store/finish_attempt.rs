@@ -96,7 +96,9 @@ fn decide(transaction: &Transaction, row: &JobRow, lost: &LossCause) -> Result<(
                         return step(Trigger::Fail, reason, message).map(|_| ());
                     }
                 }
-                let kept = if why == Some(Reason::UserPause) { why } else { reason.or(why) };
+                // A node that is taken back while a limit pauses the job changes nothing about the limit.
+                let is_kept = why == Some(Reason::UserPause) || reason == Some(Reason::WorkerEvicted);
+                let kept = if is_kept && why.is_some() { why } else { reason.or(why) };
                 step(if drained { Trigger::Drain } else { Trigger::Rest }, kept, None).map(|_| ())
             }
             // A worker ends as canceled on request only; without a request it counts as lost.

@@ -191,7 +191,11 @@ impl Store {
             rows::job(transaction, of.job)?.filter(|row| row.attempt == 1 && row.restarted_from.is_none())
         {
             let threads = RunOptions::from_resolved(&row.resolved)?.limits.threads;
-            calibration::add(transaction, &measured(&row.forecast, &report.cost, threads))?;
+            calibration::add(
+                transaction,
+                &self.machine_of(report.provenance.cpu.as_deref().unwrap_or("unknown")),
+                &measured(&row.forecast, &report.cost, threads),
+            )?;
             if let Some((problem, spacing)) = problem_of(transaction, of.job)? {
                 work_precision::keep(transaction, &of_report(&problem, spacing, &report))?;
             }

@@ -66,7 +66,10 @@ impl Supervisor {
 
     /// Kills a worker. The reason is written down first: a crash of the service must not turn a limit into bad luck.
     fn kill(&self, running: &mut Running, reason: Reason) -> Result<(), StoreError> {
-        self.store.note_kill(&running.job, running.epoch, reason)?;
+        if !running.is_kill_noted {
+            self.store.note_kill(&running.job, running.epoch, reason)?;
+            running.is_kill_noted = true;
+        }
         running.worker.kill();
         Ok(())
     }
@@ -116,7 +119,7 @@ impl Supervisor {
         self.space_checked = Instant::now();
         for job in self.store.paused_for(Reason::StorageEnospc)? {
             let needed = job.disk_bytes_to_come().saturating_add(self.settings.disk_reserve_bytes);
-            if process::free_space(self.store.directory()).is_some_and(|free| free > needed) {
+            if process::free_space(self.store.jobs_directory()).is_some_and(|free| free > needed) {
                 self.change(&job.id, Trigger::Resume, &Change::default())?;
             }
         }

@@ -16,7 +16,7 @@ use std::time::Instant;
 impl Supervisor {
     /// Takes and starts the next job of the queue; false when there is none that fits.
     pub(super) fn start_next(&mut self) -> Result<bool, StoreError> {
-        let free = process::free_space(self.store.directory()).unwrap_or(u64::MAX);
+        let free = process::free_space(self.store.jobs_directory()).unwrap_or(u64::MAX);
         let disk_left = free.saturating_sub(self.settings.disk_reserve_bytes);
         let capacity = self.executor.capacity(&self.reservations());
         if capacity.workers == 0 {
@@ -114,6 +114,8 @@ impl Supervisor {
             cancel_sent: None,
             heard: self.clock.now(),
             verdict_since: None,
+            ended: None,
+            is_kill_noted: false,
             reserved_bytes: job.forecast.memory_bytes,
             disk_checked: now,
             lease_renewed: now,

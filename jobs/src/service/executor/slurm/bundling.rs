@@ -1,7 +1,7 @@
 //! Bundles: attempts that are forecast to be short share one job of the cluster, which works through them one after another. Each
 //! keeps its directory, its claim and its worker, so that a bundle that ends early gives back what it has not begun.
 
-use super::submission::{ClusterJob, Order, Submission};
+use super::ticket::{ClusterJob, Order, Submission};
 use super::{Cluster, script};
 use crate::service::executor::Needs;
 use crate::spec::attempt_files;
@@ -88,7 +88,12 @@ pub(super) fn prepare(orders: Vec<Order>, cluster: &Cluster) -> Result<Submissio
         return Ok(Submission { name, orders: if is_wanted { orders } else { Vec::new() }, arguments });
     }
     let name = format!("{}bundle_{}-1", script::NAME_PREFIX, Ulid::generate());
+    // From here on one that is taken back is claimed by the service: the list may have it.
+    let begin =
+        |(place, order): &(usize, Order)| order.ticket.begin(ClusterJob { name: name.clone(), place: Some(*place) });
+    let orders: Vec<Order> = orders.into_iter().enumerate().filter(begin).map(|(_, order)| order).collect();
     if let Err(error) = write(&name, &orders, cluster) {
+        remove(&cluster.shared, &name);
         return Err((orders, error));
     }
     let lanes = settings.lanes as u64;
@@ -102,9 +107,6 @@ pub(super) fn prepare(orders: Vec<Order>, cluster: &Cluster) -> Result<Submissio
     let (directory, script, log) = (folder(&cluster.shared), format!("{name}.sh"), format!("{name}.log"));
     let call = script::Call { name: &name, directory: &directory, script: &script, log: &log, needs };
     let arguments = script::arguments(&call, settings);
-    let begin =
-        |(place, order): &(usize, Order)| order.ticket.begin(ClusterJob { name: name.clone(), place: Some(*place) });
-    let orders = orders.into_iter().enumerate().filter(begin).map(|(_, order)| order).collect();
     Ok(Submission { name, orders, arguments })
 }
 
@@ -121,7 +123,8 @@ fn write(name: &str, orders: &[Order], cluster: &Cluster) -> io::Result<()> {
     let lines: String = orders.iter().map(|order| format!("{}\n", order.attempt.directory.display())).collect();
     fs::write(&list, lines)?;
     fs::write(folder.join(format!("{name}.sh")), script::bundle_script(&list, &cluster.settings))?;
-    for (place, order) in orders.iter().enumerate() {
+    for order in orders {
+        let place = order.ticket.job().place.unwrap_or_default();
         let text = serde_json::to_vec(&Membership { name: name.to_owned(), place })?;
         fs::write(order.attempt.directory.join(attempt_files::BUNDLE), text)?;
     }
@@ -136,7 +139,7 @@ pub(super) fn job_of(directory: &Path, own_name: String) -> ClusterJob {
         .map_or_else(|| ClusterJob::own(own_name), |member| ClusterJob { name: member.name, place: Some(member.place) })
 }
 
-/// Removes what belongs to a bundle of which nobody watches an attempt any more.
+/// Removes what belongs to a bundle that is over or was never submitted; of another name nothing is there.
 pub(super) fn remove(shared: &Path, name: &str) {
     for ending in ["txt", "sh", "log"] {
         // What cannot be removed is small and does no harm.
@@ -147,7 +150,7 @@ pub(super) fn remove(shared: &Path, name: &str) {
 #[cfg(test)]
 mod tests {
     use super::{is_gathering, places_for, short_s, take_next};
-    use crate::service::executor::slurm::submission::{ClusterJob, Order, Stage, Ticket};
+    use crate::service::executor::slurm::ticket::{ClusterJob, Order, Stage, Ticket};
     use crate::service::executor::{AttemptPlace, Needs};
     use std::collections::VecDeque;
     use std::time::{Duration, Instant};

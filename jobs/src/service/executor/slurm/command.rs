@@ -51,7 +51,7 @@ pub fn run<S: AsRef<OsStr>>(
         .stderr(Stdio::piped())
         .spawn()
         .map_err(not_run)?;
-    // A long answer would fill the pipe while nobody reads it.
+    // A long answer would fill a pipe that is not read.
     let output = child.stdout.take().map(Reader::start);
     let errors = child.stderr.take().map(Reader::start);
     let has_said =

@@ -1,16 +1,18 @@
 //! Calls of `scancel`, on a thread of their own.
 
 use super::command;
+use std::collections::HashSet;
 use std::io;
 use std::path::PathBuf;
 use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Time that `scancel` has to answer.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 /// What to tell the cluster about a job.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Errand {
     /// Its worker has a request to read.
     Hint {
@@ -40,29 +42,37 @@ impl Errand {
     }
 }
 
-/// Takes errands.
+/// Takes errands. One that waits is not put into the line once more.
 #[derive(Debug)]
-pub(super) struct Errands(Sender<Errand>);
+pub(super) struct Errands {
+    sender: Sender<Errand>,
+    waiting: Arc<Mutex<HashSet<Errand>>>,
+}
 
 impl Errands {
     /// Starts the thread; it ends when this is dropped.
     pub(super) fn start(scancel: PathBuf) -> io::Result<Self> {
         let (sender, receiver) = channel::<Errand>();
+        let waiting: Arc<Mutex<HashSet<Errand>>> = Arc::default();
+        let left = Arc::clone(&waiting);
         std::thread::Builder::new().name("slurm-cancel".to_owned()).spawn(move || {
             for errand in receiver {
+                left.lock().unwrap_or_else(PoisonError::into_inner).remove(&errand);
                 if let Err(error) = command::run(&scancel, errand.arguments(), TIME_LIMIT, None) {
-                    // Whoever sent it sends it again while the job is there.
+                    // It is sent again while the job is there.
                     tracing::debug!(?errand, %error, "scancel gave no answer");
                 }
             }
         })?;
-        Ok(Self(sender))
+        Ok(Self { sender, waiting })
     }
 
     /// Does an errand soon.
     pub(super) fn send(&self, errand: Errand) {
-        // Without a thread nothing can be told.
-        let _ = self.0.send(errand);
+        if self.waiting.lock().unwrap_or_else(PoisonError::into_inner).insert(errand.clone()) {
+            // Without a thread nothing can be told.
+            let _ = self.sender.send(errand);
+        }
     }
 }
 

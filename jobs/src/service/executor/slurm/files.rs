@@ -2,7 +2,7 @@
 //! since a shared file system may let a look hang, and each file is opened anew, so that a look sees what another machine has closed.
 
 use super::Cluster;
-use super::submission::ClusterJob;
+use super::ticket::ClusterJob;
 use crate::service::executor::Notify;
 use crate::spec::attempt_files;
 use crate::spec::heartbeat::Heartbeat;
@@ -28,23 +28,35 @@ pub(super) struct Seen {
     pub(super) heartbeat: Option<Heartbeat>,
     /// When one of the two last changed, by this machine's clock.
     pub(super) changed: Option<Instant>,
+    /// When a look last got an answer of the file system.
+    pub(super) looked: Option<Instant>,
+    /// Whether the claim is taken though it has no owner.
+    pub(super) is_claimed: bool,
     /// Number of the cluster's job that claimed it.
     pub(super) owner: Option<String>,
     /// Whether the cluster put that job back into its queue and it came to the claim again.
     pub(super) was_requeued: bool,
-    /// Whether there may be records that nobody has read yet.
+    /// Whether there may be records that are not read yet.
     pub(super) has_news: bool,
 }
 
 impl Seen {
     /// Whether a process of the attempt has begun.
     pub(super) fn has_begun(&self) -> bool {
-        self.heartbeat.is_some() || self.owner.is_some() || self.records_bytes > 0
+        self.gave_life() || self.owner.is_some() || self.is_claimed
+    }
+
+    /// Whether its program has done anything.
+    pub(super) fn gave_life(&self) -> bool {
+        self.heartbeat.is_some() || self.records_bytes > 0
     }
 
     /// Takes what a look has found; whether anything is new.
     fn take(&mut self, found: Look) -> bool {
-        let Look { records_bytes, heartbeat, owner, was_requeued } = found;
+        let Look { records_bytes, heartbeat, owner, was_requeued, is_answer } = found;
+        if is_answer {
+            self.looked = Some(Instant::now());
+        }
         let is_new = records_bytes > self.records_bytes || heartbeat.is_some() && heartbeat != self.heartbeat;
         if is_new {
             self.records_bytes = records_bytes.max(self.records_bytes);
@@ -134,18 +146,23 @@ struct Look {
     heartbeat: Option<Heartbeat>,
     owner: Option<String>,
     was_requeued: bool,
+    /// Whether the file system answered; that a file is not there is an answer.
+    is_answer: bool,
 }
 
 impl Look {
     fn at(directory: &Path) -> Self {
         let size =
             |name: &str| File::open(directory.join(name)).and_then(|file| file.metadata()).map(|meta| meta.len());
+        let records = size(attempt_files::RECORDS);
+        let is_answer = records.as_ref().err().is_none_or(|error| error.kind() == io::ErrorKind::NotFound);
         let claim = directory.join(attempt_files::CLAIM);
         let text = std::fs::read_to_string(claim.join(attempt_files::CLAIM_OWNER)).ok();
         // The number of a restart follows the number of the job.
         let owner = text.and_then(|text| text.trim().split('.').next().map(str::to_owned)).filter(|id| !id.is_empty());
         Self {
-            records_bytes: size(attempt_files::RECORDS).unwrap_or(0),
+            is_answer,
+            records_bytes: records.unwrap_or(0),
             heartbeat: Heartbeat::read(directory),
             was_requeued: owner.as_ref().is_some_and(|id| came_second(&claim, id)),
             owner,

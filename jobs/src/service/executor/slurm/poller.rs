@@ -40,7 +40,10 @@ fn look(cluster: &Cluster) -> Duration {
     metrics::histogram!("meniscus_slurm_squeue_seconds").record(spent.as_secs_f64());
     let mut held = cluster.table();
     match answer {
-        Ok(answer) => held.take(&answer, script::NAME_PREFIX, asked),
+        Ok(answer) => {
+            held.take(&answer, script::NAME_PREFIX, asked);
+            cluster.clear_bundles(&held);
+        }
         Err(error) => {
             if held.trouble.is_none() {
                 tracing::warn!(%error, "the cluster gives no answer; what it said before stands");

@@ -4,6 +4,7 @@ use super::Settings;
 use crate::service::executor::Needs;
 use crate::spec::attempt_files;
 use std::path::Path;
+use std::time::Duration;
 
 /// Exit code of a process that came second: EX_TEMPFAIL, as [`crate::spec::requests::NOT_STARTED_CODE`].
 const CAME_SECOND: u8 = 75;
@@ -114,10 +115,15 @@ pub fn arguments(call: &Call, settings: &Settings) -> Vec<String> {
 /// Memory that the cluster grants by that which a job may use: our own limit comes first.
 const MEMORY_MARGIN: f64 = 1.05;
 
+/// Time by which `--signal` may come early.
+const SIGNAL_MARGIN: Duration = Duration::from_secs(60);
+
 /// The limit of time in minutes: that of the job or that of the site, whichever comes first, and the time to write a checkpoint.
 fn time_limit(needs: &Needs, settings: &Settings) -> Option<u64> {
     let site = settings.time_limit.map(|limit| limit.as_secs_f64());
-    let own = needs.wall_s.map(|wall| wall + settings.grace.as_secs_f64());
+    // The service's own limit comes first: it begins to count later than the cluster, whose signals may come a minute early.
+    let margin = settings.grace * 2 + settings.poll + SIGNAL_MARGIN;
+    let own = needs.wall_s.map(|wall| wall + margin.as_secs_f64());
     let seconds = match (own, site) {
         (Some(own), Some(site)) => own.min(site),
         (own, site) => own.or(site)?,
@@ -183,7 +189,7 @@ mod tests {
             "--job-name=mns-job_1-2",
             "--mem=105M",
             "--cpus-per-task=4",
-            "--time=11",
+            "--time=14",
             "--export=NIL",
             "--no-requeue",
             "--partition=main",

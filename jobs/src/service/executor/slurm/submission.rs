@@ -1,13 +1,14 @@
 //! Submissions: one thread that runs `sbatch`, one attempt after another.
 
 use super::command::{self, NoAnswer};
+use super::errands::Errand;
+use super::ticket::{Order, Stage, Submission};
 use super::{Cluster, Settings, bundling};
-use crate::service::executor::{AttemptPlace, Needs};
 use crate::system::breakpoints::pass;
 use std::collections::VecDeque;
 use std::io;
+use std::sync::Weak;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 /// Time that `sbatch` has to answer.
@@ -18,118 +19,6 @@ const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 /// Time between two looks for new orders while others wait for the end of a pause.
 const TICK: Duration = Duration::from_millis(100);
-
-/// An attempt to submit.
-#[derive(Debug, Clone)]
-pub(super) struct Order {
-    pub(super) attempt: AttemptPlace,
-    pub(super) needs: Needs,
-    pub(super) ticket: Ticket,
-}
-
-/// How far a submission is.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Stage {
-    /// In this service's line, with what the cluster said when it was last asked.
-    InLine { said: Option<String> },
-    /// The cluster may or may not have it.
-    Unsure { since: Instant },
-    /// The cluster took it.
-    Accepted { since: Instant, id: String },
-    /// Taken back before the cluster had it.
-    Revoked,
-}
-
-/// Where in the cluster an attempt is looked for.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct ClusterJob {
-    /// The name of the cluster's job.
-    pub(super) name: String,
-    /// The attempt's place in a bundle; None where the job is the attempt's alone.
-    pub(super) place: Option<usize>,
-}
-
-impl ClusterJob {
-    /// A job of the attempt's own.
-    pub(super) fn own(name: String) -> Self {
-        Self { name, place: None }
-    }
-
-    /// Whether it shares its job with others.
-    pub(super) fn is_bundled(&self) -> bool {
-        self.place.is_some()
-    }
-}
-
-/// A submission, seen by the worker and by the thread that submits.
-#[derive(Debug, Clone)]
-pub(super) struct Ticket(Arc<Mutex<Held>>);
-
-#[derive(Debug)]
-struct Held {
-    stage: Stage,
-    job: ClusterJob,
-    /// Running time that is forecast, in seconds, of an attempt that may be bundled.
-    short_s: Option<f64>,
-}
-
-impl Ticket {
-    pub(super) fn new(stage: Stage, job: ClusterJob, short_s: Option<f64>) -> Self {
-        Self(Arc::new(Mutex::new(Held { stage, job, short_s })))
-    }
-
-    fn held(&self) -> MutexGuard<'_, Held> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn stage(&self) -> Stage {
-        self.held().stage.clone()
-    }
-
-    /// Where in the cluster it is looked for.
-    pub(super) fn job(&self) -> ClusterJob {
-        self.held().job.clone()
-    }
-
-    /// Running time that is forecast, of an attempt that may be bundled.
-    pub(super) fn short_s(&self) -> Option<f64> {
-        self.held().short_s
-    }
-
-    /// Moves on, unless it was taken back.
-    pub(super) fn set(&self, stage: Stage) {
-        let mut held = self.held();
-        if held.stage != Stage::Revoked {
-            held.stage = stage;
-        }
-    }
-
-    /// Takes back what is in line; false where the cluster may have it.
-    pub(super) fn revoke(&self) -> bool {
-        let mut held = self.held();
-        let is_in_line = matches!(held.stage, Stage::InLine { .. } | Stage::Revoked);
-        if is_in_line {
-            held.stage = Stage::Revoked;
-        }
-        is_in_line
-    }
-
-    /// Begins the submission as a job of the cluster; false where it was taken back. From here on the cluster may have it.
-    pub(super) fn begin(&self, job: ClusterJob) -> bool {
-        let mut held = self.held();
-        let is_wanted = held.stage != Stage::Revoked;
-        if is_wanted {
-            held.stage = Stage::Unsure { since: Instant::now() };
-            held.job = job;
-        }
-        is_wanted
-    }
-
-    /// Back into the line.
-    pub(super) fn line_up(&self) {
-        self.set(Stage::InLine { said: None });
-    }
-}
 
 /// What `sbatch` says before it sleeps and tries again by itself.
 const IT_REPEATS: &str = "sleeping and retrying";
@@ -235,12 +124,14 @@ struct Line {
     grown: Instant,
     pause: Duration,
     not_before: Instant,
+    /// Refusals in a row.
+    refused: usize,
 }
 
 impl Line {
     fn new(cluster: Weak<Cluster>) -> Self {
         let now = Instant::now();
-        Self { cluster, orders: VecDeque::new(), grown: now, pause: Duration::ZERO, not_before: now }
+        Self { cluster, orders: VecDeque::new(), grown: now, pause: Duration::ZERO, not_before: now, refused: 0 }
     }
 
     fn work(mut self, receiver: &Receiver<Order>) {
@@ -295,17 +186,24 @@ impl Line {
         match said {
             Answer::Accepted(id) => {
                 tracing::info!(name, id, attempts = orders.len(), "submitted to the cluster");
-                self.pause = Duration::ZERO;
-                set(&Stage::Accepted { since: Instant::now(), id });
+                (self.pause, self.refused) = (Duration::ZERO, 0);
+                set(&Stage::Accepted { since: Instant::now(), id: id.clone() });
+                if orders.iter().all(|order| order.ticket.stage() == Stage::Revoked) {
+                    // All of it was taken back while the cluster thought about it.
+                    cluster.errands.send(Errand::End { name, id: Some(id) });
+                }
             }
             Answer::NotNow(said) => {
                 let pause = self.lengthen_pause();
                 tracing::warn!(name, said, pause_s = pause.as_secs(), "the cluster takes no job at the moment");
+                bundling::remove(&cluster.shared, &name);
                 self.give_back(orders, &said);
             }
             Answer::Refused(said) => {
-                // Others may be taken before this one is tried again.
-                let pause = if self.orders.is_empty() { self.lengthen_pause() } else { Duration::ZERO };
+                // Others may be taken before this one is tried again; where all are refused, the line rests.
+                self.refused += 1;
+                let pause = if self.refused > self.orders.len() { self.lengthen_pause() } else { Duration::ZERO };
+                bundling::remove(&cluster.shared, &name);
                 tracing::warn!(name, said, pause_s = pause.as_secs(), "the cluster refused a job; it is tried again");
                 set(&Stage::InLine { said: Some(said) });
                 self.orders.extend(orders);
@@ -333,20 +231,10 @@ impl Line {
     }
 }
 
-/// One call of `sbatch`.
-pub(super) struct Submission {
-    /// Name of the cluster's job.
-    pub(super) name: String,
-    /// The attempts that it works on.
-    pub(super) orders: Vec<Order>,
-    /// Arguments of `sbatch`.
-    pub(super) arguments: Vec<String>,
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::command::NoAnswer;
-    use super::{Answer, ClusterJob, Stage, Ticket, answer};
+    use super::{Answer, answer};
 
     fn failed(text: &str) -> Answer {
         answer(Err(NoAnswer::Failed(text.to_owned())))
@@ -392,16 +280,5 @@ mod tests {
         ] {
             assert!(matches!(failed(text), Answer::Unsure(_)), "{text}");
         }
-    }
-
-    #[test]
-    fn what_was_taken_back_is_never_submitted() {
-        let job = || ClusterJob::own("mns-job_1-1".to_owned());
-        let ticket = Ticket::new(Stage::InLine { said: None }, job(), None);
-        assert!(ticket.revoke() && !ticket.begin(job()));
-        ticket.line_up();
-        assert_eq!(ticket.stage(), Stage::Revoked);
-        let ticket = Ticket::new(Stage::InLine { said: None }, job(), None);
-        assert!(ticket.begin(job()) && !ticket.revoke());
     }
 }

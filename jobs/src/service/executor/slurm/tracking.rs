@@ -1,8 +1,8 @@
 //! What has become of one attempt, judged by the cluster's table and by what the attempt's files show.
 
 use super::files::Seen;
-use super::submission::{ClusterJob, Stage};
 use super::table::{Ending, JobState, Row, Table};
+use super::ticket::{ClusterJob, Stage};
 use crate::service::executor::{EndCause, Eviction, Phase};
 use crate::spec::requests::NOT_STARTED_CODE;
 use std::time::{Duration, Instant};
@@ -89,8 +89,11 @@ impl Tracking {
         self.look_at(&job.name, table, seen, since);
         match &self.row {
             Some(row) if self.absent == 0 => match row.state {
-                JobState::Ended(_) if job.is_bundled() && !seen.has_begun() => {
-                    Judgement::EndedUnclaimed(EndCause::Evicted(Eviction::Unreached))
+                JobState::Ended(ending) if job.is_bundled() && !seen.has_begun() => {
+                    // A bundle that fails by itself could not begin; another end came before the attempt's turn.
+                    let is_own = ending == Ending::Failed;
+                    let why = if is_own { Eviction::NotBegun } else { Eviction::Unreached };
+                    Judgement::EndedUnclaimed(EndCause::Evicted(why))
                 }
                 JobState::Ended(ending) if !seen.has_begun() => Judgement::EndedUnclaimed(self.cause(ending, seen)),
                 JobState::Ended(ending) => self.end(self.cause(ending, seen), (times, now)),
@@ -153,7 +156,8 @@ impl Tracking {
         }
         match ending {
             Ending::Completed => EndCause::Exited { code: 0 },
-            Ending::Failed if !seen.has_begun() => EndCause::Evicted(Eviction::NotBegun),
+            // The program did not start: there is no such file, or a library is missing.
+            Ending::Failed if !seen.gave_life() => EndCause::Evicted(Eviction::NotBegun),
             // It was put back into the queue by hand and came second to itself.
             Ending::Failed if seen.was_requeued => EndCause::Evicted(Eviction::Revoked),
             Ending::Failed => EndCause::Exited { code: 1 },
@@ -199,8 +203,8 @@ impl Tracking {
 mod tests {
     use super::{Judgement, Times, Tracking};
     use crate::service::executor::slurm::files::Seen;
-    use crate::service::executor::slurm::submission::{ClusterJob, Stage};
     use crate::service::executor::slurm::table::Table;
+    use crate::service::executor::slurm::ticket::{ClusterJob, Stage};
     use crate::service::executor::{EndCause, Eviction, Phase};
     use crate::spec::heartbeat::Heartbeat;
     use std::time::{Duration, Instant};
@@ -356,5 +360,28 @@ mod tests {
         assert!(trial.tracking.waits_for(&trial.stage, &trial.table, true).contains("bundle"));
         let unreached = EndCause::Evicted(Eviction::Unreached);
         assert_eq!(trial.at(2, Some("7|mns-job_1-1|TIMEOUT|None|node1")), Judgement::EndedUnclaimed(unreached));
+    }
+
+    #[test]
+    fn a_program_that_does_not_start_has_not_died() {
+        let mut trial = Trial::accepted();
+        trial.seen.owner = Some("7".to_owned());
+        assert_eq!(trial.at(1, Some("7|mns-job_1-1|FAILED|NonZeroExitCode|node1")), Judgement::Lives);
+        assert_eq!(trial.at(100, None), evicted(Eviction::NotBegun));
+        let mut trial = Trial::accepted();
+        trial.place = Some(0);
+        let not_begun = EndCause::Evicted(Eviction::NotBegun);
+        assert_eq!(
+            trial.at(1, Some("7|mns-job_1-1|FAILED|NonZeroExitCode|node1")),
+            Judgement::EndedUnclaimed(not_begun)
+        );
+    }
+
+    #[test]
+    fn a_claim_without_an_owner_is_somebodys() {
+        let mut trial = Trial::accepted();
+        trial.seen.is_claimed = true;
+        assert_eq!(trial.at(1, Some("7|mns-job_1-1|NODE_FAIL|None|node1")), Judgement::Lives);
+        assert_eq!(trial.at(92, None), evicted(Eviction::NodeLost));
     }
 }

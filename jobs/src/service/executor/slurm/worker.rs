@@ -2,8 +2,10 @@
 
 use super::Cluster;
 use super::errands::Errand;
-use super::submission::{Order, Stage, Submitter};
+use super::files::Seen;
+use super::submission::Submitter;
 use super::table::JobState;
+use super::ticket::{Order, Stage};
 use super::tracking::{Judgement, Times, Tracking};
 use crate::service::executor::{EndCause, Eviction, Phase, Worker, WorkerUsage};
 use crate::spec::attempt_files;
@@ -15,7 +17,7 @@ use std::time::{Duration, Instant};
 
 /// Owner of a claim by which the service takes an attempt back.
 const CLAIMED_BY_SERVICE: &str = "service\n";
-/// Time that the worker of a bundle has to end after it was told to.
+/// Time that a worker has to end after it was told to, beside that for its files to come.
 const TIME_TO_STOP: Duration = Duration::from_secs(10);
 /// The signal with which a worker ends itself when it is told to stop.
 const SIGKILL: i32 = 9;
@@ -31,14 +33,29 @@ pub(super) struct SlurmWorker {
     tracking: Tracking,
     /// When it was first seen at work.
     at_work: Option<Instant>,
+    /// When it was first told to end at once, and when the cluster was last told so.
     killed: Option<Instant>,
+    kill_sent: Option<Instant>,
+    /// Whether another process has the claim.
+    is_claimed: bool,
     end: Option<EndCause>,
 }
 
 impl SlurmWorker {
     pub(super) fn new(name: String, order: Order, cluster: Arc<Cluster>, submitter: Submitter) -> Self {
         let tracking = Tracking::new(cluster.table().round);
-        Self { name, order, cluster, submitter, tracking, at_work: None, killed: None, end: None }
+        Self {
+            name,
+            order,
+            cluster,
+            submitter,
+            tracking,
+            at_work: None,
+            killed: None,
+            kill_sent: None,
+            is_claimed: false,
+            end: None,
+        }
     }
 
     /// Puts it into the line of submissions.
@@ -75,6 +92,8 @@ impl SlurmWorker {
         if self.cluster.files.seen(&self.name).has_begun() || !self.claim() {
             return false;
         }
+        // A submission that is under way must not be repeated.
+        self.order.ticket.take_back();
         self.end = Some(EndCause::Evicted(Eviction::Revoked));
         self.end_own_job();
         true
@@ -89,9 +108,10 @@ impl SlurmWorker {
     }
 
     /// Claims an attempt that no process has begun; false where one has.
-    fn claim(&self) -> bool {
+    fn claim(&mut self) -> bool {
         let claim = self.order.attempt.directory.join(attempt_files::CLAIM);
         let is_claimed = std::fs::create_dir(&claim).is_ok();
+        self.is_claimed = !is_claimed;
         if is_claimed {
             // A claim without an owner holds as well.
             let _ = std::fs::write(claim.join(attempt_files::CLAIM_OWNER), CLAIMED_BY_SERVICE);
@@ -139,8 +159,10 @@ impl Worker for SlurmWorker {
     }
 
     fn time_since_heartbeat(&self) -> Duration {
+        // Silence counts as far as a sign of life could have been seen: a file system that did not answer here says nothing of a worker.
         let seen = self.cluster.files.seen(&self.name);
-        seen.changed.or(self.at_work).map_or(Duration::ZERO, |at| at.elapsed())
+        let since = seen.changed.into_iter().chain(self.at_work).max();
+        seen.looked.zip(since).map_or(Duration::ZERO, |(looked, since)| looked.saturating_duration_since(since))
     }
 
     fn phase(&self) -> Phase {
@@ -172,14 +194,15 @@ impl Worker for SlurmWorker {
         let job = self.order.ticket.job();
         let judged = {
             let table = self.cluster.table();
+            let seen = Seen { is_claimed: self.is_claimed, ..seen.clone() };
             self.tracking.judge((&job, &stage), &table, &seen, (times, Instant::now()))
         };
         if self.at_work.is_none() && self.tracking.phase(&seen, job.is_bundled()) == Phase::Running {
             self.at_work = Some(Instant::now());
         }
         match judged {
-            // The cluster is not told to end what others need: the worker was told, and its records are believed no longer.
-            Judgement::Lives if job.is_bundled() && self.killed.is_some_and(|at| at.elapsed() > TIME_TO_STOP) => {
+            // A process that the node cannot end, or of which the cluster says nothing any more: its records are believed no longer.
+            Judgement::Lives if self.killed.is_some_and(|at| at.elapsed() > TIME_TO_STOP + times.late_files) => {
                 self.end = Some(EndCause::Signaled { signal: SIGKILL });
             }
             Judgement::Lives => {}
@@ -210,13 +233,14 @@ impl Worker for SlurmWorker {
         if self.end.is_some() || self.order.ticket.revoke() || self.take_back() {
             return;
         }
-        if self.killed.is_some_and(|at| at.elapsed() < KILL_INTERVAL) {
-            return;
-        }
         if self.killed.is_none() {
+            self.killed = Some(Instant::now());
             self.tell(Request::Stop);
         }
-        self.killed = Some(Instant::now());
+        if self.kill_sent.is_some_and(|at| at.elapsed() < KILL_INTERVAL) {
+            return;
+        }
+        self.kill_sent = Some(Instant::now());
         let is_over = self.tracking.row().is_some_and(|row| matches!(row.state, JobState::Ended(_)));
         if !is_over {
             self.end_own_job();
@@ -226,8 +250,8 @@ impl Worker for SlurmWorker {
 }
 
 impl Drop for SlurmWorker {
-    /// It goes on without this service.
+    /// One that has not ended goes on without this service.
     fn drop(&mut self) {
-        self.cluster.forget(&self.name);
+        self.cluster.forget(&self.name, self.end.is_some());
     }
 }

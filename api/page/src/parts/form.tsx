@@ -1,0 +1,155 @@
+// A form for a JSON Schema as the service writes them: groups, choices between kinds, numbers with ranges, and text for the rest.
+import { useState } from "preact/hooks";
+import type { Problem } from "../api";
+
+export interface Schema {
+    type?: string;
+    const?: unknown;
+    enum?: unknown[];
+    anyOf?: Schema[];
+    oneOf?: Schema[];
+    properties?: Record<string, Schema>;
+    items?: Schema;
+    required?: string[];
+    description?: string;
+    default?: unknown;
+    minimum?: number;
+    maximum?: number;
+    exclusiveMinimum?: number;
+    exclusiveMaximum?: number;
+}
+
+type Item = NonNullable<Problem["errors"]>[number];
+
+export interface ParameterProps {
+    name: string;
+    schema: Schema;
+    value: unknown;
+    pointer: string[];
+    set: (pointer: string[], value: unknown) => void;
+    errorsAt: (pointer: string) => Item[];
+    isOpen?: boolean;
+}
+
+/** The schema without "or null": leaving a field empty means the same. */
+function unwrap(schema: Schema): Schema {
+    const options = (schema.anyOf ?? schema.oneOf ?? []).filter((option) => option.type !== "null");
+    if (options.length !== 1) return schema;
+    const { anyOf: _, oneOf: __, ...rest } = schema;
+    return { ...options[0], ...rest };
+}
+
+/** The kinds of an object that is one of several, by their `type`. */
+function kindsOf(schema: Schema): Map<string, Schema> {
+    const kinds = new Map<string, Schema>();
+    for (const option of (schema.anyOf ?? schema.oneOf ?? []).map(unwrap)) {
+        const word = option.properties?.type?.const;
+        if (typeof word === "string" && !kinds.has(word)) kinds.set(word, option);
+    }
+    return kinds;
+}
+
+function words(schema: Schema): string[] | null {
+    if (schema.enum?.every((word) => typeof word === "string")) return schema.enum as string[];
+    const options = schema.anyOf ?? schema.oneOf ?? [];
+    const found = options.flatMap((option) => (typeof option.const === "string" ? [option.const] : option.enum?.every((word) => typeof word === "string") ? (option.enum as string[]) : []));
+    return options.length > 0 && found.length >= options.filter((option) => option.type !== "null").length ? found : null;
+}
+
+function rangeOf(schema: Schema): string {
+    const low = schema.minimum !== undefined ? `≥ ${schema.minimum}` : schema.exclusiveMinimum !== undefined ? `> ${schema.exclusiveMinimum}` : "";
+    const high = schema.maximum !== undefined ? `≤ ${schema.maximum}` : schema.exclusiveMaximum !== undefined ? `< ${schema.exclusiveMaximum}` : "";
+    return [low, high].filter(Boolean).join(", ");
+}
+
+const show = (value: unknown): string => (value === undefined || value === null ? "" : typeof value === "string" ? value : JSON.stringify(value));
+
+export function Parameter(props: ParameterProps) {
+    const schema = unwrap(props.schema);
+    const kinds = kindsOf(schema);
+    if (kinds.size > 0) return <Kinds {...props} schema={schema} kinds={kinds} />;
+    if (schema.properties) return <Group {...props} schema={schema} />;
+    return <Leaf {...props} schema={schema} />;
+}
+
+function Group({ name, schema, value, pointer, set, errorsAt, isOpen }: ParameterProps) {
+    const of = (value ?? {}) as Record<string, unknown>;
+    const entries = Object.entries(schema.properties ?? {}).filter(([, inner]) => inner.const === undefined);
+    // What is given comes first, then plain fields, then groups.
+    const rank = ([key, inner]: [string, Schema]) => (key in of ? 0 : unwrap(inner).properties || kindsOf(unwrap(inner)).size > 0 ? 2 : 1);
+    const sorted = [...entries].sort((a, b) => rank(a) - rank(b));
+    const given = sorted.filter((entry) => rank(entry) === 0);
+    const rest = sorted.filter((entry) => rank(entry) !== 0);
+    const fields = (list: [string, Schema][]) => list.map(([key, inner]) => <Parameter key={key} name={key} schema={inner} value={of[key]} pointer={[...pointer, key]} set={set} errorsAt={errorsAt} />);
+    const [isMore, setMore] = useState(given.length === 0);
+    return (
+        <fieldset class="group">
+            <legend title={schema.description}>{name}</legend>
+            {!isOpen && schema.description && <p class="doc">{schema.description}</p>}
+            {fields(given)}
+            {rest.length > 0 && (isMore ? fields(rest) : <button type="button" class="link" onClick={() => setMore(true)}>{rest.length} more</button>)}
+        </fieldset>
+    );
+}
+
+function Kinds({ name, schema, value, pointer, set, errorsAt, kinds }: ParameterProps & { kinds: Map<string, Schema> }) {
+    const of = value as Record<string, unknown> | undefined;
+    const word = typeof of?.type === "string" ? of.type : "";
+    const chosen = kinds.get(word);
+    const id = `field${pointer.join("-")}`;
+    return (
+        <div class="kind">
+            <div class="field">
+                <label for={id}>{name}</label>
+                <select id={id} value={word} onChange={(event) => set(pointer, event.currentTarget.value ? { type: event.currentTarget.value } : undefined)}>
+                    <option value="">{show(schema.default) ? `default: ${show(schema.default).slice(0, 60)}` : "default"}</option>
+                    {[...kinds.keys()].map((option) => <option key={option} value={option}>{option}</option>)}
+                </select>
+                <p class="doc">{chosen?.description ?? schema.description}</p>
+                <Errors items={errorsAt(`/${pointer.join("/")}`)} />
+            </div>
+            {chosen && Object.keys(chosen.properties ?? {}).length > 1 && <Group name={word} schema={{ ...chosen, description: undefined }} value={of} pointer={pointer} set={set} errorsAt={errorsAt} />}
+        </div>
+    );
+}
+
+function Errors({ items }: { items: Item[] }) {
+    return <>{items.map((item) => <p key={item.code} class="wrong" role="alert">{item.detail}{item.did_you_mean ? ` Did you mean ${item.did_you_mean}?` : ""}</p>)}</>;
+}
+
+function Leaf({ name, schema, value, pointer, set, errorsAt }: ParameterProps) {
+    const id = `field${pointer.join("-")}`;
+    const items = errorsAt(`/${pointer.join("/")}`);
+    const options = words(schema);
+    const common = { id, "aria-invalid": items.length > 0, "aria-describedby": `${id}-doc` };
+    const isNumber = schema.type === "number" || schema.type === "integer";
+    const read = (text: string): unknown => {
+        if (text.trim() === "") return undefined;
+        if (schema.type === "string" && !/^[[{]/.test(text)) return text;
+        try {
+            return JSON.parse(text) as unknown;
+        } catch {
+            // What is no JSON is text, such as a formula.
+            return text;
+        }
+    };
+    return (
+        <div class="field">
+            <label for={id}>{name}</label>
+            {schema.type === "boolean" ? (
+                <select {...common} value={show(value)} onChange={(event) => set(pointer, event.currentTarget.value === "" ? undefined : event.currentTarget.value === "true")}>
+                    <option value="">{schema.default !== undefined ? `default: ${show(schema.default)}` : "default"}</option><option value="true">yes</option><option value="false">no</option>
+                </select>
+            ) : options ? (
+                <select {...common} value={show(value)} onChange={(event) => set(pointer, event.currentTarget.value || undefined)}>
+                    <option value="">{schema.default !== undefined ? `default: ${show(schema.default)}` : "default"}</option>
+                    {options.map((option) => <option key={option} value={option}>{option}</option>)}
+                </select>
+            ) : (
+                <input {...common} value={show(value)} placeholder={show(schema.default)} inputMode={isNumber ? "decimal" : undefined} onChange={(event) => set(pointer, read(event.currentTarget.value))} />
+            )}
+            <p class="doc" id={`${id}-doc`}>{schema.description}{rangeOf(schema) && <span class="range"> {rangeOf(schema)}</span>}</p>
+            <Errors items={items} />
+        </div>
+    );
+}

@@ -1,0 +1,167 @@
+// All jobs: a table that follows the service, with the filters of the API in its address.
+import { useMemo, useRef, useState } from "preact/hooks";
+import { get, post, type Job, type Page } from "../api";
+import { ago, seconds } from "../format";
+import { useLoaded } from "../load";
+import { Act, Bar, Health, State, Trouble } from "../parts/basics";
+import { setQuery, type Route } from "../route";
+
+const STATES = ["queued", "running", "pausing", "paused", "canceling", "interrupted", "succeeded", "failed", "canceled"];
+const KINDS = ["redistance", "vortex", "droplet", "surface_pde", "front"];
+const ROW_PX = 38;
+const SPARE_ROWS = 12;
+const PAGE = 500;
+const MOST = 20_000;
+const REFRESH_MS = 2000;
+
+/** The newest jobs that the filters let through; further pages as long as there are any. */
+async function loadAll(query: string, known: Job[], signal: AbortSignal): Promise<Job[]> {
+    const found: Job[] = [];
+    let cursor: string | number | null | undefined = null;
+    do {
+        const part: string = cursor === null ? "" : `&cursor=${encodeURIComponent(String(cursor))}`;
+        const page: Page<Job> = await get<Page<Job>>(`v1/jobs?limit=${PAGE}${query}${part}`, signal);
+        found.push(...page.items);
+        cursor = page.next;
+        // What has ended does not change: the rest is as it was.
+        const last = page.items.at(-1);
+        if (last && cursor) {
+            const at = known.findIndex((job) => job.id === last.id);
+            if (at >= 0 && known.slice(at).every((job) => job.finished_at)) return [...found, ...known.slice(at + 1)];
+        }
+    } while (cursor && found.length < MOST);
+    return found;
+}
+
+export function Jobs({ route }: { route: Route }) {
+    const filters = ["state", "kind", "health", "name", "owner", "study"].filter((name) => route.query.get(name));
+    const query = filters.map((name) => `&${name}=${encodeURIComponent(route.query.get(name) ?? "")}`).join("");
+    const known = useRef<{ query: string; jobs: Job[] }>({ query: "", jobs: [] });
+    const { data, error, reload } = useLoaded(async (signal) => {
+        const jobs = await loadAll(query, known.current.query === query ? known.current.jobs : [], signal);
+        known.current = { query, jobs };
+        return jobs;
+    }, [query], REFRESH_MS);
+    const [selected, setSelected] = useState<Set<string>>(new Set());
+    const jobs = data ?? [];
+    const toggle = (id: string) => {
+        const next = new Set(selected);
+        if (!next.delete(id)) next.add(id);
+        setSelected(next);
+    };
+    return (
+        <main>
+            <header class="title">
+                <h1>Jobs</h1>
+                <span class="quiet" role="status">{data ? `${jobs.length.toLocaleString("en")}${jobs.length >= MOST ? " newest" : ""}` : "loading"}</span>
+                <span class="grow" />
+                {selected.size >= 2 && selected.size <= 6 && <a class="button" href={`#/compare/${[...selected].join(",")}`}>Compare {selected.size}</a>}
+                <a class="button primary" href="#/new">New job</a>
+            </header>
+            <Filters route={route} />
+            <Trouble error={error} />
+            <Bulk query={query} filters={filters} route={route} count={jobs.length} onDone={reload} />
+            {data && jobs.length === 0 ? <Nothing isFiltered={filters.length > 0} /> : <Table jobs={jobs} selected={selected} toggle={toggle} />}
+        </main>
+    );
+}
+
+function Nothing({ isFiltered }: { isFiltered: boolean }) {
+    return isFiltered ? <p class="empty">No job is like that.</p> : <p class="empty">There is no job yet. <a href="#/new">Make the first one</a>.</p>;
+}
+
+function Filters({ route }: { route: Route }) {
+    const choice = (name: string, values: string[]) => (
+        <label>
+            {name}{" "}
+            <select value={route.query.get(name) ?? ""} onChange={(event) => setQuery(route, { [name]: event.currentTarget.value })}>
+                <option value="">any</option>
+                {values.map((value) => <option key={value} value={value}>{value}</option>)}
+            </select>
+        </label>
+    );
+    return (
+        <form class="filters" onSubmit={(event) => event.preventDefault()}>
+            {choice("state", STATES)}
+            {choice("kind", KINDS)}
+            {choice("health", ["sound", "doubtful"])}
+            <label>
+                name{" "}
+                <input type="search" value={route.query.get("name") ?? ""} onChange={(event) => setQuery(route, { name: event.currentTarget.value })} />
+            </label>
+        </form>
+    );
+}
+
+/** Acts on all that the filters let through, after it has told how many that are. */
+function Bulk({ query, filters, route, count, onDone }: { query: string; filters: string[]; route: Route; count: number; onDone: () => void }) {
+    const [planned, setPlanned] = useState<{ action: string; matched: number } | null>(null);
+    if (filters.length === 0 || count === 0) return null;
+    const filter = Object.fromEntries(filters.map((name) => [name, route.query.get(name)]));
+    const ask = (action: string) => async () => {
+        const { matched } = await post<{ matched: number }>("v1/jobs/actions", { action, filter, dry_run: true });
+        setPlanned({ action, matched });
+    };
+    return (
+        <div class="bulk" key={query}>
+            <span class="quiet">All of these:</span>
+            {["pause", "resume", "cancel", "delete"].map((action) => <Act key={action} work={ask(action)}>{action}</Act>)}
+            {planned && (
+                <span class="confirm" role="alertdialog" aria-label="confirm">
+                    {planned.action} {planned.matched} {planned.matched === 1 ? "job" : "jobs"}?{" "}
+                    <Act kind="danger" work={async () => {
+                        await post("v1/jobs/actions", { action: planned.action, filter, dry_run: false });
+                        setPlanned(null);
+                        onDone();
+                    }}>yes, {planned.action}</Act>
+                    <button type="button" onClick={() => setPlanned(null)}>no</button>
+                </span>
+            )}
+        </div>
+    );
+}
+
+/** Only the rows that are seen are in the document: ten thousand scroll as ten do. */
+function Table({ jobs, selected, toggle }: { jobs: Job[]; selected: Set<string>; toggle: (id: string) => void }) {
+    const [top, setTop] = useState(0);
+    const [height, setHeight] = useState(600);
+    const first = Math.max(0, Math.floor(top / ROW_PX) - SPARE_ROWS);
+    const last = Math.min(jobs.length, Math.ceil((top + height) / ROW_PX) + SPARE_ROWS);
+    const rows = useMemo(() => jobs.slice(first, last), [jobs, first, last]);
+    const measure = (place: HTMLDivElement | null) => {
+        if (place && place.clientHeight !== height) setHeight(place.clientHeight);
+    };
+    return (
+        <div class="scroll" ref={measure} onScroll={(event) => setTop(event.currentTarget.scrollTop)} tabIndex={0} aria-label="jobs">
+            <table class="jobs" aria-rowcount={jobs.length}>
+                <thead>
+                    <tr><th scope="col"><span class="unseen">compare</span></th><th scope="col">state</th><th scope="col">progress</th><th scope="col">kind</th><th scope="col">name</th><th scope="col">health</th><th scope="col">CPU</th><th scope="col">made</th></tr>
+                </thead>
+                <tbody>
+                    {first > 0 && <tr style={{ height: `${first * ROW_PX}px` }} aria-hidden="true" />}
+                    {rows.map((job, index) => <Row key={job.id} job={job} index={first + index + 1} isSelected={selected.has(job.id)} toggle={toggle} />)}
+                    {last < jobs.length && <tr style={{ height: `${(jobs.length - last) * ROW_PX}px` }} aria-hidden="true" />}
+                </tbody>
+            </table>
+        </div>
+    );
+}
+
+function Row({ job, index, isSelected, toggle }: { job: Job; index: number; isSelected: boolean; toggle: (id: string) => void }) {
+    const kind = (job.resolved as { scene?: { kind?: string } } | null)?.scene?.kind ?? (job.spec as { scene?: { kind?: string } })?.scene?.kind ?? "";
+    return (
+        <tr aria-rowindex={index}>
+            <td><input type="checkbox" checked={isSelected} onChange={() => toggle(job.id)} aria-label={`compare ${job.name ?? job.id}`} /></td>
+            <td><State state={job.state} reason={job.state === "succeeded" ? null : job.reason} /></td>
+            <td>
+                <Bar fraction={job.progress.fraction} />
+                {job.progress.eta_s ? <span class="quiet"> {seconds(job.progress.eta_s)}</span> : null}
+            </td>
+            <td>{kind}</td>
+            <td class="name"><a href={`#/jobs/${job.id}`}>{job.name ?? job.id}</a>{Object.entries(job.labels).map(([key, value]) => <span key={key} class="label">{key}: {value}</span>)}</td>
+            <td><Health status={job.health.status} /></td>
+            <td class="figure">{seconds(job.usage.cpu_s)}</td>
+            <td title={job.created_at}>{ago(job.created_at)}</td>
+        </tr>
+    );
+}
