@@ -144,10 +144,16 @@ const steps = {
     },
 
     async study() {
-        const sweep = { mode: "grid", axes: { "/scene/spacing": [0.05, 0.035, 0.025] } };
-        const { id } = await api("/v1/studies", { name: "orders", base: { scene: { kind: "redistance" } }, sweep });
-        await page.goto(`${url}/#/studies`);
-        await page.getByRole("link", { name: "orders" }).click();
+        await page.goto(`${url}/#/new`);
+        await page.getByRole("button", { name: /^redistance/ }).click();
+        await page.getByLabel("body").fill('{"name": "orders", "scene": {"kind": "redistance"}}');
+        await page.getByText("As a study").click();
+        await page.getByLabel("values 1").fill("0.05, 0.035, 0.025");
+        await page.getByRole("button", { name: "count" }).click();
+        await page.getByText(/^3 points/).waitFor(WAIT);
+        await page.getByRole("button", { name: "start the study" }).click();
+        await page.getByRole("heading", { name: "orders" }).waitFor(WAIT);
+        const id = page.url().split("/").at(-1);
         await until("the study has ended", async () => (await api(`/v1/studies/${id}`)).state === "succeeded");
         await until("all points are in the table", async () => (await page.locator(".scroll tbody tr").count()) === 3);
         await page.locator(".plot canvas").first().waitFor(WAIT);

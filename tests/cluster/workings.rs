@@ -154,9 +154,9 @@ fn another_build_on_a_node_is_named_and_nothing_is_lost() {
     assert!(job["hint"].as_str().unwrap().contains("tries again by itself"), "{job}");
 }
 
-/// A job of half a second, whose running time is known from one before.
+/// A job of a second, whose running time is known from one before.
 fn short_body() -> serde_json::Value {
-    json!({"scene": {"kind": "redistance", "spacing": 0.05, "repeat": 600}, "checkpoint": {"every_steps": 20}})
+    json!({"scene": {"kind": "redistance", "spacing": 0.02, "repeat": 100}, "checkpoint": {"every_steps": 20}})
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn short_jobs_share_a_job_of_the_cluster_and_each_keeps_its_promises() {
             .count()
     };
     let before = jobs();
-    let values: Vec<f64> = (0..60).map(|k| 0.05 + 1e-5 * f64::from(k)).collect();
+    let values: Vec<f64> = (0..30).map(|k| 0.02 + 1e-5 * f64::from(k)).collect();
     let study = json!({"base": short_body(), "sweep": {"mode": "grid", "axes": {"/scene/spacing": values}}});
     let answer = service.post("/v1/studies", &study);
     assert_eq!(answer.status, 201, "{}", answer.text());
@@ -198,7 +198,7 @@ fn short_jobs_share_a_job_of_the_cluster_and_each_keeps_its_promises() {
     service.restart();
     let view = eventually("all are done", Duration::from_secs(120), || {
         let view = service.get(&format!("/v1/studies/{study}")).json();
-        (view["counts"]["succeeded"] == 59).then_some(view)
+        (view["counts"]["succeeded"] == 29).then_some(view)
     });
     assert_eq!(view["counts"]["canceled"], 1, "{view}");
     assert!(jobs() - before <= 4, "{} jobs of the cluster", jobs() - before);
@@ -219,9 +219,7 @@ fn short_jobs_share_a_job_of_the_cluster_and_each_keeps_its_promises() {
 fn a_bundle_that_the_cluster_ends_gives_its_attempts_back() {
     let cluster = Cluster::start();
     let service = serve(&cluster);
-    let mut short = short_body();
-    short["scene"]["spacing"] = json!(0.02);
-    short["scene"]["repeat"] = json!(60);
+    let short = short_body();
     let first = service.submit(&short);
     service.wait_for(&first, &["succeeded"]);
     let expected = (service.frames(&first), service.series(&first));
@@ -243,9 +241,7 @@ fn a_bundle_that_the_cluster_ends_gives_its_attempts_back() {
 fn a_worker_of_a_bundle_that_dies_is_tried_again_while_the_others_go_on() {
     let cluster = Cluster::start();
     let service = serve(&cluster);
-    let mut short = short_body();
-    short["scene"]["spacing"] = json!(0.02);
-    short["scene"]["repeat"] = json!(100);
+    let short = short_body();
     let first = service.submit(&short);
     service.wait_for(&first, &["succeeded"]);
     let expected = (service.frames(&first), service.series(&first));

@@ -12,32 +12,43 @@ import { go } from "../route";
 
 const REFRESH_MS = 5000;
 
-/** Counts changes of a job, by its events. */
-function useChanges(id: string, job: Job | null): number {
+/** What is small follows every event, what may be long (files, series, log) comes now and then. */
+const SOON_MS = 150;
+const SLOWLY_MS = 2000;
+
+/** Counts changes of a job, by its events: at once, and slowly. */
+function useChanges(id: string, job: Job | null): { changes: number; slow: number } {
     const [changes, setChanges] = useState(0);
+    const [slow, setSlow] = useState(0);
     const isOver = job !== null && job.finished_at !== null && job.finished_at !== undefined;
     useEffect(() => {
         if (isOver) return;
-        let timer: number | undefined;
+        let soon: number | undefined;
+        let later: number | undefined;
         // Many events in a moment are one change of the page.
         const change = () => {
-            timer ??= window.setTimeout(() => {
-                timer = undefined;
+            soon ??= window.setTimeout(() => {
+                soon = undefined;
                 setChanges((count) => count + 1);
-            }, 150);
+            }, SOON_MS);
+            later ??= window.setTimeout(() => {
+                later = undefined;
+                setSlow((count) => count + 1);
+            }, SLOWLY_MS);
         };
         const stop = listen(`v1/jobs/${id}/events`, 0, change);
         return () => {
             stop();
-            window.clearTimeout(timer);
+            window.clearTimeout(soon);
+            window.clearTimeout(later);
         };
     }, [id, isOver]);
-    return changes;
+    return { changes, slow };
 }
 
 export function JobPage({ id }: { id: string }) {
     const [watched, setWatched] = useState<Job | null>(null);
-    const changes = useChanges(id, watched);
+    const { changes, slow } = useChanges(id, watched);
     const { data: job, error, reload } = useLoaded((signal) => get<Job>(`v1/jobs/${id}`, signal), [id], watched?.finished_at ? 0 : REFRESH_MS);
     useEffect(reload, [changes]);
     useEffect(() => setWatched(job), [job?.id, job?.finished_at]);
@@ -46,7 +57,7 @@ export function JobPage({ id }: { id: string }) {
     useEffect(() => {
         files.reload();
         series.reload();
-    }, [changes, job?.finished_at]);
+    }, [slow, job?.finished_at]);
     if (!job) return <main><Trouble error={error} />{!error && <p class="quiet">loading</p>}</main>;
     const frames = (files.data?.items ?? []).filter((file) => /^frames\/.*\.vtkhdf$/.test(file.path));
     const kind = (job.resolved as { scene?: { kind?: string } } | null)?.scene?.kind ?? "";
@@ -90,7 +101,7 @@ export function JobPage({ id }: { id: string }) {
                 {job.state === "succeeded" && <section><h2>Errors and cost</h2><ReportTable id={id} /></section>}
                 <section>
                     <h2>Checkpoints and files</h2>
-                    <Checkpoints job={job} changes={changes} />
+                    <Checkpoints job={job} changes={slow} />
                     <Files id={id} files={files.data?.items ?? []} />
                 </section>
                 <section>
@@ -101,7 +112,7 @@ export function JobPage({ id }: { id: string }) {
                 </section>
                 <section>
                     <h2>Log</h2>
-                    <Log id={id} changes={changes} />
+                    <Log id={id} changes={slow} isOver={Boolean(job.finished_at)} />
                 </section>
             </div>
         </main>
@@ -298,8 +309,8 @@ function Files({ id, files }: { id: string; files: FileEntry[] }) {
 
 const LINES = 40;
 
-function Log({ id, changes }: { id: string; changes: number }) {
+function Log({ id, changes, isOver }: { id: string; changes: number; isOver: boolean }) {
     const { data, reload } = useLoaded(async (signal) => (await request(`v1/jobs/${id}/log?tail=${LINES}`, { accept: "text/plain", signal })).text(), [id]);
-    useEffect(reload, [changes]);
+    useEffect(reload, [changes, isOver]);
     return <pre class="log" tabIndex={0}>{data ?? ""}</pre>;
 }

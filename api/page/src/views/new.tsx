@@ -6,6 +6,7 @@ import { bytes, curl, number, seconds } from "../format";
 import { useLoaded } from "../load";
 import { Act, Copy, Findings, Trouble } from "../parts/basics";
 import { Parameter, type Schema } from "../parts/form";
+import { Sweep } from "../parts/sweep";
 import { go, type Route } from "../route";
 
 type Body = { scene: Record<string, unknown> } & Record<string, unknown>;
@@ -150,6 +151,7 @@ function Editor({ body, scene, text, textError, onForm, onText }: EditorProps) {
             <form onSubmit={(event) => event.preventDefault()} aria-label="parameters">
                 {schema && <Parameter name="scene" schema={{ ...schema, properties: without(schema.properties, "kind") }} value={body.scene} pointer={["scene"]} set={set} errorsAt={errorsAt} isOpen />}
                 <Parameter name="run" schema={RUN} value={body} pointer={[]} set={set} errorsAt={errorsAt} isOpen />
+                <Sweep body={body} />
                 <Uploads />
             </form>
             <aside>

@@ -17,7 +17,7 @@ export function Studies() {
         <main>
             <header class="title"><h1>Studies</h1><span class="quiet">{data ? studies.length : "loading"}</span></header>
             <Trouble error={error} />
-            {data && studies.length === 0 ? <p class="empty">There is no study yet. README.md shows how to make one with curl.</p> : (
+            {data && studies.length === 0 ? <p class="empty">There is no study yet. <a href="#/new">New</a> makes one: “As a study”.</p> : (
                 <table>
                     <thead><tr><th scope="col">state</th><th scope="col">done</th><th scope="col">name</th><th scope="col">points</th><th scope="col">axes</th><th scope="col">made</th></tr></thead>
                     <tbody>
