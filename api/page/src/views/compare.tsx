@@ -7,7 +7,7 @@ import { useLoaded } from "../load";
 import { State, Trouble } from "../parts/basics";
 import { Plot, type Curve } from "../parts/plot";
 import type { Series } from "../series";
-import { loadSeries } from "./job";
+import { loadSeries, OF_THE_METHOD } from "./job";
 
 interface Member {
     job: Job;
@@ -53,7 +53,7 @@ function Together({ members }: { members: Member[] }) {
     const [chosen, setChosen] = useState<string | null>(null);
     const [logY, setLogY] = useState(false);
     useEffect(() => setChosen(null), [names.join()]);
-    const name = chosen ?? names[0];
+    const name = chosen ?? names.find((option) => !OF_THE_METHOD.test(option)) ?? names[0];
     if (!name) return <p class="empty">These jobs have no series.</p>;
     const times = [...new Set(members.flatMap(({ series }) => (series?.columns.time ?? []).filter((time): time is number => time !== null)))].sort((a, b) => a - b);
     const curves: Curve[] = members.map(({ job, series }) => {

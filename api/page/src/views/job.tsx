@@ -160,7 +160,7 @@ export async function loadSeries(id: string, signal: AbortSignal): Promise<Serie
 
 const HIDDEN_COLUMNS = new Set(["step", "time"]);
 /** Columns that tell of the method, not of the physics: not shown at first. */
-const OF_THE_METHOD = /^(time_step|cfl|band_particles|rescued_fits|unresolved|swept|kept)$/;
+export const OF_THE_METHOD = /^(time_step|cfl|band_particles|rescued_fits|unresolved|swept|kept)$/;
 const SHOWN_AT_FIRST = 2;
 
 export function SeriesPlot({ job, series }: { job: string; series: Series | null }) {
