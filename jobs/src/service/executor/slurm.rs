@@ -22,7 +22,7 @@ mod worker;
 use super::{Adoption, AttemptPlace, Capacity, Executor, Needs, NotStarted, Notify, Orphans, Reservation, Worker};
 use crate::spec::attempt_files;
 use crate::system::breakpoints::pass;
-use crate::system::{artifacts, digest};
+use crate::system::digest;
 use errands::{Errand, Errands};
 use files::Files;
 use std::collections::{HashMap, HashSet};
@@ -323,7 +323,8 @@ impl Executor for SlurmExecutor {
             OpenOptions::new().create(true).append(true).open(attempt.directory.join(name))?;
         }
         let text = script::script(&attempt.directory, &self.cluster.settings);
-        artifacts::write(&attempt.directory.join(attempt_files::SCRIPT), text.as_bytes())?;
+        // The cluster takes a copy of it. One that a crash of this machine loses makes a further attempt, and no harm.
+        std::fs::write(attempt.directory.join(attempt_files::SCRIPT), text)?;
         pass("slurm/scripted");
         let worker = self.worker(attempt, needs, notify, Stage::InLine { said: None });
         worker.submit();

@@ -21,8 +21,9 @@ const LEAST_S: f64 = 300.0;
 const MOST_S: f64 = 3600.0;
 /// Attempts of a bundle at most.
 const MOST_ATTEMPTS: usize = 1000;
-/// Time for which the line waits for further short attempts after the last one that came.
+/// Time for which the line waits for further short attempts after the last one that came, and after the first.
 const GATHERING: Duration = Duration::from_millis(300);
+const LONGEST_GATHERING: Duration = Duration::from_secs(2);
 /// Folder of the lists and scripts, in the shared directory.
 const FOLDER: &str = "bundles";
 
@@ -44,10 +45,11 @@ pub(super) fn places_for(long: usize, short_s: f64) -> usize {
 }
 
 /// Whether short attempts may still be coming.
-pub(super) fn is_gathering(orders: &VecDeque<Order>, grown: Instant) -> bool {
+pub(super) fn is_gathering(orders: &VecDeque<Order>, (begun, grown): (Instant, Instant)) -> bool {
     let Some(first) = orders.front() else { return false };
     let all: f64 = orders.iter().filter_map(|order| order.ticket.short_s()).sum();
-    first.ticket.short_s().is_some() && all < LEAST_S && grown.elapsed() < GATHERING
+    let has_time = grown.elapsed() < GATHERING && begun.elapsed() < LONGEST_GATHERING;
+    first.ticket.short_s().is_some() && all < LEAST_S && has_time
 }
 
 /// Takes the next order, and where it is short those like it, as many as make the bundles for the free places equal.
@@ -190,9 +192,12 @@ mod tests {
         let now = Instant::now();
         let long_ago = now.checked_sub(Duration::from_secs(1)).unwrap();
         let line = |forecast| VecDeque::from([order(1, forecast, 1)]);
-        assert!(is_gathering(&line(Some(1.0)), now));
-        assert!(!is_gathering(&line(Some(1.0)), long_ago));
-        assert!(!is_gathering(&line(None), now));
+        assert!(is_gathering(&line(Some(1.0)), (now, now)));
+        assert!(!is_gathering(&line(Some(1.0)), (long_ago, long_ago)));
+        let (begun, before) = (now.checked_sub(Duration::from_secs(3)).unwrap(), now);
+        // Others come all the time.
+        assert!(!is_gathering(&line(Some(1.0)), (begun, before)));
+        assert!(!is_gathering(&line(None), (now, now)));
         assert_eq!(places_for(3, 640.0), 5);
     }
 }

@@ -120,7 +120,8 @@ impl Submitter {
 struct Line {
     cluster: Weak<Cluster>,
     orders: VecDeque<Order>,
-    /// When the last order came.
+    /// When the line was last empty, and when the last order came.
+    begun: Instant,
     grown: Instant,
     pause: Duration,
     not_before: Instant,
@@ -131,7 +132,15 @@ struct Line {
 impl Line {
     fn new(cluster: Weak<Cluster>) -> Self {
         let now = Instant::now();
-        Self { cluster, orders: VecDeque::new(), grown: now, pause: Duration::ZERO, not_before: now, refused: 0 }
+        Self {
+            cluster,
+            orders: VecDeque::new(),
+            begun: now,
+            grown: now,
+            pause: Duration::ZERO,
+            not_before: now,
+            refused: 0,
+        }
     }
 
     fn work(mut self, receiver: &Receiver<Order>) {
@@ -145,7 +154,10 @@ impl Line {
             let Some(cluster) = self.cluster.upgrade() else { return };
             self.orders.retain(|order| order.ticket.stage() != Stage::Revoked);
             let places = cluster.free_places();
-            if Instant::now() >= self.not_before && places > 0 && !bundling::is_gathering(&self.orders, self.grown) {
+            if Instant::now() >= self.not_before
+                && places > 0
+                && !bundling::is_gathering(&self.orders, (self.begun, self.grown))
+            {
                 let orders = bundling::take_next(&mut self.orders, places);
                 if !orders.is_empty() {
                     self.submit(&cluster, orders);
@@ -156,6 +168,9 @@ impl Line {
 
     fn take(&mut self, order: Order) {
         self.grown = Instant::now();
+        if self.orders.is_empty() {
+            self.begun = self.grown;
+        }
         self.orders.push_back(order);
     }
 
