@@ -1,5 +1,5 @@
-//! The web page: files that are part of the program. It uses the public API alone; anybody may load it, and its requests need what
-//! all requests need.
+//! The web page: files that are part of the program. It uses the public API alone; it is loaded without a token, and its requests
+//! need what all requests need.
 
 use crate::base_path;
 use crate::error::ApiError;

@@ -31,7 +31,7 @@ pub fn metrics() -> std::io::Result<PrometheusHandle> {
     describe_gauge!("meniscus_event_streams", "open event streams");
     describe_gauge!("meniscus_store_bytes", "bytes of the database and its log");
     describe_gauge!("meniscus_uploads_quarantined", "uploads that are not examined yet");
-    describe_gauge!("meniscus_disk_free_bytes", "free bytes of the data directory");
+    describe_gauge!("meniscus_disk_free_bytes", "free bytes where jobs write");
     describe_gauge!("meniscus_disk_reserve_bytes", "bytes that jobs leave free");
     describe_gauge!("meniscus_resident_bytes", "resident memory of the service in bytes");
     describe_gauge!("meniscus_memory_available_bytes", "bytes of memory available to new workers");

@@ -5,6 +5,7 @@ pub mod data_directory;
 pub mod executor;
 pub mod found_folders;
 pub mod fsck;
+pub mod growing_pause;
 pub mod inspector;
 pub mod refinement;
 pub mod shared_directory;

@@ -1,7 +1,10 @@
 //! The faults of a cluster, with real daemons: lost nodes and answers, time limits, preemption, doubles, late files.
 
 use crate::service::{eventually, signal};
-use crate::{Cluster, attempt_directory, body, check, longer, serve, serve_with, undisturbed, wait_for_checkpoint};
+use crate::{
+    Cluster, Trial, attempt_directory, body, check, check_attempt, longer, serve, serve_with, undisturbed,
+    wait_for_checkpoint,
+};
 use rustix::process::Signal;
 use serde_json::json;
 use std::process::Command;
@@ -10,19 +13,10 @@ use std::time::Duration;
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn a_lost_node_costs_an_interval_while_its_orphan_is_not_believed() {
-    let expected = undisturbed(&longer());
-    let mut cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&longer());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, mut cluster, service, id } = Trial::begin(&longer());
     let node = cluster.node_of(&id);
     cluster.kill_node(node);
-    let job = eventually("there is a second attempt", Duration::from_secs(60), || {
-        let job = service.job(&id);
-        (job["attempt"] == 2 || job["state"] == "succeeded").then_some(job)
-    });
-    // The orphan may have come to its end before the node was declared lost: then its verdict counts.
-    let _ = job;
+    // The orphan may come to its end before the node is declared lost: then its verdict counts.
     service.wait_for(&id, &["succeeded"]);
     check(&service, &id, &expected);
     cluster.start_node(node);
@@ -34,18 +28,12 @@ fn a_lost_node_costs_an_interval_while_its_orphan_is_not_believed() {
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn a_daemon_that_is_back_in_time_loses_nothing() {
-    let expected = undisturbed(&body());
-    let mut cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&body());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, mut cluster, service, id } = Trial::begin(&body());
     let node = cluster.node_of(&id);
     cluster.kill_node(node);
     std::thread::sleep(Duration::from_secs(1));
     cluster.start_node(node);
-    let job = service.wait_for(&id, &["succeeded"]);
-    assert_eq!(job["attempt"], 1, "{job}");
-    check(&service, &id, &expected);
+    check_attempt(&service, &id, 1, &expected);
 }
 
 #[test]
@@ -61,9 +49,7 @@ fn a_lost_answer_of_sbatch_makes_no_second_job() {
         service.log_text().contains("whether the cluster has a job is not known").then_some(())
     });
     cluster.freeze_controller(false);
-    let job = service.wait_for(&id, &["succeeded"]);
-    assert_eq!(job["attempt"], 1, "{job}");
-    check(&service, &id, &expected);
+    check_attempt(&service, &id, 1, &expected);
     assert_eq!(service.get("/readyz").status, 200);
 }
 
@@ -93,18 +79,12 @@ fn the_time_limit_of_the_cluster_is_a_pause_and_no_end() {
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn preemption_sends_the_job_back_to_the_queue_with_its_checkpoint() {
-    let expected = undisturbed(&longer());
-    let cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&longer());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, cluster, service, id } = Trial::begin(&longer());
     cluster.node_of(&id);
     cluster
         .ask("sbatch", &["-p", "urgent", "-N2", "--exclusive", "-t", "1", "-o", "/dev/null", "--wrap", "sleep 2"])
         .unwrap();
-    let job = service.wait_for(&id, &["succeeded"]);
-    assert_eq!(job["attempt"], 2, "{job}");
-    check(&service, &id, &expected);
+    check_attempt(&service, &id, 2, &expected);
     let evicted = service.events(&id).iter().any(|event| event["data"]["reason"] == "worker.evicted");
     assert!(evicted, "{:?}", service.events(&id));
 }
@@ -132,11 +112,7 @@ fn a_controller_that_forgets_a_job_and_gives_its_number_away_confuses_nobody() {
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn without_answers_for_a_while_jobs_run_on_and_the_service_stays_ready() {
-    let expected = undisturbed(&body());
-    let mut cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&body());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, mut cluster, service, id } = Trial::begin(&body());
     cluster.stop_munged();
     let waiting = service.submit(&body());
     let said = eventually("it says so", Duration::from_secs(30), || {
@@ -158,11 +134,7 @@ fn without_answers_for_a_while_jobs_run_on_and_the_service_stays_ready() {
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn of_two_jobs_of_one_attempt_one_works() {
-    let expected = undisturbed(&body());
-    let cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&body());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, cluster, service, id } = Trial::begin(&body());
     let directory = attempt_directory(&cluster, &id, 1);
     let name = format!("--job-name=mns-{id}-1");
     let script = directory.join("slurm.sh").display().to_string();
@@ -174,19 +146,13 @@ fn of_two_jobs_of_one_attempt_one_works() {
         (row != "PENDING" && row != "RUNNING" && row != "COMPLETING").then_some(row)
     });
     assert_eq!(state, "FAILED");
-    let job = service.wait_for(&id, &["succeeded"]);
-    assert_eq!(job["attempt"], 1, "{job}");
-    check(&service, &id, &expected);
+    check_attempt(&service, &id, 1, &expected);
 }
 
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn a_requeue_by_hand_never_runs_an_attempt_twice() {
-    let expected = undisturbed(&longer());
-    let cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&longer());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, cluster, service, id } = Trial::begin(&longer());
     cluster.node_of(&id);
     let number = cluster.queue("%i")[0].clone();
     // The administrator allows what the service has forbidden.
@@ -199,11 +165,7 @@ fn a_requeue_by_hand_never_runs_an_attempt_twice() {
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn a_signal_to_the_worker_is_an_eviction_and_a_kill_a_death() {
-    let expected = undisturbed(&longer());
-    let cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&longer());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, cluster, service, id } = Trial::begin(&longer());
     signal(service.worker_eventually(&id), Signal::TERM);
     eventually("there is a second attempt", Duration::from_secs(30), || {
         (service.job(&id)["attempt"] == 2).then_some(())
@@ -211,9 +173,7 @@ fn a_signal_to_the_worker_is_an_eviction_and_a_kill_a_death() {
     let heartbeat = attempt_directory(&cluster, &id, 2).join("heartbeat.json");
     eventually("it gives signs of life", Duration::from_secs(30), || heartbeat.exists().then_some(()));
     signal(service.worker_eventually(&id), Signal::KILL);
-    let job = service.wait_for(&id, &["succeeded"]);
-    assert_eq!(job["attempt"], 3, "{job}");
-    check(&service, &id, &expected);
+    check_attempt(&service, &id, 3, &expected);
     let reasons: Vec<String> =
         service.events(&id).iter().filter_map(|event| event["data"]["reason"].as_str().map(str::to_owned)).collect();
     assert!(

@@ -31,7 +31,7 @@ impl Cluster {
         for folder in ["run", "log", "state", "spool/node1", "spool/node2", "shared"] {
             std::fs::create_dir_all(cluster.path(folder)).unwrap();
         }
-        // Munge wants directories that nobody else can write.
+        // Munge wants directories that its user alone can write.
         set_mode(&cluster.path(""), 0o755);
         std::fs::write(cluster.path("munge.key"), [7_u8; 1024]).unwrap();
         set_mode(&cluster.path("munge.key"), 0o400);
@@ -153,7 +153,7 @@ impl Cluster {
         self.end_daemon(NODES + number - 1);
     }
 
-    /// An orderly end of the daemon without which nobody is known to anybody.
+    /// An orderly end of the daemon by which all others know each other.
     pub fn stop_munged(&mut self) {
         if let Some(child) = &self.daemons[MUNGED] {
             signal(child.id(), Signal::TERM);
@@ -208,7 +208,7 @@ impl Cluster {
         })
     }
 
-    /// Processes of jobs, whoever their parent is now.
+    /// Processes of jobs, whatever their parent is now.
     pub fn job_processes(&self) -> Vec<u32> {
         let conf = format!("SLURM_CONF={}", self.path("slurm.conf").display());
         let mut found = Vec::new();

@@ -74,6 +74,37 @@ pub fn longer() -> Value {
     longer
 }
 
+/// A job at work on a cluster, and what it gives when nothing disturbs it.
+pub struct Trial {
+    /// The results of an undisturbed run.
+    pub expected: Expected,
+    /// Where it runs.
+    pub cluster: Cluster,
+    /// The service that uses the cluster.
+    pub service: Service,
+    /// Id of the job.
+    pub id: String,
+}
+
+impl Trial {
+    /// Runs a body without a cluster, then begins it on one and waits for its first checkpoint.
+    pub fn begin(body: &Value) -> Self {
+        let expected = undisturbed(body);
+        let cluster = Cluster::start();
+        let service = serve(&cluster);
+        let id = service.submit(body);
+        wait_for_checkpoint(&service, &id);
+        Self { expected, cluster, service, id }
+    }
+}
+
+/// A job comes to its end in an attempt, with the results of an undisturbed run.
+pub fn check_attempt(service: &Service, id: &str, attempt: u64, expected: &Expected) {
+    let job = service.wait_for(id, &["succeeded"]);
+    assert_eq!(job["attempt"], attempt, "{job}");
+    check(service, id, expected);
+}
+
 /// Frames and series are those of an undisturbed run.
 pub fn check(service: &Service, id: &str, expected: &Expected) {
     assert_eq!(service.frames(id), expected.frames, "{id}");

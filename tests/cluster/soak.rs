@@ -29,32 +29,14 @@ fn every_job_ends_as_undisturbed_under_random_kills() {
     let ids: Vec<String> = (0..jobs).map(|_| service.submit(&body)).collect();
     let (began, mut kills, mut draw) = (Instant::now(), [0; 3], 0);
     while began.elapsed() < time && !is_all_done(&service, &ids) {
-        draw += 1;
-        std::thread::sleep(Duration::from_secs_f64(2.0 + 10.0 * chance(seed, draw)));
-        draw += 1;
-        let away = Duration::from_secs_f64(8.0 * chance(seed, draw));
-        draw += 1;
-        match (4.0 * chance(seed, draw)) as usize {
-            0 => {
-                service.kill();
-                std::thread::sleep(away);
-                service.restart();
-                kills[0] += 1;
-            }
-            1 => {
-                cluster.kill_controller();
-                std::thread::sleep(away);
-                cluster.start_controller();
-                kills[1] += 1;
-            }
-            which => {
-                cluster.kill_node(which - 1);
-                // Sometimes longer than the cluster has patience for.
-                std::thread::sleep(away * 2);
-                cluster.start_node(which - 1);
-                kills[2] += 1;
-            }
-        }
+        let mut next = || {
+            draw += 1;
+            chance(seed, draw)
+        };
+        std::thread::sleep(Duration::from_secs_f64(2.0 + 10.0 * next()));
+        let (away, which) = (Duration::from_secs_f64(8.0 * next()), (4.0 * next()) as usize);
+        kills[which.min(2)] += 1;
+        disturb(&mut cluster, &mut service, which, away);
     }
     let mut attempts = 0;
     for id in &ids {
@@ -77,6 +59,28 @@ fn every_job_ends_as_undisturbed_under_random_kills() {
         kills[2],
         began.elapsed().as_secs_f64()
     );
+}
+
+/// Kills the service (0), the controller (1) or the daemon of a node (2, 3), and starts it again after a while.
+fn disturb(cluster: &mut Cluster, service: &mut Service, which: usize, away: Duration) {
+    match which {
+        0 => {
+            service.kill();
+            std::thread::sleep(away);
+            service.restart();
+        }
+        1 => {
+            cluster.kill_controller();
+            std::thread::sleep(away);
+            cluster.start_controller();
+        }
+        _ => {
+            cluster.kill_node(which - 1);
+            // Sometimes longer than the cluster has patience for.
+            std::thread::sleep(away * 2);
+            cluster.start_node(which - 1);
+        }
+    }
 }
 
 fn is_all_done(service: &Service, ids: &[String]) -> bool {

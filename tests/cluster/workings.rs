@@ -1,7 +1,8 @@
 //! What a user does: run, watch, pause, cancel, restart the service.
 
-use crate::service::eventually;
-use crate::{Cluster, body, check, longer, serve, serve_with, undisturbed, wait_for_checkpoint};
+use crate::results::Expected;
+use crate::service::{Service, eventually};
+use crate::{Cluster, Trial, body, check, longer, serve, serve_with, undisturbed, wait_for_checkpoint};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
@@ -87,11 +88,7 @@ fn a_job_says_what_it_waits_for_and_a_cancel_is_prompt_everywhere() {
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn a_pause_on_the_cluster_keeps_its_checkpoint_and_restarts_are_bit_identical() {
-    let expected = undisturbed(&body());
-    let cluster = Cluster::start();
-    let service = serve(&cluster);
-    let id = service.submit(&body());
-    wait_for_checkpoint(&service, &id);
+    let Trial { expected, cluster: _cluster, service, id } = Trial::begin(&body());
     service.act(&id, "pause");
     let job = service.wait_for(&id, &["paused"]);
     assert_eq!(job["reason"], "user.pause");
@@ -134,12 +131,12 @@ fn another_build_on_a_node_is_named_and_nothing_is_lost() {
     let file = cluster.path("config.toml");
     std::fs::write(&file, text).unwrap();
     let conf = cluster.path("slurm.conf");
-    let service = crate::Service::start_with(
+    let service = Service::start_with(
         &cluster.path("data"),
         &["--config", file.to_str().unwrap()],
         &[("SLURM_CONF", conf.to_str().unwrap())],
     );
-    // Somebody installs another build while the service runs.
+    // Another build is installed while the service runs.
     let mut bytes = std::fs::read(&copy).unwrap();
     bytes.extend_from_slice(b"another build");
     std::fs::remove_file(&copy).unwrap();
@@ -157,6 +154,14 @@ fn another_build_on_a_node_is_named_and_nothing_is_lost() {
 /// A job of a second, whose running time is known from one before.
 fn short_body() -> serde_json::Value {
     json!({"scene": {"kind": "redistance", "spacing": 0.02, "repeat": 100}, "checkpoint": {"every_steps": 20}})
+}
+
+/// A cluster on which the time of a short job is known, and what the job gives.
+fn short_trial() -> (Cluster, Service, Expected) {
+    let cluster = Cluster::start();
+    let service = serve(&cluster);
+    let expected = Expected::of(&service, &short_body());
+    (cluster, service, expected)
 }
 
 #[test]
@@ -217,12 +222,8 @@ fn short_jobs_share_a_job_of_the_cluster_and_each_keeps_its_promises() {
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn a_bundle_that_the_cluster_ends_gives_its_attempts_back() {
-    let cluster = Cluster::start();
-    let service = serve(&cluster);
+    let (cluster, service, expected) = short_trial();
     let short = short_body();
-    let first = service.submit(&short);
-    service.wait_for(&first, &["succeeded"]);
-    let expected = (service.frames(&first), service.series(&first));
     let ids: Vec<String> = (0..12).map(|_| service.submit(&short)).collect();
     let bundle = eventually("the bundle works", Duration::from_secs(30), || {
         cluster.queue("%j %T").into_iter().find(|row| row.contains("bundle") && row.contains("RUNNING"))
@@ -232,24 +233,20 @@ fn a_bundle_that_the_cluster_ends_gives_its_attempts_back() {
     cluster.ask("scancel", &["--me", &format!("--name={name}")]).unwrap();
     for id in &ids {
         service.wait_for(id, &["succeeded"]);
-        assert_eq!((service.frames(id), service.series(id)), expected, "{id}");
+        check(&service, id, &expected);
     }
 }
 
 #[test]
 #[ignore = "needs Slurm: make test-cluster"]
 fn a_worker_of_a_bundle_that_dies_is_tried_again_while_the_others_go_on() {
-    let cluster = Cluster::start();
-    let service = serve(&cluster);
+    let (_cluster, service, expected) = short_trial();
     let short = short_body();
-    let first = service.submit(&short);
-    service.wait_for(&first, &["succeeded"]);
-    let expected = (service.frames(&first), service.series(&first));
     let ids: Vec<String> = (0..6).map(|_| service.submit(&short)).collect();
     crate::service::signal(service.worker_eventually(&ids[0]), rustix::process::Signal::KILL);
     for id in &ids {
         let job = service.wait_for(id, &["succeeded"]);
         assert_eq!(job["attempt"].as_u64(), Some(if *id == ids[0] { 2 } else { 1 }), "{job}");
-        assert_eq!((service.frames(id), service.series(id)), expected, "{id}");
+        check(&service, id, &expected);
     }
 }

@@ -11,25 +11,37 @@ export interface Loaded<T> {
 export function useLoaded<T>(load: (signal: AbortSignal) => Promise<T>, keys: unknown[], everyMs = 0): Loaded<T> {
     const [data, setData] = useState<T | null>(null);
     const [error, setError] = useState<Error | null>(null);
-    const [turn, setTurn] = useState(0);
     const latest = useRef(load);
     latest.current = load;
-    const reload = useCallback(() => setTurn((count) => count + 1), []);
-    useEffect(() => setData(null), keys);
+    const starter = useRef(() => {});
+    const reload = useCallback(() => starter.current(), []);
     useEffect(() => {
+        setData(null);
         const abort = new AbortController();
-        latest.current(abort.signal).then(
-            (found) => {
-                if (abort.signal.aborted) return;
-                setData(found);
-                setError(null);
-            },
-            (failed: unknown) => {
-                if (!abort.signal.aborted) setError(failed instanceof Error ? failed : new Error(String(failed)));
-            },
-        );
+        let isLoading = false;
+        let isWanted = false;
+        // A load that is under way comes to its end: else frequent changes would let none of them do so.
+        const start = async () => {
+            isWanted = true;
+            if (isLoading) return;
+            isLoading = true;
+            while (isWanted && !abort.signal.aborted) {
+                isWanted = false;
+                try {
+                    const found = await latest.current(abort.signal);
+                    if (abort.signal.aborted) return;
+                    setData(found);
+                    setError(null);
+                } catch (failed) {
+                    if (!abort.signal.aborted) setError(failed instanceof Error ? failed : new Error(String(failed)));
+                }
+            }
+            isLoading = false;
+        };
+        starter.current = () => void start();
+        void start();
         return () => abort.abort();
-    }, [...keys, turn]);
+    }, keys);
     useEffect(() => {
         if (everyMs <= 0) return;
         const timer = window.setInterval(() => document.hidden || reload(), everyMs);
@@ -41,4 +53,13 @@ export function useLoaded<T>(load: (signal: AbortSignal) => Promise<T>, keys: un
         };
     }, [...keys, everyMs]);
     return { data, error, reload };
+}
+
+/** Loads again when something changes; the first time each has loaded by itself. */
+export function useReload(reloads: (() => void)[], changes: unknown[]): void {
+    const isFirst = useRef(true);
+    useEffect(() => {
+        if (isFirst.current) isFirst.current = false;
+        else reloads.forEach((reload) => reload());
+    }, changes);
 }

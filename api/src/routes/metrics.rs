@@ -22,7 +22,7 @@ pub async fn metrics(State(state): State<AppState>) -> Result<Response, ApiError
     gauge!("meniscus_store_bytes").set(statistics.store_bytes as f64);
     gauge!("meniscus_uploads_quarantined").set(statistics.quarantined as f64);
     gauge!("meniscus_slots").set(state.config.slots as f64);
-    let free = process::free_space(state.store.directory()).unwrap_or(0);
+    let free = process::free_space(state.store.jobs_directory()).unwrap_or(0);
     gauge!("meniscus_disk_free_bytes").set(free as f64);
     gauge!("meniscus_disk_reserve_bytes").set(state.config.disk_reserve_bytes as f64);
     gauge!("meniscus_resident_bytes").set(process::resident_bytes(std::process::id()).unwrap_or(0) as f64);

@@ -28,7 +28,7 @@ pub struct AttemptPlace {
 }
 
 /// What an attempt needs of the machine that it runs on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Needs {
     /// Resident memory at most, in bytes.
     pub memory_bytes: u64,
@@ -169,17 +169,6 @@ pub enum Eviction {
 }
 
 impl Eviction {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::NodeLost,
-        Self::Preempted,
-        Self::TimeLimit,
-        Self::Forgotten,
-        Self::Revoked,
-        Self::NotBegun,
-        Self::Unreached,
-    ];
-
     /// Its word in metrics.
     #[must_use]
     pub fn word(self) -> &'static str {

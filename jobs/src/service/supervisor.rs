@@ -8,6 +8,7 @@ mod recovery;
 mod starting;
 
 use crate::service::executor::{EndCause, Eviction, Executor, Orphans, Phase, Worker};
+use crate::service::growing_pause::GrowingPause;
 use crate::service::refinement;
 use crate::service::store::finish_attempt::{LossCause, LossKind};
 use crate::service::store::import::{Imported, ProgressPace};
@@ -20,7 +21,7 @@ use crate::spec::run_options::RunOptions;
 use crate::spec::states::{Reason, Trigger};
 use crate::system::breakpoints::pass;
 use crate::system::process;
-use patience::{GrowingPause, PatientClock};
+use patience::PatientClock;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
@@ -383,7 +384,12 @@ impl Supervisor {
         let (kind, hint) = match why {
             Eviction::NotBegun => {
                 let pause = self.start_pause.begin();
-                tracing::error!(job = running.job, message, pause_s = pause.as_secs(), "a worker could not be started");
+                tracing::error!(
+                    job = running.job,
+                    cause = message,
+                    pause_s = pause.as_secs(),
+                    "a worker could not be started"
+                );
                 (LossKind::Harmless, Some(not_started_hint(&message, pause)))
             }
             Eviction::Unreached => (LossKind::Harmless, None),

@@ -41,12 +41,8 @@ const CONTROL_INTERVAL: Duration = Duration::from_secs(1);
 /// When the specification cannot be read, the records cannot be opened or signals cannot be received.
 pub fn run(directory: &Path, terms: &Terms) -> io::Result<Verdict> {
     let life = Life::new(directory);
-    let cause = match foreign_build(terms) {
-        Ok(None) => None,
-        Ok(Some(cause)) => Some(cause),
-        Err(error) => Some(format!("the program cannot be read: {error}")),
-    };
-    if let Some(cause) = cause {
+    let foreign = foreign_build(terms).unwrap_or_else(|error| Some(format!("the program cannot be read: {error}")));
+    if let Some(cause) = foreign {
         life.end(NOT_STARTED_CODE.into(), Some(cause.clone()))?;
         return Ok(Verdict::Unstarted { cause });
     }

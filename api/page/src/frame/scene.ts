@@ -74,8 +74,6 @@ export class FrameScene {
     private spacing = 0.1;
     private readonly watch: ResizeObserver;
     private linked: FrameScene[] = [];
-    /** Called when the view was turned or moved. */
-    onMove: () => void = () => {};
 
     constructor(private readonly canvas: HTMLCanvasElement) {
         this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
@@ -92,7 +90,6 @@ export class FrameScene {
         controls.screenSpacePanning = true;
         controls.addEventListener("change", () => {
             this.draw();
-            this.onMove();
             this.linked.forEach((other) => other.follow(this));
         });
         return controls;
@@ -204,10 +201,9 @@ export class FrameScene {
         this.center.addVectors(low, high).multiplyScalar(0.5);
         this.radius = Math.max(extent.length() / 2, 1e-12);
         this.isFlat = extent.z < 1e-9 * this.radius;
-        const isSurface = !this.isFlat && (frame.triangles.length > 0 || count < 2);
         const measureOf = this.isFlat ? extent.x * extent.y : extent.x * extent.y * extent.z;
         const estimate = this.isFlat ? Math.sqrt(measureOf / count) : Math.cbrt(measureOf / count);
-        this.spacing = isSurface ? this.radius / 100 : nearest(frame.positions, estimate);
+        this.spacing = nearest(frame.positions, estimate);
         this.reset();
     }
 

@@ -6,7 +6,6 @@ import { number } from "../format";
 export interface Curve {
     label: string;
     values: (number | null)[];
-    dash?: number[];
     /** Whether each value is marked. */
     isMarked?: boolean;
 }
@@ -62,7 +61,6 @@ export function Plot({ x, xLabel, curves, logX = false, logY = false, height = 2
                         label: curve.label,
                         stroke: color(index),
                         width: 1.75,
-                        dash: curve.dash,
                         spanGaps: true,
                         points: curve.isMarked ? { show: true, size: 8 } : { size: 5 },
                         value: (_: uPlot, value: number | null) => number(value),

@@ -4,7 +4,7 @@ import { get, openAddress, post, remove, request, Refusal, type Checkpoint, type
 import { listen } from "../events";
 import { ago, bytes, curl, number, seconds } from "../format";
 import { FrameView } from "../frame/view";
-import { useLoaded } from "../load";
+import { useLoaded, useReload } from "../load";
 import { Act, actionsOf, Bar, Copy, Findings, Health, State, Trouble } from "../parts/basics";
 import { Plot } from "../parts/plot";
 import { readSeries, type Series } from "../series";
@@ -50,14 +50,11 @@ export function JobPage({ id }: { id: string }) {
     const [watched, setWatched] = useState<Job | null>(null);
     const { changes, slow } = useChanges(id, watched);
     const { data: job, error, reload } = useLoaded((signal) => get<Job>(`v1/jobs/${id}`, signal), [id], watched?.finished_at ? 0 : REFRESH_MS);
-    useEffect(reload, [changes]);
+    useReload([reload], [changes]);
     useEffect(() => setWatched(job), [job?.id, job?.finished_at]);
     const files = useLoaded((signal) => get<Page<FileEntry>>(`v1/jobs/${id}/files`, signal), [id]);
     const series = useLoaded((signal) => loadSeries(id, signal), [id]);
-    useEffect(() => {
-        files.reload();
-        series.reload();
-    }, [slow, job?.finished_at]);
+    useReload([files.reload, series.reload], [slow, job?.finished_at]);
     if (!job) return <main><Trouble error={error} />{!error && <p class="quiet">loading</p>}</main>;
     const frames = (files.data?.items ?? []).filter((file) => /^frames\/.*\.vtkhdf$/.test(file.path));
     const kind = (job.resolved as { scene?: { kind?: string } } | null)?.scene?.kind ?? "";
@@ -241,7 +238,7 @@ function ReportTable({ id }: { id: string }) {
 function Checkpoints({ job, changes }: { job: Job; changes: number }) {
     const { data, reload } = useLoaded((signal) => get<Page<Checkpoint>>(`v1/jobs/${job.id}/checkpoints`, signal), [job.id]);
     const [chosen, setChosen] = useState<string | null>(null);
-    useEffect(reload, [changes, job.finished_at]);
+    useReload([reload], [changes, job.finished_at]);
     const checkpoints = data?.items ?? [];
     return (
         <>
@@ -311,6 +308,6 @@ const LINES = 40;
 
 function Log({ id, changes, isOver }: { id: string; changes: number; isOver: boolean }) {
     const { data, reload } = useLoaded(async (signal) => (await request(`v1/jobs/${id}/log?tail=${LINES}`, { accept: "text/plain", signal })).text(), [id]);
-    useEffect(reload, [changes, isOver]);
+    useReload([reload], [changes, isOver]);
     return <pre class="log" tabIndex={0}>{data ?? ""}</pre>;
 }

@@ -1,13 +1,12 @@
 // All jobs: a table that follows the service, with the filters of the API in its address.
 import { useMemo, useRef, useState } from "preact/hooks";
-import { get, post, type Job, type Page } from "../api";
+import { get, post, type Job, type Page, type SceneKind } from "../api";
 import { ago, seconds } from "../format";
 import { useLoaded } from "../load";
 import { Act, Bar, Health, State, Trouble } from "../parts/basics";
 import { setQuery, type Route } from "../route";
 
 const STATES = ["queued", "running", "pausing", "paused", "canceling", "interrupted", "succeeded", "failed", "canceled"];
-const KINDS = ["redistance", "vortex", "droplet", "surface_pde", "front"];
 const ROW_PX = 38;
 const SPARE_ROWS = 12;
 const PAGE = 500;
@@ -71,6 +70,7 @@ function Nothing({ isFiltered }: { isFiltered: boolean }) {
 }
 
 function Filters({ route }: { route: Route }) {
+    const { data: kinds } = useLoaded((signal) => get<Page<SceneKind>>("v1/scenes", signal), []);
     const choice = (name: string, values: string[]) => (
         <label>
             {name}{" "}
@@ -83,7 +83,7 @@ function Filters({ route }: { route: Route }) {
     return (
         <form class="filters" onSubmit={(event) => event.preventDefault()}>
             {choice("state", STATES)}
-            {choice("kind", KINDS)}
+            {choice("kind", (kinds?.items ?? []).map(({ kind }) => kind))}
             {choice("health", ["sound", "doubtful"])}
             <label>
                 name{" "}

@@ -1,7 +1,7 @@
 // A new job: a form made from the schema of its scene, beside the body as JSON; either can be edited, and the service says of both
 // what it thinks.
-import { useEffect, useRef, useState } from "preact/hooks";
-import { get, post, Refusal, request, type Estimate, type Job, type Problem, type SceneKind, type Upload } from "../api";
+import { useEffect, useState } from "preact/hooks";
+import { get, post, Refusal, request, type Estimate, type Job, type Page, type Problem, type SceneKind, type Upload } from "../api";
 import { bytes, curl, number, seconds } from "../format";
 import { useLoaded } from "../load";
 import { Act, Copy, Findings, Trouble } from "../parts/basics";
@@ -11,32 +11,18 @@ import { go, type Route } from "../route";
 
 type Body = { scene: Record<string, unknown> } & Record<string, unknown>;
 
-const KINDS: [string, string][] = [
-    ["vortex", "an interface in a flow"],
-    ["droplet", "a droplet of two fluids"],
-    ["front", "a moving front"],
-    ["surface_pde", "an equation on a surface"],
-    ["redistance", "distances from a surface"],
-];
-
 const ESTIMATE_PAUSE_MS = 350;
 
-/** Fields of a body beside its scene. */
-const RUN: Schema = {
-    type: "object",
-    properties: {
-        name: { type: "string", description: "name, for people" },
-        output: { type: "object", properties: {
-            every_time: { type: "number", exclusiveMinimum: 0, description: "a frame at every multiple of this time; first and last only when not given" },
-            series_every_steps: { type: "integer", minimum: 1, default: 10, description: "a series row every so many steps" },
-        }, description: "what to write" },
-        limits: { type: "object", properties: {
-            threads: { type: "integer", minimum: 1, description: "threads of the worker" },
-            wall_s: { type: "number", exclusiveMinimum: 0, description: "running time until the job is paused, in seconds" },
-        }, description: "limits of the job" },
-        priority: { type: "integer", default: 0, description: "higher goes first; a unit is worth ten minutes of waiting" },
-    },
-};
+/** The description of the API, loaded once: it is long, and does not change while the service runs. */
+let described: Promise<{ components: { schemas: Record<string, Schema> } }> | null = null;
+
+/** What a body has beside its scene, as the service declares it. */
+async function loadRunSchema(): Promise<Schema> {
+    described ??= get("openapi.json");
+    described.catch(() => { described = null; });
+    const { properties } = (await described).components.schemas.JobSpec ?? {};
+    return { type: "object", properties: without(without(properties, "scene"), "restart") };
+}
 
 export function New({ route }: { route: Route }) {
     const like = route.query.get("like");
@@ -44,6 +30,8 @@ export function New({ route }: { route: Route }) {
     const [text, setText] = useState("");
     const [textError, setTextError] = useState<string | null>(null);
     const kind = String(body?.scene.kind ?? "");
+    const { data: kinds } = useLoaded((signal) => get<Page<SceneKind>>("v1/scenes", signal), []);
+    const { data: run } = useLoaded(loadRunSchema, []);
     const { data: scene, error } = useLoaded<SceneKind | null>(async (signal) => (kind ? get<SceneKind>(`v1/scenes/${kind}`, signal) : null), [kind]);
 
     const begin = (next: Body) => {
@@ -76,7 +64,7 @@ export function New({ route }: { route: Route }) {
                 <h1>New job</h1>
                 <p>What is to be computed?</p>
                 <ul class="kinds">
-                    {KINDS.map(([name, says]) => <li key={name}><button type="button" onClick={() => void choose(name)}><strong>{name}</strong><span>{says}</span></button></li>)}
+                    {(kinds?.items ?? []).map(({ kind: name, title }) => <li key={name}><button type="button" onClick={() => void choose(name)}><strong>{name}</strong><span>{title}</span></button></li>)}
                 </ul>
             </main>
         );
@@ -85,7 +73,7 @@ export function New({ route }: { route: Route }) {
         <main>
             <header class="title"><h1>New job</h1><span class="quiet">{scene?.title}</span><span class="grow" /><button type="button" onClick={() => setBody(null)}>another kind</button></header>
             <Trouble error={error} />
-            <Editor body={body} scene={scene} text={text} textError={textError} onForm={begin} onText={edit} />
+            <Editor body={body} scene={scene} run={run} text={text} textError={textError} onForm={begin} onText={edit} />
         </main>
     );
 }
@@ -124,22 +112,18 @@ function useEstimate(body: Body, isSound: boolean): { estimate: Estimate | null;
 interface EditorProps {
     body: Body;
     scene: SceneKind | null;
+    /** What the body has beside its scene. */
+    run: Schema | null;
     text: string;
     textError: string | null;
     onForm: (body: Body) => void;
     onText: (text: string) => void;
 }
 
-function Editor({ body, scene, text, textError, onForm, onText }: EditorProps) {
+function Editor({ body, scene, run, text, textError, onForm, onText }: EditorProps) {
     const { estimate, problem, error } = useEstimate(body, textError === null);
     const errors = problem?.errors ?? [];
-    const placed = useRef(new Set<string>());
-    placed.current = new Set();
-    const errorsAt = (pointer: string) => {
-        const found = errors.filter((item) => item.pointer === pointer);
-        if (found.length > 0) placed.current.add(pointer);
-        return found;
-    };
+    const errorsAt = (pointer: string) => errors.filter((item) => item.pointer === pointer);
     const submit = async () => {
         const made = await post<Job>("v1/jobs", body);
         go(`/jobs/${made.id}`);
@@ -150,7 +134,7 @@ function Editor({ body, scene, text, textError, onForm, onText }: EditorProps) {
         <div class="editor">
             <form onSubmit={(event) => event.preventDefault()} aria-label="parameters">
                 {schema && <Parameter name="scene" schema={{ ...schema, properties: without(schema.properties, "kind") }} value={body.scene} pointer={["scene"]} set={set} errorsAt={errorsAt} isOpen />}
-                <Parameter name="run" schema={RUN} value={body} pointer={[]} set={set} errorsAt={errorsAt} isOpen />
+                {run && <Parameter name="run" schema={run} value={body} pointer={[]} set={set} errorsAt={errorsAt} isOpen />}
                 <Sweep body={body} />
                 <Uploads />
             </form>
@@ -186,7 +170,16 @@ function EstimateBox({ estimate }: { estimate: Estimate | null }) {
     );
 }
 
-const PURPOSES = ["surface", "mesh", "points", "queries", "values", "flow", "checkpoint"];
+/** What a file is uploaded as, and how a body names it then. */
+const PURPOSES: Record<string, (id: string) => string> = {
+    surface: (id) => `"surface": {"type": "points", "upload": "${id}"}`,
+    mesh: (id) => `"shape": {"type": "mesh", "upload": "${id}"}`,
+    points: (id) => `"shape": {"type": "points", "upload": "${id}"}`,
+    queries: (id) => `"queries": {"type": "points", "upload": "${id}"}`,
+    values: (id) => `{"type": "data", "name": "u", "upload": "${id}"}`,
+    flow: (id) => `"flow": {"type": "grid", "upload": "${id}"}`,
+    checkpoint: (id) => `"restart": {"upload": "${id}"}`,
+};
 
 /** Points, meshes and values from files; the id of an upload goes into the body. */
 function Uploads() {
@@ -212,9 +205,9 @@ function Uploads() {
     return (
         <details class="group">
             <summary>Files of one's own</summary>
-            <label>as <select value={purpose} onChange={(event) => setPurpose(event.currentTarget.value)}>{PURPOSES.map((name) => <option key={name} value={name}>{name}</option>)}</select></label>
+            <label>as <select value={purpose} onChange={(event) => setPurpose(event.currentTarget.value)}>{Object.keys(PURPOSES).map((name) => <option key={name} value={name}>{name}</option>)}</select></label>
             <label>file <input type="file" onChange={(event) => void send(event.currentTarget.files?.[0])} /></label>
-            {made && <p role="status"><code>{made.id}</code> is {made.state}{made.reason ? `: ${made.reason}` : ""}. {made.state === "ready" && <>Use it as <code>{`{"type": "${purpose === "mesh" ? "mesh" : "points"}", "upload": "${made.id}"}`}</code>.</>}</p>}
+            {made && <p role="status"><code>{made.id}</code> is {made.state}{made.reason ? `: ${made.reason}` : ""}. {made.state === "ready" && <>A body names it so: <code>{PURPOSES[made.as]?.(made.id)}</code></>}</p>}
             {made?.found ? <pre>{JSON.stringify(made.found, null, 2)}</pre> : null}
             <Trouble error={error} />
         </details>

@@ -3,7 +3,7 @@ import { useEffect, useState } from "preact/hooks";
 import { get, openAddress, post, remove, request, Refusal, type Page, type Study } from "../api";
 import { listen } from "../events";
 import { ago, number } from "../format";
-import { useLoaded } from "../load";
+import { useLoaded, useReload } from "../load";
 import { Act, Bar, State, Trouble } from "../parts/basics";
 import { Plot, type Curve } from "../parts/plot";
 import { go } from "../route";
@@ -87,10 +87,7 @@ export function StudyPage({ id }: { id: string }) {
             window.clearTimeout(timer);
         };
     }, [id, isOver]);
-    useEffect(() => {
-        table.reload();
-        report.reload();
-    }, [JSON.stringify(study?.counts)]);
+    useReload([table.reload, report.reload], [JSON.stringify(study?.counts)]);
     if (!study) return <main><Trouble error={error} />{!error && <p class="quiet">loading</p>}</main>;
     const act = (action: string) => async () => {
         await post(`v1/studies/${id}/${action}`);

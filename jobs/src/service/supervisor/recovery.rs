@@ -41,19 +41,23 @@ impl Supervisor {
     fn adopt(&mut self, job: &JobRow) -> Result<bool, StoreError> {
         let directory = attempt_directory(&self.store.job_directory(&job.id), job.attempt);
         let place = AttemptPlace { job: job.id.clone(), epoch: job.attempt, directory };
-        let options = RunOptions::from_resolved(&job.resolved)?;
-        match self.executor.adopt(&place, job.worker_handle.as_deref(), &needs(job, &options), self.notify()) {
+        // A job that cannot be read fails when it is started again; it must not keep the service from its others.
+        let options = RunOptions::from_resolved(&job.resolved).ok();
+        let needs = options.as_ref().map(|options| needs(job, options)).unwrap_or_default();
+        match self.executor.adopt(&place, job.worker_handle.as_deref(), &needs, self.notify()) {
             Adoption::Gone => Ok(false),
-            // The job is about to go back to the queue already.
-            Adoption::Running(mut worker) if !job.state.has_worker() => {
-                worker.kill();
-                Ok(false)
-            }
-            Adoption::Running(worker) => {
-                tracing::info!(job = job.id, attempt = job.attempt, handle = worker.handle(), "worker adopted");
-                self.keep_watch(job, worker, options);
-                Ok(true)
-            }
+            Adoption::Running(mut worker) => match options.filter(|_| job.state.has_worker()) {
+                Some(options) => {
+                    tracing::info!(job = job.id, attempt = job.attempt, handle = worker.handle(), "worker adopted");
+                    self.keep_watch(job, worker, options);
+                    Ok(true)
+                }
+                // The job is about to go back to the queue already, or cannot be read.
+                None => {
+                    worker.kill();
+                    Ok(false)
+                }
+            },
         }
     }
 }

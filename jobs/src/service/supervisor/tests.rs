@@ -5,7 +5,7 @@ use crate::service::executor::{
     Adoption, AttemptPlace, Capacity, EndCause, Executor, Needs, NotStarted, Notify, Phase, Reservation, Worker,
     WorkerUsage,
 };
-use crate::service::store::{JobRow, Store};
+use crate::service::store::{JobRow, Store, StoreError};
 use crate::spec::body::{self, Allowance, NoSources};
 use crate::spec::requests::Request;
 use crate::spec::states::{Reason, State};
@@ -149,6 +149,44 @@ fn a_worker_that_outlived_its_service_is_adopted_in_the_same_attempt() {
     assert_eq!((job.state, job.attempt, supervisor.running.len()), (State::Running, 1, 1));
     for mut running in supervisor.running {
         running.worker.kill();
+    }
+}
+
+#[test]
+fn a_job_that_cannot_be_read_keeps_no_other_from_its_recovery() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = Arc::new(Store::open(directory.path()).unwrap());
+    let (damaged, sound) = (submit(&store), submit(&store));
+    for _ in 0..2 {
+        store.claim(|_, _| true).unwrap();
+    }
+    let damage: Result<(), StoreError> = store.write(|transaction| {
+        transaction.execute("UPDATE jobs SET resolved = '{}' WHERE id = ?1", [&damaged])?;
+        Ok(())
+    });
+    damage.unwrap();
+    let stand_in = Gone(StandIn { command: &["sleep", "1000"], time_since_heartbeat: Duration::ZERO });
+    let mut supervisor = Supervisor::new(Arc::clone(&store), Box::new(stand_in), Settings::with_slots(1));
+    supervisor.recover().unwrap();
+    for id in [&damaged, &sound] {
+        assert_eq!(store.job(id).unwrap().unwrap().state, State::Queued);
+    }
+}
+
+/// Finds no worker of an earlier service.
+struct Gone(StandIn);
+
+impl Executor for Gone {
+    fn start(&self, attempt: &AttemptPlace, needs: &Needs, notify: Notify) -> Result<Box<dyn Worker>, NotStarted> {
+        self.0.start(attempt, needs, notify)
+    }
+
+    fn adopt(&self, _: &AttemptPlace, _: Option<&str>, _: &Needs, _: Notify) -> Adoption {
+        Adoption::Gone
+    }
+
+    fn capacity(&self, reservations: &[Reservation]) -> Capacity {
+        self.0.capacity(reservations)
     }
 }
 

@@ -3,11 +3,9 @@
 use super::Settings;
 use crate::service::executor::Needs;
 use crate::spec::attempt_files;
+use crate::spec::requests::NOT_STARTED_CODE;
 use std::path::Path;
 use std::time::Duration;
-
-/// Exit code of a process that came second: EX_TEMPFAIL, as [`crate::spec::requests::NOT_STARTED_CODE`].
-const CAME_SECOND: u8 = 75;
 
 /// Start of the names of all jobs that this program submits.
 pub const NAME_PREFIX: &str = "mns-";
@@ -41,7 +39,7 @@ pub fn script(directory: &Path, settings: &Settings) -> String {
          me=$SLURM_JOB_ID.${{SLURM_RESTART_COUNT:-0}}\n\
          if ! mkdir \"$dir/{claim}\" 2> /dev/null && [ \"$(cat \"$dir/{claim}/{owner}\" 2> /dev/null)\" != \"$me\" ]; then\n\
          \x20   : > \"$dir/{claim}/second-$me\"\n\
-         \x20   exit {CAME_SECOND}\n\
+         \x20   exit {NOT_STARTED_CODE}\n\
          fi\n\
          echo \"$me\" > \"$dir/{claim}/{owner}\"\n\
          # No file that the worker reads may bring code along.\n\

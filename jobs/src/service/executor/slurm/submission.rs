@@ -4,6 +4,7 @@ use super::command::{self, NoAnswer};
 use super::errands::Errand;
 use super::ticket::{Order, Stage, Submission};
 use super::{Cluster, Settings, bundling};
+use crate::service::growing_pause::GrowingPause;
 use crate::system::breakpoints::pass;
 use std::collections::VecDeque;
 use std::io;
@@ -13,10 +14,6 @@ use std::time::{Duration, Instant};
 
 /// Time that `sbatch` has to answer.
 const TIME_LIMIT: Duration = Duration::from_secs(60);
-/// The first pause after a refusal; each further one is twice as long.
-const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
-/// The longest pause.
-const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 /// Time between two looks for new orders while others wait for the end of a pause.
 const TICK: Duration = Duration::from_millis(100);
 
@@ -123,7 +120,8 @@ struct Line {
     /// When the line was last empty, and when the last order came.
     begun: Instant,
     grown: Instant,
-    pause: Duration,
+    /// No call before its end, and none right after another.
+    pause: GrowingPause,
     not_before: Instant,
     /// Refusals in a row.
     refused: usize,
@@ -137,7 +135,7 @@ impl Line {
             orders: VecDeque::new(),
             begun: now,
             grown: now,
-            pause: Duration::ZERO,
+            pause: GrowingPause::default(),
             not_before: now,
             refused: 0,
         }
@@ -155,6 +153,7 @@ impl Line {
             self.orders.retain(|order| order.ticket.stage() != Stage::Revoked);
             let places = cluster.free_places();
             if Instant::now() >= self.not_before
+                && !self.pause.is_on()
                 && places > 0
                 && !bundling::is_gathering(&self.orders, (self.begun, self.grown))
             {
@@ -180,7 +179,7 @@ impl Line {
         let submission = match bundling::prepare(orders, cluster) {
             Ok(submission) => submission,
             Err((orders, error)) => {
-                let pause = self.lengthen_pause();
+                let pause = self.pause.begin();
                 tracing::error!(%error, pause_s = pause.as_secs(), "a bundle could not be written");
                 self.give_back(orders, &error.to_string());
                 return;
@@ -201,7 +200,8 @@ impl Line {
         match said {
             Answer::Accepted(id) => {
                 tracing::info!(name, id, attempts = orders.len(), "submitted to the cluster");
-                (self.pause, self.refused) = (Duration::ZERO, 0);
+                self.pause.reset();
+                self.refused = 0;
                 set(&Stage::Accepted { since: Instant::now(), id: id.clone() });
                 if orders.iter().all(|order| order.ticket.stage() == Stage::Revoked) {
                     // All of it was taken back while the cluster thought about it.
@@ -209,7 +209,7 @@ impl Line {
                 }
             }
             Answer::NotNow(said) => {
-                let pause = self.lengthen_pause();
+                let pause = self.pause.begin();
                 tracing::warn!(name, said, pause_s = pause.as_secs(), "the cluster takes no job at the moment");
                 bundling::remove(&cluster.shared, &name);
                 self.give_back(orders, &said);
@@ -217,7 +217,7 @@ impl Line {
             Answer::Refused(said) => {
                 // Others may be taken before this one is tried again; where all are refused, the line rests.
                 self.refused += 1;
-                let pause = if self.refused > self.orders.len() { self.lengthen_pause() } else { Duration::ZERO };
+                let pause = if self.refused > self.orders.len() { self.pause.begin() } else { Duration::ZERO };
                 bundling::remove(&cluster.shared, &name);
                 tracing::warn!(name, said, pause_s = pause.as_secs(), "the cluster refused a job; it is tried again");
                 set(&Stage::InLine { said: Some(said) });
@@ -237,12 +237,6 @@ impl Line {
             order.ticket.set(Stage::InLine { said: Some(said.to_owned()) });
             self.orders.push_front(order);
         }
-    }
-
-    fn lengthen_pause(&mut self) -> Duration {
-        self.pause = (self.pause * 2).clamp(SHORTEST_PAUSE, LONGEST_PAUSE);
-        self.not_before = Instant::now() + self.pause;
-        self.pause
     }
 }
 

@@ -53,9 +53,13 @@ impl Fake {
     }
 
     fn attempt(&self) -> AttemptPlace {
-        let directory = self.path("jobs/job_1/attempts/1");
+        self.attempt_of("job_1")
+    }
+
+    fn attempt_of(&self, job: &str) -> AttemptPlace {
+        let directory = self.path(&format!("jobs/{job}/attempts/1"));
         std::fs::create_dir_all(&directory).unwrap();
-        AttemptPlace { job: "job_1".to_owned(), epoch: 1, directory }
+        AttemptPlace { job: job.to_owned(), epoch: 1, directory }
     }
 
     fn lines(&self, name: &str) -> usize {
@@ -144,7 +148,7 @@ fn a_cluster_that_fails_or_lies_ends_nothing() {
 }
 
 #[test]
-fn a_full_cluster_is_asked_again_with_pauses_and_a_hopeless_job_does_not_hold_up_others() {
+fn a_hopeless_job_does_not_hold_up_others() {
     let fake = Fake::new(
         "echo x >> $here/submitted\n\
          case \"$*\" in *job_1*) echo 'sbatch: error: Batch job submission failed: Requested node configuration is not available' >&2; exit 1;; esac\n\
@@ -153,15 +157,84 @@ fn a_full_cluster_is_asked_again_with_pauses_and_a_hopeless_job_does_not_hold_up
     );
     let executor = fake.executor();
     let hopeless = executor.start(&fake.attempt(), &NEEDS, Box::new(|| {})).unwrap();
-    let directory = fake.path("jobs/job_2/attempts/1");
-    std::fs::create_dir_all(&directory).unwrap();
-    let other = AttemptPlace { job: "job_2".to_owned(), epoch: 1, directory };
-    let other = executor.start(&other, &NEEDS, Box::new(|| {})).unwrap();
+    let other = executor.start(&fake.attempt_of("job_2"), &NEEDS, Box::new(|| {})).unwrap();
     until("the other is submitted", || {
         other.waits_for().filter(|said| said.contains("submitted")).filter(|said| !said.contains("not"))
     });
     let said = until("its words are shown", || hopeless.waits_for().filter(|said| said.contains("configuration")));
     assert!(said.starts_with("slurm ("), "{said}");
+}
+
+#[test]
+fn a_cluster_that_refuses_all_jobs_is_asked_with_growing_pauses() {
+    let refusal =
+        "echo x >> $here/submitted; echo 'sbatch: error: Batch job submission failed: Invalid account' >&2; exit 1";
+    let fake = Fake::new(refusal, "true");
+    let executor = fake.executor();
+    let start = |job: &str| executor.start(&fake.attempt_of(job), &NEEDS, Box::new(|| {})).unwrap();
+    let workers = [start("job_1"), start("job_2"), start("job_3")];
+    std::thread::sleep(Duration::from_secs(4));
+    // Each once, then after one second and after two more.
+    let asked = fake.lines("submitted");
+    assert!((3..=6).contains(&asked), "{asked} calls in four seconds");
+    assert!(workers.iter().all(|worker| worker.waits_for().is_some_and(|said| said.contains("Invalid account"))));
+}
+
+#[test]
+fn what_is_taken_back_while_the_cluster_thinks_about_it_is_ended_there_and_not_submitted_again() {
+    for (answer, is_taken) in [("echo 7", true), ("echo 'temporarily unable to accept job' >&2; exit 1", false)] {
+        let fake = Fake::new(&format!("echo x >> $here/submitted; sleep 1; {answer}"), "true");
+        let (executor, attempt) = (fake.executor(), fake.attempt());
+        let mut worker = executor.start(&attempt, &NEEDS, Box::new(|| {})).unwrap();
+        until("sbatch is at it", || (fake.lines("submitted") == 1).then_some(()));
+        worker.send(Request::Cancel);
+        assert_eq!(worker.poll().unwrap(), Some(EndCause::Evicted(Eviction::Revoked)));
+        drop(worker);
+        std::thread::sleep(Duration::from_millis(2500));
+        let told = std::fs::read_to_string(fake.path("canceled")).unwrap_or_default();
+        assert_eq!(told.contains("--name=mns-job_1-1 7"), is_taken, "{told}");
+        assert_eq!(fake.lines("submitted"), 1);
+    }
+}
+
+#[test]
+fn lists_of_bundles_go_when_they_are_refused_and_when_they_are_done_but_not_at_a_stop() {
+    let noted = "for a in \"$@\"; do case $a in --job-name=*) echo \"${a#--job-name=}\" > $here/name;; esac; done\n";
+    let fake = Fake::new(&format!("{noted}echo x >> $here/submitted; echo 'submit limit' >&2; exit 1"), "true");
+    let executor = fake.executor();
+    let short = Needs { forecast_s: Some(1.0), ..NEEDS };
+    let attempts = ["job_1", "job_2"].map(|job| fake.attempt_of(job));
+    let start = |attempt: &AttemptPlace| executor.start(attempt, &short, Box::new(|| {})).unwrap();
+    let mut workers: Vec<Box<dyn Worker>> = attempts.iter().map(start).collect();
+    let lists = || std::fs::read_dir(fake.path("bundles")).map_or(0, Iterator::count);
+    until("it was refused", || (fake.lines("submitted") == 1 && lists() == 0).then_some(()));
+    fake.set("sbatch", &format!("{noted}echo 7"));
+    fake.set("squeue", "[ ! -e $here/name ] || echo \"7|$(cat $here/name)|RUNNING|None|node1\"");
+    until("they wait in a bundle", || {
+        workers
+            .iter_mut()
+            .all(|worker| {
+                worker.poll().unwrap().is_none() && worker.waits_for().is_some_and(|said| said.contains("bundle"))
+            })
+            .then_some(())
+    });
+    assert_eq!(lists(), 2);
+    // The service stops and starts again: the cluster still needs them.
+    workers.clear();
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(lists(), 2);
+    let adopt = |attempt: &AttemptPlace| match executor.adopt(attempt, None, &short, Box::new(|| {})) {
+        Adoption::Running(worker) => worker,
+        Adoption::Gone => panic!("it has a script"),
+    };
+    let mut workers: Vec<Box<dyn Worker>> = attempts.iter().map(adopt).collect();
+    for attempt in &attempts {
+        give_life(&attempt.directory, 1, Some(0));
+    }
+    assert!(workers.iter_mut().all(|worker| end_of(worker) == EndCause::Exited { code: 0 }));
+    workers.clear();
+    fake.set("squeue", "true");
+    until("they are gone", || (lists() == 0).then_some(()));
 }
 
 #[test]

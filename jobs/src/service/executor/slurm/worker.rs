@@ -37,7 +37,7 @@ pub(super) struct SlurmWorker {
     killed: Option<Instant>,
     kill_sent: Option<Instant>,
     /// Whether another process has the claim.
-    is_claimed: bool,
+    is_claimed_elsewhere: bool,
     end: Option<EndCause>,
 }
 
@@ -53,7 +53,7 @@ impl SlurmWorker {
             at_work: None,
             killed: None,
             kill_sent: None,
-            is_claimed: false,
+            is_claimed_elsewhere: false,
             end: None,
         }
     }
@@ -110,13 +110,13 @@ impl SlurmWorker {
     /// Claims an attempt that no process has begun; false where one has.
     fn claim(&mut self) -> bool {
         let claim = self.order.attempt.directory.join(attempt_files::CLAIM);
-        let is_claimed = std::fs::create_dir(&claim).is_ok();
-        self.is_claimed = !is_claimed;
-        if is_claimed {
+        let is_ours = std::fs::create_dir(&claim).is_ok();
+        self.is_claimed_elsewhere = !is_ours;
+        if is_ours {
             // A claim without an owner holds as well.
             let _ = std::fs::write(claim.join(attempt_files::CLAIM_OWNER), CLAIMED_BY_SERVICE);
         }
-        is_claimed
+        is_ours
     }
 
     fn is_bundled(&self) -> bool {
@@ -194,7 +194,7 @@ impl Worker for SlurmWorker {
         let job = self.order.ticket.job();
         let judged = {
             let table = self.cluster.table();
-            let seen = Seen { is_claimed: self.is_claimed, ..seen.clone() };
+            let seen = Seen { is_claimed: self.is_claimed_elsewhere, ..seen.clone() };
             self.tracking.judge((&job, &stage), &table, &seen, (times, Instant::now()))
         };
         if self.at_work.is_none() && self.tracking.phase(&seen, job.is_bundled()) == Phase::Running {
