@@ -113,6 +113,11 @@ fn a_vortex_is_submitted_by_the_form_and_watched_to_its_end() {
 }
 
 #[test]
+fn a_file_of_ones_own_is_seen_before_it_is_used() {
+    run("upload");
+}
+
+#[test]
 fn a_job_goes_on_from_a_checkpoint_to_a_later_end() {
     run("restart");
 }

@@ -188,6 +188,33 @@ const steps = {
         await until("they are gone", async () => (await api("/v1/jobs")).items.length === 0);
     },
 
+    async upload() {
+        await page.goto(`${url}/#/new`);
+        await page.getByRole("button", { name: /^surface_pde/ }).click();
+        await page.getByText("Files of one's own").click();
+        // An octahedron as OBJ, then the same corners as points.
+        const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+        const faces = [[1, 3, 5], [3, 2, 5], [2, 4, 5], [4, 1, 5], [3, 1, 6], [2, 3, 6], [4, 2, 6], [1, 4, 6]];
+        const obj = [...corners.map((at) => `v ${at.join(" ")}`), ...faces.map((at) => `f ${at.join(" ")}`)].join("\n");
+        await page.getByRole("combobox", { name: "as" }).selectOption("mesh");
+        await page.getByLabel("file").setInputFiles({ name: "octahedron.obj", mimeType: "text/plain", buffer: Buffer.from(obj) });
+        await page.getByText("octahedron.obj: 6 points, 8 triangles").waitFor(WAIT);
+        await page.getByText("is ready").waitFor(WAIT);
+        await page.waitForTimeout(500);
+        const share = async () => page.getByLabel(/^preview/).evaluate((canvas) => {
+            const copy = document.createElement("canvas");
+            [copy.width, copy.height] = [canvas.width, canvas.height];
+            const paint = copy.getContext("2d");
+            paint.drawImage(canvas, 0, 0);
+            const { data } = paint.getImageData(0, 0, copy.width, copy.height);
+            return data.filter((value, k) => k % 4 === 3 && value > 0).length / (data.length / 4);
+        });
+        check((await share()) > 0.05, `the preview of the mesh is empty: ${await share()}`);
+        await page.getByRole("combobox", { name: "as" }).selectOption("points");
+        await page.getByLabel("file").setInputFiles({ name: "six.xyz", mimeType: "text/plain", buffer: Buffer.from(corners.map((at) => at.join(" ")).join("\n")) });
+        await page.getByText("six.xyz: 6 points").waitFor(WAIT);
+    },
+
     async recovery() {
         expected = /ERR_|Failed to load resource|net::/;
         const { id } = await api("/v1/jobs", { ...vortex(0.02, 4), name: "it goes on" });
@@ -291,7 +318,7 @@ steps.speed = async () => {
     await page.goto(`${url}/#/jobs/${id}`);
     await page.locator("canvas[data-ready=yes]").first().waitFor({ timeout: 120_000 });
     await page.waitForTimeout(2000);
-    const times = await page.locator(".canvas canvas").first().evaluate((canvas) => Array.from({ length: 20 }, () => canvas.drawNow()));
+    const times = await page.locator(".canvas canvas").first().evaluate((canvas) => Array.from({ length: 20 }, () => canvas.drawNow(true)));
     times.sort((a, b) => a - b);
     process.stderr.write(`first paint ${paint?.toFixed(0)} ms; ${job.progress.particles} points, ${(1000 / times[10]).toFixed(1)} pictures a second (median of 20)\n`);
     const minutes = Number(process.env.MENISCUS_TAB_MINUTES ?? 0);
@@ -304,6 +331,28 @@ steps.speed = async () => {
         await page.waitForTimeout(60_000 * minutes);
         process.stderr.write(`memory of the tab: ${(first / 1e6).toFixed(0)} MB at first, ${((await heap()) / 1e6).toFixed(0)} MB after ${minutes} minutes\n`);
     }
+};
+
+/** What is measured by hand: how a list of 10,000 jobs scrolls. */
+steps.scroll = async () => {
+    const spacings = Array.from({ length: 100 }, (_, k) => 0.05 + k * 1e-4);
+    const ends = Array.from({ length: 100 }, (_, k) => 1000 + k);
+    const base = { scene: { kind: "vortex", flow: { type: "single_vortex", period: 8 } } };
+    const study = await api("/v1/studies", { name: "ten thousand", base, sweep: { mode: "grid", axes: { "/scene/spacing": spacings, "/scene/end_time": ends } } });
+    await page.goto(`${url}/#/jobs?study=${study.id}`);
+    await page.getByText("10,000", { exact: true }).waitFor({ timeout: 120_000 });
+    const gaps = await page.locator(".scroll").evaluate(async (place) => {
+        const found = [];
+        let last = performance.now();
+        for (let k = 0; k < 300; k += 1) {
+            place.scrollTop += place.scrollHeight / 300;
+            const now = await new Promise((resolve) => requestAnimationFrame(resolve));
+            found.push(now - last);
+            last = now;
+        }
+        return found.sort((a, b) => a - b);
+    });
+    process.stderr.write(`scrolling through 10,000 jobs: a picture every ${gaps[150].toFixed(0)} ms (median), ${gaps[285].toFixed(0)} ms (95 %), ${gaps[299].toFixed(0)} ms (longest)\n`);
 };
 
 try {

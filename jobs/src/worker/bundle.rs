@@ -11,7 +11,7 @@ use signal_hook::consts::{SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals;
 use std::fs::{self, OpenOptions};
 use std::io;
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -47,6 +47,8 @@ pub fn read_list(file: &Path) -> io::Result<Vec<PathBuf>> {
 /// # Errors
 /// When signals cannot be received, or this is another program than the one that was ordered.
 pub fn run(bundle: &Bundle) -> io::Result<()> {
+    // Before anything that takes time: a signal that nobody listens to ends the process.
+    let mut signals = Signals::new([SIGTERM, SIGUSR1])?;
     if let Some(cause) = detached::foreign_build(&bundle.terms)? {
         // Each says why it did not begin.
         for attempt in bundle.attempts.iter().filter(|attempt| claim(attempt, &bundle.owner)) {
@@ -54,7 +56,6 @@ pub fn run(bundle: &Bundle) -> io::Result<()> {
         }
         return Err(io::Error::other(cause));
     }
-    let mut signals = Signals::new([SIGTERM, SIGUSR1])?;
     let mut waiting = bundle.attempts.iter();
     let mut workers: Vec<(&PathBuf, Child)> = Vec::new();
     let mut is_over = false;
@@ -70,6 +71,10 @@ pub fn run(bundle: &Bundle) -> io::Result<()> {
         for (attempt, mut worker) in workers {
             match worker.try_wait()? {
                 None => left.push((attempt, worker)),
+                // It was told to stop before it listened, so it has done nothing.
+                Some(status) if is_over && status.signal() == Some(SIGTERM) => {
+                    say_last(attempt, NOT_STARTED_CODE.into(), Some("the cluster ended the bundle".to_owned()));
+                }
                 // No other process sees how it ended.
                 Some(status) if !has_said_last(attempt) => {
                     say_last(attempt, status.code().unwrap_or(KILLED_CODE), None);

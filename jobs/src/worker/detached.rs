@@ -40,6 +40,8 @@ const CONTROL_INTERVAL: Duration = Duration::from_secs(1);
 /// # Errors
 /// When the specification cannot be read, the records cannot be opened or signals cannot be received.
 pub fn run(directory: &Path, terms: &Terms) -> io::Result<Verdict> {
+    // Before anything that takes time: a signal that nobody listens to ends the process.
+    let signals = Signals::new([SIGTERM, SIGUSR1])?;
     let life = Life::new(directory);
     let foreign = foreign_build(terms).unwrap_or_else(|error| Some(format!("the program cannot be read: {error}")));
     if let Some(cause) = foreign {
@@ -47,7 +49,7 @@ pub fn run(directory: &Path, terms: &Terms) -> io::Result<Verdict> {
         return Ok(Verdict::Unstarted { cause });
     }
     let control = Control::default();
-    let watch = Watch::begin(directory, control.clone(), life.clone(), terms)?;
+    let watch = Watch::begin(directory, signals, control.clone(), life.clone(), terms)?;
     let ran = attempt(directory, &control);
     drop(watch);
     let (code, cause) = match &ran {
@@ -119,9 +121,8 @@ struct Watch {
 }
 
 impl Watch {
-    fn begin(directory: &Path, control: Control, life: Life, terms: &Terms) -> io::Result<Self> {
+    fn begin(directory: &Path, signals: Signals, control: Control, life: Life, terms: &Terms) -> io::Result<Self> {
         let is_over = Arc::new(AtomicBool::new(false));
-        let signals = Signals::new([SIGTERM, SIGUSR1])?;
         life.give()?;
         let ears = Ears { signals, file: directory.join(attempt_files::CONTROL), offset: 0, control };
         let (over, terms) = (Arc::clone(&is_over), terms.clone());

@@ -26,14 +26,18 @@ function reader(): Worker {
     return worker;
 }
 
-async function read(path: string): Promise<Frame> {
-    const bytes = await (await request(path, { accept: "*/*" })).arrayBuffer();
+/** Reads the bytes of a VTKHDF file; they are gone afterwards. */
+export function readFrame(bytes: ArrayBuffer): Promise<Frame> {
     count += 1;
     const id = count;
     return new Promise((resolve, reject) => {
         waiting.set(id, { resolve, reject });
         reader().postMessage({ id, bytes }, [bytes]);
     });
+}
+
+async function read(path: string): Promise<Frame> {
+    return readFrame(await (await request(path, { accept: "*/*" })).arrayBuffer());
 }
 
 /** A frame of a job. A file that was written again under its name has another digest and is read anew. */

@@ -1,11 +1,13 @@
 // Points and surfaces on a canvas. Nothing is drawn unless something has changed.
 import {
-    BufferAttribute, BufferGeometry, DataTexture, DoubleSide, LineBasicMaterial, LineSegments, Mesh, OrthographicCamera, PerspectiveCamera,
-    Points, Scene as ThreeScene, ShaderMaterial, Vector3, WebGLRenderer, type Camera,
+    BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, Mesh, OrthographicCamera, PerspectiveCamera, Points,
+    Scene as ThreeScene, Vector3, WebGLRenderer, type Camera, type ShaderMaterial,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { table } from "./colors";
+import { pointMaterials, triangleMaterial, type Paint } from "./materials";
+import { frontToBack } from "./order";
 import type { Frame } from "./reader";
+import { usualGap } from "./spacing";
 
 export interface Look {
     /** A value for each point. */
@@ -21,45 +23,33 @@ export interface Look {
     clip: { axis: 0 | 1 | 2; share: number };
 }
 
-const VERTEX = `
-    attribute float value;
-    attribute vec3 direction;
-    uniform float size, low, high, scale;
-    uniform vec3 clipNormal;
-    varying float share;
-    varying vec3 facing;
-    varying float depth;
-    void main() {
-        share = high > low ? clamp((value - low) / (high - low), 0.0, 1.0) : 0.5;
-        if (!(value == value)) share = -1.0;
-        facing = normalMatrix * direction;
-        depth = dot(position, clipNormal);
-        vec4 seen = modelViewMatrix * vec4(position, 1.0);
-        gl_Position = projectionMatrix * seen;
-        gl_PointSize = max(1.5, projectionMatrix[2][3] == 0.0 ? size * scale * projectionMatrix[1][1] : size * scale * projectionMatrix[1][1] / -seen.z);
-    }`;
-
-const FRAGMENT = `
-    uniform sampler2D colors;
-    uniform float clipAt;
-    uniform bool isLit, isDisc;
-    uniform vec3 plain;
-    uniform bool isPlain;
-    varying float share;
-    varying vec3 facing;
-    varying float depth;
-    void main() {
-        if (depth > clipAt) discard;
-        vec2 place = 2.0 * gl_PointCoord - 1.0;
-        if (isDisc && dot(place, place) > 1.0) discard;
-        vec3 color = isPlain ? plain : share < 0.0 ? vec3(0.62) : texture2D(colors, vec2(share, 0.5)).rgb;
-        float light = 1.0;
-        if (isLit && dot(facing, facing) > 0.0) light = 0.35 + 0.65 * abs(normalize(facing).z);
-        gl_FragColor = vec4(color * light, 1.0);
-    }`;
-
 /** Glyphs that are drawn at most: more hide each other. */
 const MOST_GLYPHS = 4000;
+/** A view that has not moved for this long rests. */
+const REST_MS = 250;
+/** Pixels of the canvas by those of the page at rest: edges are smooth. */
+const FINE_PIXELS = 2;
+/** Where a picture takes longer, none is drawn finer than the screen. */
+const SLOW_MS = 500;
+/** Cosine of the angle by which a view turns before its points are ordered anew. */
+const SAME_DIRECTION = 0.98;
+
+/** Points that are drawn, in two ways. */
+interface Cloud {
+    points: Points;
+    round: ShaderMaterial;
+    square: ShaderMaterial;
+    /** The direction by which they are ordered. */
+    direction: Vector3 | null;
+}
+
+function geometryOf(positions: Float32Array, values: Float32Array | null, directions: Float32Array | null): BufferGeometry {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(positions, 3));
+    geometry.setAttribute("value", new BufferAttribute(values ?? new Float32Array(positions.length / 3), 1));
+    geometry.setAttribute("direction", new BufferAttribute(directions ?? new Float32Array(positions.length), 3));
+    return geometry;
+}
 
 export class FrameScene {
     private readonly renderer: WebGLRenderer;
@@ -74,9 +64,15 @@ export class FrameScene {
     private spacing = 0.1;
     private readonly watch: ResizeObserver;
     private linked: FrameScene[] = [];
+    private clouds: Cloud[] = [];
+    /** Until the view rests again, in the clock of the page. */
+    private movesUntil = 0;
+    private rest = 0;
+    /** Whether a picture took long. */
+    private isSlow = false;
 
     constructor(private readonly canvas: HTMLCanvasElement) {
-        this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+        this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: true, preserveDrawingBuffer: true });
         this.renderer.setClearColor(0x000000, 0);
         this.camera = new OrthographicCamera();
         this.controls = this.control();
@@ -89,7 +85,7 @@ export class FrameScene {
         controls.enableRotate = !this.isFlat;
         controls.screenSpacePanning = true;
         controls.addEventListener("change", () => {
-            this.draw();
+            this.move();
             this.linked.forEach((other) => other.follow(this));
         });
         return controls;
@@ -106,6 +102,14 @@ export class FrameScene {
         this.controls.target.copy(other.controls.target);
         if (this.camera instanceof OrthographicCamera && other.camera instanceof OrthographicCamera) this.camera.zoom = other.camera.zoom;
         this.camera.updateProjectionMatrix();
+        this.move();
+    }
+
+    /** Draws a view that moves: quickly now, and well as soon as it rests. */
+    private move(): void {
+        this.movesUntil = performance.now() + REST_MS;
+        window.clearTimeout(this.rest);
+        this.rest = window.setTimeout(() => this.draw(), REST_MS);
         this.draw();
     }
 
@@ -114,61 +118,63 @@ export class FrameScene {
         const isFirst = this.frame === null;
         this.frame = frame;
         if (isFirst) this.measure(frame);
-        this.scene.clear();
-        const geometry = new BufferGeometry();
-        const count = frame.positions.length / 3;
-        geometry.setAttribute("position", new BufferAttribute(frame.positions, 3));
-        geometry.setAttribute("value", new BufferAttribute(look.values ?? new Float32Array(count), 1));
-        geometry.setAttribute("direction", new BufferAttribute(look.normals ?? new Float32Array(3 * count), 3));
-        const hasTriangles = frame.triangles.length > 0;
-        const material = this.material(look, hasTriangles ? { isDisc: false, isLit: true } : { isDisc: true, isLit: look.normals !== null && !this.isFlat });
-        if (hasTriangles) {
+        this.clear();
+        const isLit = look.normals !== null && !this.isFlat;
+        const paint = { map: look.map, low: look.low, high: look.high, ...this.clipOf(look) };
+        if (frame.triangles.length > 0) {
+            const geometry = geometryOf(frame.positions, look.values, look.normals);
             geometry.setIndex(new BufferAttribute(frame.triangles, 1));
             if (!look.normals) {
                 geometry.computeVertexNormals();
                 geometry.setAttribute("direction", geometry.getAttribute("normal"));
             }
-            this.scene.add(new Mesh(geometry, material));
+            this.scene.add(new Mesh(geometry, triangleMaterial({ ...paint, isLit: true })));
         } else {
-            this.scene.add(new Points(geometry, material));
+            // Discs of a surface lap over each other, so that it looks closed.
+            this.addCloud(frame.positions, look.values, look.normals, { ...paint, isLit }, isLit ? 2.4 : 1.05);
         }
-        if (look.surface) this.addSurface(look.surface, look);
+        if (look.surface) this.addSurface(look.surface, paint);
         if (look.hasGlyphs && look.normals) this.addGlyphs(frame.positions, look.normals);
         this.draw();
     }
 
-    private material(look: Look, shape: { isDisc: boolean; isLit: boolean }, plain?: [number, number, number]): ShaderMaterial {
-        const colors = new DataTexture(table(look.map), 256, 1);
-        colors.needsUpdate = true;
-        const normal = new Vector3().setComponent(look.clip.axis, 1);
+    /** Takes all away, what the graphics hold of it too. */
+    private clear(): void {
+        for (const thing of this.scene.children as (Mesh | Points | LineSegments)[]) {
+            thing.geometry.dispose();
+            for (const material of [thing.material].flat()) {
+                (material as Partial<ShaderMaterial>).uniforms?.colors?.value.dispose();
+                material.dispose();
+            }
+        }
+        this.clouds.forEach(({ round, square }) => [round, square].forEach((material) => material.dispose()));
+        this.clouds = [];
+        this.scene.clear();
+    }
+
+    private clipOf(look: Look): { clipNormal: Vector3; clipAt: number } {
         const middle = this.center.getComponent(look.clip.axis);
         const clipAt = look.clip.share >= 1 ? 1e30 : middle + this.radius * (2 * look.clip.share - 1);
-        return new ShaderMaterial({
-            vertexShader: VERTEX,
-            fragmentShader: FRAGMENT,
-            side: DoubleSide,
-            uniforms: {
-                // Discs of a surface lap over each other, so that it looks closed.
-                size: { value: this.spacing * (plain ? 0.35 : shape.isLit ? 2.4 : 1.05) }, low: { value: look.low }, high: { value: look.high }, scale: { value: this.canvas.height / 2 },
-                colors: { value: colors }, clipNormal: { value: normal }, clipAt: { value: clipAt }, isLit: { value: shape.isLit }, isDisc: { value: shape.isDisc },
-                isPlain: { value: plain !== undefined }, plain: { value: new Vector3(...(plain ?? [0, 0, 0])) },
-            },
-        });
+        return { clipNormal: new Vector3().setComponent(look.clip.axis, 1), clipAt };
+    }
+
+    private addCloud(positions: Float32Array, values: Float32Array | null, directions: Float32Array | null, paint: Paint, spacings: number): void {
+        const geometry = geometryOf(positions, values, directions);
+        const { round, square } = pointMaterials(paint, spacings * this.spacing);
+        const points = new Points(geometry, round);
+        this.clouds.push({ points, round, square, direction: null });
+        this.scene.add(points);
     }
 
     /** Closest points of the narrow band lie on the surface: drawn as dots they show it. */
-    private addSurface(surface: Float32Array, look: Look): void {
-        const geometry = new BufferGeometry();
+    private addSurface(surface: Float32Array, paint: Omit<Paint, "isLit">): void {
         const kept: number[] = [];
         const lift = this.isFlat ? this.radius * 1e-3 : 0;
         for (let k = 0; k < surface.length; k += 3) {
             const [x, y, z] = [surface[k] as number, surface[k + 1] as number, surface[k + 2] as number];
             if (Number.isFinite(x + y + z)) kept.push(x, y, z + lift);
         }
-        geometry.setAttribute("position", new BufferAttribute(Float32Array.from(kept), 3));
-        geometry.setAttribute("value", new BufferAttribute(new Float32Array(kept.length / 3), 1));
-        geometry.setAttribute("direction", new BufferAttribute(new Float32Array(kept.length), 3));
-        this.scene.add(new Points(geometry, this.material(look, { isDisc: true, isLit: false }, [0.07, 0.07, 0.09])));
+        this.addCloud(Float32Array.from(kept), null, null, { ...paint, isLit: false, plain: [0.07, 0.07, 0.09] }, 0.35);
     }
 
     private addGlyphs(positions: Float32Array, normals: Float32Array): void {
@@ -203,7 +209,7 @@ export class FrameScene {
         this.isFlat = extent.z < 1e-9 * this.radius;
         const measureOf = this.isFlat ? extent.x * extent.y : extent.x * extent.y * extent.z;
         const estimate = this.isFlat ? Math.sqrt(measureOf / count) : Math.cbrt(measureOf / count);
-        this.spacing = nearest(frame.positions, estimate);
+        this.spacing = usualGap(frame.positions, estimate);
         this.reset();
     }
 
@@ -230,7 +236,6 @@ export class FrameScene {
         const place = this.canvas.parentElement ?? this.canvas;
         const width = Math.max(place.clientWidth, 1);
         const height = Math.max(place.clientHeight, 1);
-        this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
         this.renderer.setSize(width, height, false);
         const aspect = width / height;
         if (this.camera instanceof PerspectiveCamera) this.camera.aspect = aspect;
@@ -252,13 +257,35 @@ export class FrameScene {
     }
 
     /** Draws at once; the time that it took in milliseconds, the graphics included. */
-    drawNow(): number {
+    drawNow(isMoving = performance.now() < this.movesUntil): number {
         const began = performance.now();
+        const ratio = isMoving ? Math.min(devicePixelRatio, 1) : this.isSlow ? devicePixelRatio : Math.max(FINE_PIXELS, devicePixelRatio);
+        if (ratio !== this.renderer.getPixelRatio()) this.renderer.setPixelRatio(ratio);
+        for (const cloud of this.clouds) {
+            cloud.points.material = isMoving ? cloud.square : cloud.round;
+            Object.assign(cloud.round.uniforms.scale ?? {}, { value: this.canvas.height / 2 });
+            if (!this.isFlat) this.sort(cloud);
+        }
         this.renderer.render(this.scene, this.camera);
         // Reading a pixel waits for the whole picture.
         const gl = this.renderer.getContext();
         gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-        return performance.now() - began;
+        const took = performance.now() - began;
+        this.isSlow ||= took > SLOW_MS;
+        return took;
+    }
+
+    /** Orders the points of a cloud anew once the view has turned. */
+    private sort(cloud: Cloud): void {
+        const direction = this.camera.getWorldDirection(new Vector3());
+        if (cloud.direction && cloud.direction.dot(direction) > SAME_DIRECTION) return;
+        cloud.direction = direction;
+        const { geometry } = cloud.points;
+        const positions = geometry.getAttribute("position").array as Float32Array;
+        const index = geometry.getIndex() ?? new BufferAttribute(new Uint32Array(positions.length / 3), 1);
+        frontToBack(positions, direction.toArray(), index.array as Uint32Array);
+        index.needsUpdate = true;
+        geometry.setIndex(index);
     }
 
     /** The point nearest to a place of the canvas (in its own pixels); -1 where none is near. */
@@ -285,45 +312,17 @@ export class FrameScene {
     }
 
     picture(): Promise<Blob | null> {
-        this.drawNow();
+        this.drawNow(false);
         return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
     }
 
     dispose(): void {
         cancelAnimationFrame(this.drawing);
+        window.clearTimeout(this.rest);
+        this.clear();
         this.watch.disconnect();
         this.controls.dispose();
         this.renderer.dispose();
         this.renderer.forceContextLoss();
     }
-}
-
-/** The usual gap between neighbors: the median over some points, found in a grid of cells. */
-function nearest(positions: Float32Array, estimate: number): number {
-    const count = positions.length / 3;
-    const cell = Math.max(estimate * 2, 1e-12);
-    const cells = new Map<string, number[]>();
-    const keyOf = (k: number, shift: [number, number, number]) => [0, 1, 2].map((c) => Math.floor((positions[3 * k + c] as number) / cell) + (shift[c] as number)).join();
-    const limit = Math.min(count, 20_000);
-    for (let k = 0; k < limit; k += 1) {
-        const key = keyOf(k, [0, 0, 0]);
-        const held = cells.get(key);
-        if (held) held.push(k);
-        else cells.set(key, [k]);
-    }
-    const gaps: number[] = [];
-    for (let k = 0; k < limit; k += Math.max(1, Math.floor(limit / 300))) {
-        let least = Infinity;
-        for (let dx = -1; dx <= 1; dx += 1) for (let dy = -1; dy <= 1; dy += 1) for (let dz = -1; dz <= 1; dz += 1) {
-            for (const other of cells.get(keyOf(k, [dx, dy, dz])) ?? []) {
-                if (other === k) continue;
-                let square = 0;
-                for (let c = 0; c < 3; c += 1) square += ((positions[3 * k + c] as number) - (positions[3 * other + c] as number)) ** 2;
-                least = Math.min(least, square);
-            }
-        }
-        if (Number.isFinite(least)) gaps.push(Math.sqrt(least));
-    }
-    gaps.sort((a, b) => a - b);
-    return gaps[Math.floor(gaps.length / 2)] ?? estimate;
 }

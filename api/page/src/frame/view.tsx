@@ -67,7 +67,7 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
                 scene.current = new FrameScene(at);
                 onScene?.(scene.current);
                 // For measurements: how long a picture takes.
-                Object.assign(at, { drawNow: () => scene.current?.drawNow() });
+                Object.assign(at, { drawNow: (isMoving: boolean) => scene.current?.drawNow(isMoving) });
                 setReady(true);
             } catch (failed) {
                 setError(failed instanceof Error ? failed : new Error(String(failed)));

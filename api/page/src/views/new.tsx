@@ -6,6 +6,7 @@ import { bytes, curl, number, seconds } from "../format";
 import { useLoaded } from "../load";
 import { Act, Copy, Findings, Trouble } from "../parts/basics";
 import { Parameter, type Schema } from "../parts/form";
+import { Preview } from "../parts/preview";
 import { Sweep } from "../parts/sweep";
 import { go, type Route } from "../route";
 
@@ -185,12 +186,15 @@ const PURPOSES: Record<string, (id: string) => string> = {
 function Uploads() {
     const [purpose, setPurpose] = useState("surface");
     const [made, setMade] = useState<Upload | null>(null);
+    const [file, setFile] = useState<File | null>(null);
     const [error, setError] = useState<Error | null>(null);
-    const send = async (file: File | undefined) => {
-        if (!file) return;
+    const send = async (chosen: File | undefined) => {
+        if (!chosen) return;
         setError(null);
+        setMade(null);
+        setFile(chosen);
         try {
-            const answer = await request(`v1/uploads?as=${purpose}`, { method: "POST", body: file, headers: { "Content-Type": "application/octet-stream" } });
+            const answer = await request(`v1/uploads?as=${purpose}`, { method: "POST", body: chosen, headers: { "Content-Type": "application/octet-stream" } });
             let upload = (await answer.json()) as Upload;
             setMade(upload);
             while (upload.state === "quarantined") {
@@ -208,6 +212,7 @@ function Uploads() {
             <label>as <select value={purpose} onChange={(event) => setPurpose(event.currentTarget.value)}>{Object.keys(PURPOSES).map((name) => <option key={name} value={name}>{name}</option>)}</select></label>
             <label>file <input type="file" onChange={(event) => void send(event.currentTarget.files?.[0])} /></label>
             {made && <p role="status"><code>{made.id}</code> is {made.state}{made.reason ? `: ${made.reason}` : ""}. {made.state === "ready" && <>A body names it so: <code>{PURPOSES[made.as]?.(made.id)}</code></>}</p>}
+            {file && <Preview file={file} />}
             {made?.found ? <pre>{JSON.stringify(made.found, null, 2)}</pre> : null}
             <Trouble error={error} />
         </details>

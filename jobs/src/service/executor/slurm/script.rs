@@ -26,7 +26,8 @@ pub fn is_plain(path: &Path) -> bool {
 
 /// The script of one attempt. It claims the attempt before anything else: of two jobs with its name, one works and the other
 /// leaves. A job that the cluster puts back into its queue has the same number, so the count of its restarts belongs to the claim.
-/// Then it becomes the worker, so that signals reach it.
+/// Then it becomes the worker, so that signals reach it. The signal that hints at a request is ignored until the worker listens:
+/// a worker reads its requests at its start in any case.
 #[must_use]
 pub fn script(directory: &Path, settings: &Settings) -> String {
     let directory = directory.display();
@@ -34,6 +35,7 @@ pub fn script(directory: &Path, settings: &Settings) -> String {
     let (claim, owner) = (attempt_files::CLAIM, attempt_files::CLAIM_OWNER);
     format!(
         "#!/bin/sh\n\
+         trap '' USR1\n\
          PATH=/usr/local/bin:/usr/bin:/bin\n\
          dir={directory}\n\
          me=$SLURM_JOB_ID.${{SLURM_RESTART_COUNT:-0}}\n\
@@ -57,6 +59,7 @@ pub fn bundle_script(list: &Path, settings: &Settings) -> String {
     let Settings { program, program_sha256, heartbeat, lease, lanes, .. } = settings;
     format!(
         "#!/bin/sh\n\
+         trap '' USR1\n\
          PATH=/usr/local/bin:/usr/bin:/bin\n\
          export HDF5_PLUGIN_PRELOAD=::\n\
          exec {program} bundle --list {list} --owner \"$SLURM_JOB_ID.${{SLURM_RESTART_COUNT:-0}}\" --lanes {lanes} \
@@ -162,7 +165,7 @@ pub fn wrong_option(option: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Call, arguments, is_plain, script, wrong_option};
+    use super::{Call, arguments, bundle_script, is_plain, script, wrong_option};
     use crate::service::executor::Needs;
     use crate::service::executor::slurm::Settings;
     use std::path::Path;
@@ -219,6 +222,20 @@ mod tests {
         // A file system that reports the first answer twice.
         assert_eq!(run("17", None), Some(0));
         assert!(directory.path().join("claim/second-17.1").is_file());
+    }
+
+    #[test]
+    fn a_hint_before_the_worker_listens_does_not_end_it() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = tempfile::tempdir().unwrap();
+        let program = directory.path().join("program");
+        std::fs::write(&program, "#!/bin/sh\nkill -USR1 $$\nexit 3\n").unwrap();
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let settings = Settings::new(program, "0".repeat(64));
+        for text in [script(directory.path(), &settings), bundle_script(Path::new("/list"), &settings)] {
+            let ended = Command::new("sh").args(["-c", &text]).status().unwrap();
+            assert_eq!(ended.code(), Some(3), "{ended:?}");
+        }
     }
 
     #[test]
