@@ -41,6 +41,8 @@ pub fn metrics() -> std::io::Result<PrometheusHandle> {
     describe_counter!("meniscus_transitions_total", "changes of the state of jobs, by new state and reason");
     describe_gauge!("meniscus_slurm_table_age_seconds", "age of the cluster's last answer");
     describe_gauge!("meniscus_slurm_jobs", "jobs of this service in the cluster, waiting and running");
+    describe_gauge!("meniscus_slurm_node_jobs", "jobs of this service on a node of the cluster");
+    describe_gauge!("meniscus_slurm_node_excluded", "1 for a node that is left out because it lost attempts, else 0");
     describe_gauge!("meniscus_slurm_unsure", "submissions of which it is not known whether the cluster has them");
     describe_counter!("meniscus_slurm_evictions_total", "attempts that the cluster took away, by cause");
     describe_histogram!("meniscus_slurm_sbatch_seconds", "seconds that a submission took");

@@ -78,6 +78,7 @@ fn a_job_says_what_it_waits_for_and_a_cancel_is_prompt_everywhere() {
     for name in [
         "meniscus_slurm_table_age_seconds",
         "meniscus_slurm_jobs",
+        "meniscus_slurm_node_jobs{node=\"node1\"}",
         "meniscus_slurm_unsure",
         "meniscus_slurm_sbatch_seconds",
     ] {

@@ -2,15 +2,17 @@
 
 const BINS = 1024;
 
-/** Points from front to back along a direction, roughly: what lies behind others is then not painted at all. A sort by counting. */
-export function frontToBack(positions: Float32Array, direction: [number, number, number], order: Uint32Array): void {
+/** Every `stride`-th point, from front to back along a direction, roughly: what lies behind others is then not painted at all. A
+ *  sort by counting; the number of points. */
+export function frontToBack(positions: Float32Array, direction: [number, number, number], stride: number, order: Uint32Array): number {
     const [x, y, z] = direction;
-    const count = order.length;
+    const count = Math.ceil(positions.length / 3 / stride);
     const depths = new Float32Array(count);
     let low = Infinity;
     let high = -Infinity;
     for (let k = 0; k < count; k += 1) {
-        const depth = x * (positions[3 * k] as number) + y * (positions[3 * k + 1] as number) + z * (positions[3 * k + 2] as number);
+        const at = 3 * stride * k;
+        const depth = x * (positions[at] as number) + y * (positions[at + 1] as number) + z * (positions[at + 2] as number);
         depths[k] = depth;
         if (depth < low) low = depth;
         if (depth > high) high = depth;
@@ -27,7 +29,7 @@ export function frontToBack(positions: Float32Array, direction: [number, number,
     for (let k = 0; k < count; k += 1) {
         const bin = binOf(k);
         const at = starts[bin] as number;
-        order[at] = k;
+        order[at] = stride * k;
         starts[bin] = at + 1;
-    }
+    }    return count;
 }

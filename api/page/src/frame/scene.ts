@@ -34,13 +34,23 @@ const SLOW_MS = 500;
 /** Cosine of the angle by which a view turns before its points are ordered anew. */
 const SAME_DIRECTION = 0.98;
 
+/** Distance in spacings within which the closest points of particles are shown. */
+const NEXT_TO_SURFACE = 1.5;
+/** Time of a picture of a view that moves: where all points take longer, some of them stand for all, as larger squares. */
+const MOVING_MS = 80;
+
 /** Points that are drawn, in two ways. */
 interface Cloud {
     points: Points;
     round: ShaderMaterial;
     square: ShaderMaterial;
-    /** The direction by which they are ordered. */
+    /** The direction by which they are ordered, and one of how many is drawn. */
     direction: Vector3 | null;
+    stride: number;
+    /** Size of a point that stands for itself alone. */
+    size: number;
+    /** Dimension of what the points fill. */
+    dimension: number;
 }
 
 function geometryOf(positions: Float32Array, values: Float32Array | null, directions: Float32Array | null): BufferGeometry {
@@ -68,8 +78,12 @@ export class FrameScene {
     /** Until the view rests again, in the clock of the page. */
     private movesUntil = 0;
     private rest = 0;
-    /** Whether a picture took long. */
+    /** Whether a picture at rest took long. */
     private isSlow = false;
+    /** While the view moves, one of so many points is drawn. */
+    private stride = 1;
+    /** Pictures of this frame in a view that moved. */
+    private moving = 0;
 
     constructor(private readonly canvas: HTMLCanvasElement) {
         this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: true, preserveDrawingBuffer: true });
@@ -97,9 +111,11 @@ export class FrameScene {
     }
 
     private follow(other: FrameScene): void {
-        this.camera.position.copy(other.camera.position);
+        // Frames of scenes of other places and sizes are seen from the same side, as large.
+        const mapped = (place: Vector3) => new Vector3().subVectors(place, other.center).multiplyScalar(this.radius / other.radius).add(this.center);
+        this.camera.position.copy(mapped(other.camera.position));
         this.camera.quaternion.copy(other.camera.quaternion);
-        this.controls.target.copy(other.controls.target);
+        this.controls.target.copy(mapped(other.controls.target));
         if (this.camera instanceof OrthographicCamera && other.camera instanceof OrthographicCamera) this.camera.zoom = other.camera.zoom;
         this.camera.updateProjectionMatrix();
         this.move();
@@ -118,6 +134,7 @@ export class FrameScene {
         const isFirst = this.frame === null;
         this.frame = frame;
         if (isFirst) this.measure(frame);
+        [this.stride, this.moving] = [1, 0];
         this.clear();
         const isLit = look.normals !== null && !this.isFlat;
         const paint = { map: look.map, low: look.low, high: look.high, ...this.clipOf(look) };
@@ -133,7 +150,7 @@ export class FrameScene {
             // Discs of a surface lap over each other, so that it looks closed.
             this.addCloud(frame.positions, look.values, look.normals, { ...paint, isLit }, isLit ? 2.4 : 1.05);
         }
-        if (look.surface) this.addSurface(look.surface, paint);
+        if (look.surface) this.addSurface(frame.positions, look.surface, paint);
         if (look.hasGlyphs && look.normals) this.addGlyphs(frame.positions, look.normals);
         this.draw();
     }
@@ -160,19 +177,22 @@ export class FrameScene {
 
     private addCloud(positions: Float32Array, values: Float32Array | null, directions: Float32Array | null, paint: Paint, spacings: number): void {
         const geometry = geometryOf(positions, values, directions);
-        const { round, square } = pointMaterials(paint, spacings * this.spacing);
+        const size = spacings * this.spacing;
+        const { round, square } = pointMaterials(paint, size);
         const points = new Points(geometry, round);
-        this.clouds.push({ points, round, square, direction: null });
+        const dimension = this.isFlat || paint.isLit || paint.plain ? 2 : 3;
+        this.clouds.push({ points, round, square, direction: null, stride: 1, size, dimension });
         this.scene.add(points);
     }
 
-    /** Closest points of the narrow band lie on the surface: drawn as dots they show it. */
-    private addSurface(surface: Float32Array, paint: Omit<Paint, "isLit">): void {
+    /** Closest points lie on the surface: drawn as dots they show it. Those of the particles next to it are enough. */
+    private addSurface(positions: Float32Array, surface: Float32Array, paint: Omit<Paint, "isLit">): void {
         const kept: number[] = [];
         const lift = this.isFlat ? this.radius * 1e-3 : 0;
         for (let k = 0; k < surface.length; k += 3) {
             const [x, y, z] = [surface[k] as number, surface[k + 1] as number, surface[k + 2] as number];
-            if (Number.isFinite(x + y + z)) kept.push(x, y, z + lift);
+            const distance = Math.hypot(x - (positions[k] as number), y - (positions[k + 1] as number), z - (positions[k + 2] as number));
+            if (distance <= NEXT_TO_SURFACE * this.spacing) kept.push(x, y, z + lift);
         }
         this.addCloud(Float32Array.from(kept), null, null, { ...paint, isLit: false, plain: [0.07, 0.07, 0.09] }, 0.35);
     }
@@ -264,28 +284,33 @@ export class FrameScene {
         for (const cloud of this.clouds) {
             cloud.points.material = isMoving ? cloud.square : cloud.round;
             Object.assign(cloud.round.uniforms.scale ?? {}, { value: this.canvas.height / 2 });
-            if (!this.isFlat) this.sort(cloud);
+            this.order(cloud, isMoving ? this.stride : 1);
         }
         this.renderer.render(this.scene, this.camera);
         // Reading a pixel waits for the whole picture.
         const gl = this.renderer.getContext();
         gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
         const took = performance.now() - began;
-        this.isSlow ||= took > SLOW_MS;
+        if (!isMoving) this.isSlow ||= took > SLOW_MS;
+        // The first picture has to be prepared by the graphics and tells nothing.
+        else if (this.moving > 0) this.stride = Math.max(this.stride, Math.ceil((this.stride * took) / MOVING_MS));
+        if (isMoving) this.moving += 1;
         return took;
     }
 
-    /** Orders the points of a cloud anew once the view has turned. */
-    private sort(cloud: Cloud): void {
-        const direction = this.camera.getWorldDirection(new Vector3());
-        if (cloud.direction && cloud.direction.dot(direction) > SAME_DIRECTION) return;
-        cloud.direction = direction;
+    /** Orders the points of a cloud from front to back, anew once the view has turned or other points are drawn. */
+    private order(cloud: Cloud, stride: number): void {
+        const direction = this.isFlat ? new Vector3(0, 0, 1) : this.camera.getWorldDirection(new Vector3());
+        if (cloud.stride === stride && cloud.direction && cloud.direction.dot(direction) > SAME_DIRECTION) return;
+        Object.assign(cloud, { direction, stride });
+        Object.assign(cloud.round.uniforms.size ?? {}, { value: cloud.size * stride ** (1 / cloud.dimension) });
         const { geometry } = cloud.points;
         const positions = geometry.getAttribute("position").array as Float32Array;
         const index = geometry.getIndex() ?? new BufferAttribute(new Uint32Array(positions.length / 3), 1);
-        frontToBack(positions, direction.toArray(), index.array as Uint32Array);
+        const count = frontToBack(positions, direction.toArray(), stride, index.array as Uint32Array);
         index.needsUpdate = true;
         geometry.setIndex(index);
+        geometry.setDrawRange(0, count);
     }
 
     /** The point nearest to a place of the canvas (in its own pixels); -1 where none is near. */

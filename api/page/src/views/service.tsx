@@ -31,6 +31,10 @@ export function ServicePage() {
     const metric = (name: string) => metrics?.get(name);
     const jobs = [...(metrics ?? new Map<string, number>())].filter(([name, value]) => name.startsWith("meniscus_jobs{") && value > 0);
     const cluster = [...(metrics ?? new Map<string, number>())].filter(([name]) => name.startsWith("meniscus_slurm_jobs{"));
+    const nodes = [...(metrics ?? new Map<string, number>())].flatMap(([name, value]) => {
+        const node = /^meniscus_slurm_node_jobs\{node="([^"]+)"/.exec(name)?.[1];
+        return node ? [{ node, jobs: value, isExcluded: metric(`meniscus_slurm_node_excluded{node="${node}"}`) === 1 }] : [];
+    });
     return (
         <main>
             <header class="title"><h1>Service</h1><span role="status">{ready ?? "–"}</span></header>
@@ -50,6 +54,13 @@ export function ServicePage() {
                 {cluster.map(([name, value]) => <><dt>{/state="([^"]+)"/.exec(name)?.[1]} in the cluster</dt><dd>{number(value)}</dd></>)}
                 {metric("meniscus_slurm_table_age_seconds") !== undefined && <><dt>last answer of the cluster</dt><dd>{seconds(metric("meniscus_slurm_table_age_seconds"))} ago</dd></>}
             </dl>
+            {nodes.length > 0 && (
+                <table>
+                    <caption>Nodes of the cluster that have had jobs</caption>
+                    <thead><tr><th scope="col">node</th><th scope="col">jobs</th><th scope="col">left out</th></tr></thead>
+                    <tbody>{nodes.map(({ node, jobs: count, isExcluded }) => <tr key={node}><td>{node}</td><td class="figure">{number(count)}</td><td>{isExcluded ? "yes, it lost attempts" : "no"}</td></tr>)}</tbody>
+                </table>
+            )}
             <p><a href="openapi.json">Description of the API (OpenAPI)</a> · <a href="metrics">metrics</a></p>
             <h2>Scenes and their parameters</h2>
             {(kinds?.items ?? []).map((kind) => (

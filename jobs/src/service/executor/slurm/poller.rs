@@ -2,7 +2,7 @@
 
 use super::errands::Errand;
 use super::{Cluster, command, script, table};
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::io;
 use std::sync::{PoisonError, Weak};
 use std::time::{Duration, Instant};
@@ -17,8 +17,10 @@ const PATIENCE: u32 = 5;
 /// Starts the thread; it ends with the cluster.
 pub(super) fn start(cluster: Weak<Cluster>) -> io::Result<()> {
     std::thread::Builder::new().name("slurm-poll".to_owned()).spawn(move || {
+        let mut nodes = BTreeSet::new();
         while let Some(cluster) = cluster.upgrade() {
             let spent = look(&cluster);
+            tell_of_nodes(&cluster, &mut nodes);
             let poll = cluster.settings.poll;
             let least = (spent * PATIENCE).max(LEAST_INTERVAL.min(poll));
             wait(&cluster, least, least.max(poll));
@@ -60,6 +62,19 @@ fn look(cluster: &Cluster) -> Duration {
     metrics::gauge!("meniscus_slurm_unsure").set(unsure as f64);
     end_orphans(cluster);
     spent
+}
+
+/// Metrics of the nodes that have or had jobs of this service; `known` has those seen so far.
+fn tell_of_nodes(cluster: &Cluster, known: &mut BTreeSet<String>) {
+    let jobs = cluster.table().jobs_by_node();
+    let excluded = cluster.excluded();
+    known.extend(jobs.keys().cloned().chain(excluded.iter().cloned()));
+    for node in known.iter() {
+        let count = jobs.get(node).copied().unwrap_or(0);
+        metrics::gauge!("meniscus_slurm_node_jobs", "node" => node.clone()).set(count as f64);
+        let is_excluded = f64::from(u8::from(excluded.contains(node)));
+        metrics::gauge!("meniscus_slurm_node_excluded", "node" => node.clone()).set(is_excluded);
+    }
 }
 
 /// Ends jobs of earlier attempts whose successors are watched.

@@ -1,6 +1,6 @@
 //! The table of the cluster's jobs, as `squeue` answers.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::time::Instant;
 
 /// What `squeue` is asked for: id, name, state, reason, nodes.
@@ -146,6 +146,16 @@ impl Table {
         self.rows.get(name).map_or(&[], Vec::as_slice)
     }
 
+    /// How many jobs each node runs.
+    #[must_use]
+    pub fn jobs_by_node(&self) -> BTreeMap<String, u64> {
+        let mut jobs = BTreeMap::new();
+        for row in self.all().filter(|row| row.state.is_alive() && !row.nodes.is_empty()) {
+            *jobs.entry(row.nodes.clone()).or_default() += 1;
+        }
+        jobs
+    }
+
     /// Every row.
     pub fn all(&self) -> impl Iterator<Item = &Row> {
         self.rows.values().flatten()
@@ -169,6 +179,16 @@ mod tests {
         let mut table = Table::new();
         table.take(answer, "mns-", Instant::now());
         table
+    }
+
+    #[test]
+    fn nodes_have_the_jobs_that_live_on_them() {
+        let mut table = Table::new();
+        let answer = "1|mns-a-1|RUNNING|None|node1\n2|mns-b-1|RUNNING|None|node2\n3|mns-c-1|RUNNING|None|node1\n\
+                      4|mns-d-1|PENDING|Resources|\n5|mns-e-1|FAILED|NonZeroExitCode|node2\n";
+        table.take(answer, "mns-", Instant::now());
+        let found: Vec<(String, u64)> = table.jobs_by_node().into_iter().collect();
+        assert_eq!(found, [("node1".to_owned(), 2), ("node2".to_owned(), 1)]);
     }
 
     #[test]
