@@ -94,18 +94,37 @@ pub fn enclosed_area_or_volume<const D: usize>(
     surface: &LevelSurface<D>,
     interrupt: &Interrupt,
 ) -> Result<f64, Interrupted> {
-    enclosed_moments(surface, |x| *x, interrupt).map(|moments| moments.area_or_volume)
+    enclosed_moments(surface, |x| *x, &Bounds::none(), interrupt).map(|moments| moments.area_or_volume)
+}
+
+/// A box outside of which nothing counts; infinite where it is open.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds<const D: usize> {
+    /// Lower corner.
+    pub low: Vector<D>,
+    /// Upper corner.
+    pub high: Vector<D>,
+}
+
+impl<const D: usize> Bounds<D> {
+    /// No bounds.
+    #[must_use]
+    pub fn none() -> Self {
+        Self { low: Vector::<D>::repeat(f64::NEG_INFINITY), high: Vector::<D>::repeat(f64::INFINITY) }
+    }
 }
 
 /// Moments of the set with negative level.
 ///
-/// In a periodic domain, `unwrap` must move the points of the surface to connected images.
+/// In a periodic domain, `unwrap` must move the points of the surface to connected images. Only what lies between the bounds
+/// counts.
 ///
 /// # Errors
 /// [`Interrupted`] when the interrupt is raised.
 pub fn enclosed_moments<const D: usize>(
     surface: &LevelSurface<D>,
     unwrap: impl Fn(&Vector<D>) -> Vector<D>,
+    bounds: &Bounds<D>,
     interrupt: &Interrupt,
 ) -> Result<EnclosedMoments<D>, Interrupted> {
     if surface.is_lost() {
@@ -124,8 +143,13 @@ pub fn enclosed_moments<const D: usize>(
     let coarsening = ((high - low).max() / (COARSE_CELLS * spacing)).log2().ceil().max(0.0);
     let edge = spacing * coarsening.exp2();
     let halvings = halvings(D) + coarsening as u32;
-    let low = low.add_scalar(-2.0 * spacing);
-    let counts: [usize; D] = std::array::from_fn(|d| ((high[d] + 2.0 * spacing - low[d]) / edge).ceil() as usize);
+    // Cells that bounds cut would have other edges: the grid begins at a lower bound and fits between two.
+    let low = low.add_scalar(-2.0 * spacing).sup(&bounds.low);
+    let high = high.add_scalar(2.0 * spacing).inf(&bounds.high);
+    let counts: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
+    let edges = Vector::<D>::from_fn(|d, _| {
+        if high[d] == bounds.high[d] { (high[d] - low[d]) / counts[d] as f64 } else { edge }
+    });
     let rows: usize = counts[1..].iter().product();
     let sums: Vec<EnclosedMoments<D>> = (0..rows)
         .into_par_iter()
@@ -133,14 +157,14 @@ pub fn enclosed_moments<const D: usize>(
             let mut corner = low;
             let mut rest = row;
             for d in 1..D {
-                corner[d] += (rest % counts[d]) as f64 * edge;
+                corner[d] += (rest % counts[d]) as f64 * edges[d];
                 rest /= counts[d];
             }
             let mut sum = EnclosedMoments::zero();
             for k in 0..counts[0] {
-                corner[0] = low[0] + k as f64 * edge;
+                corner[0] = low[0] + k as f64 * edges[0];
                 if !interrupt.is_raised() {
-                    inside_of_cell(surface, &corner, edge, halvings, &mut sum);
+                    inside_of_cell(surface, &corner, &edges, halvings, &mut sum);
                 }
             }
             sum
@@ -155,22 +179,22 @@ pub fn enclosed_moments<const D: usize>(
     Ok(moments)
 }
 
-/// Adds the inside part of a cubic cell. The part of a cut cell is added at the center of the cell.
+/// Adds the inside part of a cell with these edges. The part of a cut cell is added at the center of the cell.
 fn inside_of_cell<const D: usize>(
     surface: &LevelSurface<D>,
     corner: &Vector<D>,
-    edge: f64,
+    edges: &Vector<D>,
     halvings: u32,
     sum: &mut EnclosedMoments<D>,
 ) {
-    let whole = edge.powi(D as i32);
-    let center = corner.add_scalar(0.5 * edge);
-    let half_diagonal = 0.5 * edge * (D as f64).sqrt();
+    let whole = edges.product();
+    let center = corner + edges * 0.5;
+    let half_diagonal = 0.5 * edges.norm();
     let Some(foot) = surface.query(&center, f64::INFINITY) else { return };
     let mut add = |area_or_volume: f64| {
         sum.area_or_volume += area_or_volume;
         sum.first += center * area_or_volume;
-        sum.second += center.component_mul(&center).add_scalar(edge * edge / 12.0) * area_or_volume;
+        sum.second += (center.component_mul(&center) + edges.component_mul(edges) / 12.0) * area_or_volume;
         sum.mixed += Vector::<D>::from_fn(|d, _| center[d] * center[(d + 1) % D]) * area_or_volume;
     };
     if foot.distance >= half_diagonal {
@@ -180,19 +204,22 @@ fn inside_of_cell<const D: usize>(
         return;
     }
     if halvings == 0 {
+        // In units of the longest edge.
+        let edge = edges.max();
         let signed = if foot.is_outside { foot.distance } else { -foot.distance };
         // At the distance ρ the surface is κ ρ²/2 away from its tangent plane, on average κ edge²/24 over a section of
         // the cell.
         let mean_deviation = (foot.curvature * edge).clamp(-1.0, 1.0) / 24.0;
         let offset = signed / edge + mean_deviation;
-        add(whole * share_below_plane(&foot.normal, offset));
-        sum.surface += whole / edge * section_by_plane(&foot.normal, offset);
+        let normal = foot.normal.component_mul(edges) / edge;
+        add(whole * share_below_plane(&normal, offset));
+        sum.surface += whole / edge * section_by_plane(&normal, offset);
         return;
     }
-    let half = 0.5 * edge;
+    let half = edges * 0.5;
     for octant in 0..1_usize << D {
-        let child = Vector::<D>::from_fn(|d, _| corner[d] + half * (octant >> d & 1) as f64);
-        inside_of_cell(surface, &child, half, halvings - 1, sum);
+        let child = Vector::<D>::from_fn(|d, _| corner[d] + half[d] * (octant >> d & 1) as f64);
+        inside_of_cell(surface, &child, &half, halvings - 1, sum);
     }
 }
 

@@ -14,6 +14,7 @@
 //! | a tension that varies | [`tension_law`], `varying_tension`, `surfactant`, `tension_record`, `migration` |
 //! | one evaluation | `system` |
 //! | steps in time | `stepping`, [`time_step`] |
+//! | walls | [`walls`] |
 //! | what a run watches | `budget`, `checks`, `guard` |
 //! | the simulation and what it shows | `simulation`, `saved_state`, `diagnostics`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
 
@@ -50,6 +51,7 @@ mod simulation;
 pub mod species;
 mod smoothed_delta;
 mod standing_wave;
+pub mod steady_flow;
 mod stepping;
 mod strays;
 mod summary;
@@ -60,6 +62,8 @@ mod tension_record;
 pub mod time_step;
 mod varying_tension;
 mod volume_form;
+pub mod walls;
+mod wall_record;
 mod wave_record;
 
 pub use config::{

@@ -11,6 +11,9 @@ pub trait Choice: Sized + Clone {
     /// The field of the JSON object that names the variant.
     const TAG: &'static str = "type";
 
+    /// The variant that an object without a tag stands for.
+    const UNTAGGED: Option<&'static str> = None;
+
     /// Names of the variants, in the order of declaration.
     fn names() -> Vec<&'static str>;
 
@@ -48,7 +51,13 @@ pub fn parse<T: Choice>(given: &Value, place: &str, errors: &mut Vec<Violation>)
     let empty = Map::new();
     let (name, fields, at) = match given {
         Value::String(name) => (Some(name.as_str()), &empty, place.to_owned()),
-        Value::Object(fields) => (fields.get(T::TAG).and_then(Value::as_str), fields, format!("{place}/{}", T::TAG)),
+        Value::Object(fields) => {
+            let name = match fields.get(T::TAG) {
+                Some(tag) => tag.as_str(),
+                None => T::UNTAGGED,
+            };
+            (name, fields, format!("{place}/{}", T::TAG))
+        }
         _ => {
             let detail = format!("a choice is a name or an object with a {}", T::TAG);
             errors.push(Violation::new(place, "type", detail, given.clone(), T::names()));
@@ -101,7 +110,9 @@ pub fn schema<T: Choice>() -> Map<String, Value> {
             if let Some(Value::Object(properties)) = schema.get_mut("properties") {
                 properties.shift_insert(0, T::TAG.into(), json!({"const": variant.name}));
             }
-            if let Some(Value::Array(required)) = schema.get_mut("required") {
+            if let Some(Value::Array(required)) = schema.get_mut("required")
+                && T::UNTAGGED != Some(variant.name)
+            {
                 required.insert(0, json!(T::TAG));
             }
             schema.insert("description".into(), json!(variant.doc));

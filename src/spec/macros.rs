@@ -221,12 +221,12 @@ macro_rules! parameter_of_group {
 /// ```
 ///
 /// Fields are declared as in [`group!`]. `..Name(Type)` before the variants takes in those of another choice; `enum Name by "tag"`
-/// names the variant in another field than `type`.
+/// names the variant in another field than `type`; `enum Name untagged "name"` takes an object without that field for the variant.
 #[macro_export]
 macro_rules! choice {
     (
         $(#[doc = $about:literal])*
-        $vis:vis enum $Name:ident $(by $tag:literal)? {
+        $vis:vis enum $Name:ident $(by $tag:literal)? $(untagged $untagged:literal)? {
             $( .. $Other:ident($OtherType:ty) )?
             $(
                 $(#[doc = $variant_doc:literal])*
@@ -251,6 +251,7 @@ macro_rules! choice {
 
         impl $crate::spec::Choice for $Name {
             $( const TAG: &'static str = $tag; )?
+            $( const UNTAGGED: Option<&'static str> = Some($untagged); )?
 
             fn names() -> Vec<&'static str> {
                 let others: &[Vec<&'static str>] = &[$( <$OtherType as $crate::spec::Choice>::names() )?];

@@ -52,5 +52,30 @@ pub fn bodies() -> Vec<Value> {
         "kind": "droplet", "dimension": 3, "case": "static", "spacing": 0.16, "steps": 4, "end_time": 4e-3,
         "shape": {"type": "sphere", "radius": 0.6}, "surfactant": {"coverage": 0.5, "slope": [0, 0, 0.2]}
     }));
+    // Walls: one that moves, gravity, a drop that sits on a wall, and one in a box in space.
+    let drop_on_wall = json!({
+        "low": [-1, -0.5], "high": [1, 0.8],
+        "axes": ["periodic", {"low": {"contact_angle": 70}, "high": {"velocity": [20, 0]}}]
+    });
+    bodies.push(droplet(json!({
+        "case": "custom", "domain": drop_on_wall, "shape": {"type": "circle", "center": [0, -0.5], "radius": 0.5}, "spacing": 0.07
+    })));
+    let slip = json!({"type": "free_slip", "advancing_angle": 100, "receding_angle": 80});
+    bodies.push(droplet(json!({
+        "case": "custom", "domain": {"low": [-0.8, -0.8], "high": [0.8, 0.8], "axes": [{"low": slip, "high": slip}, {"type": "walls"}]},
+        "shape": {"type": "circle", "radius": 0.4}, "spacing": 0.07, "fluids": {"inside": {"density": 0.5}},
+        "body_force": {"type": "constant", "acceleration": [0, -100], "balance": "mean"}
+    })));
+    bodies.push(json!({
+        "kind": "droplet", "dimension": 3, "case": "custom", "spacing": 0.15, "steps": 4, "end_time": 4e-3, "allow_soft": true,
+        "domain": {"low": [-0.8, -0.8, -0.6], "high": [0.8, 0.8, 0.6], "axes": ["periodic", "periodic", {"low": {"contact_angle": 60}, "high": {}}]},
+        "shape": {"type": "sphere", "center": [0, 0, -0.6], "radius": 0.6}, "body_force": {"type": "constant", "acceleration": [0, 0, -9]}
+    }));
+    bodies.push(json!({
+        "kind": "droplet", "case": "custom", "spacing": 0.05, "steps": 40, "end_time": 0.2, "surface_tension": 0,
+        "domain": {"low": [0, 0], "high": [1, 1], "axes": ["periodic", {"low": {}, "high": {}}]},
+        "shape": {"type": "layer", "height": 0, "thickness": 1}, "fluids": {"inside": {"density": 2, "viscosity": 0.1}, "outside": {"viscosity": 0.05}},
+        "body_force": {"type": "constant", "acceleration": [0, -1]}
+    }));
     bodies
 }

@@ -37,7 +37,7 @@ const DOCUMENTS: &str = "documents.json";
 /// The cases of a kind of scene.
 #[derive(Debug, Clone)]
 pub struct KindCases {
-    /// Kind of scene, or [`INPUTS`].
+    /// Kind of scene, or [`INPUTS`] or [`WALLS`].
     pub kind: &'static str,
     /// Name of the document with its results; kinds may share one.
     pub document: String,
@@ -50,7 +50,8 @@ pub struct KindCases {
 /// All cases, by kind.
 #[derive(Debug, Clone)]
 pub struct Catalog {
-    /// The kinds in the order of the engine's list, and then the inputs of one's own; those without cases have empty lists.
+    /// The kinds in the order of the engine's list, then the inputs of one's own and droplets among walls; those without cases have
+    /// empty lists.
     pub kinds: Vec<KindCases>,
     /// The cases of studies, in the order of their names.
     pub studies: Vec<(String, StudyCase)>,
@@ -58,6 +59,8 @@ pub struct Catalog {
 
 /// The folder of the cases of inputs of one's own, whose runs are of any kind, and their name among the kinds.
 pub const INPUTS: &str = "inputs";
+/// The folder of the cases of droplets among walls, and their name among the kinds.
+pub const WALLS: &str = "walls";
 /// The folder of the cases of studies, and their name among the kinds.
 pub const STUDIES: &str = "studies";
 
@@ -85,7 +88,7 @@ impl Catalog {
     fn from_files(files: impl IntoIterator<Item = (String, Vec<u8>)>) -> Result<Self, CaseError> {
         let mut documents: BTreeMap<String, Vec<String>> = BTreeMap::new();
         let empty = |kind| KindCases { kind, document: String::new(), cases: Vec::new(), plots: Vec::new() };
-        let mut kinds: Vec<KindCases> = SCENES.iter().map(|kind| kind.kind).chain([INPUTS]).map(empty).collect();
+        let mut kinds: Vec<KindCases> = SCENES.iter().map(|kind| kind.kind).chain([INPUTS, WALLS]).map(empty).collect();
         let mut studies = Vec::new();
         for (file, text) in files {
             if let Some(name) = file.strip_prefix("studies/").and_then(|name| name.strip_suffix(".json")) {
@@ -98,7 +101,7 @@ impl Catalog {
             }
             let refuse = |cause: String| CaseError { file: file.clone(), place: "name".to_owned(), cause };
             let parts: Vec<&str> = file.trim_end_matches(".json").split('/').collect();
-            let known = || SCENES.iter().map(|kind| kind.kind).chain([INPUTS]).collect::<Vec<_>>().join(", ");
+            let known = || SCENES.iter().map(|kind| kind.kind).chain([INPUTS, WALLS]).collect::<Vec<_>>().join(", ");
             let (folder, name, is_plot) = match parts[..] {
                 [folder, name] => (folder, name, false),
                 [folder, "plots", name] => (folder, name, true),

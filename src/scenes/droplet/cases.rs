@@ -1,6 +1,6 @@
 //! The cases: what holds for each when it is not given.
 
-use super::spec::{CaseName, Corners, DensityChoice, ForceChoice, Shifting};
+use super::spec::{CaseName, BoxSpec, DensityChoice, ForceChoice, Shifting};
 use crate::scenes::shapes::Shape;
 use crate::spec::Coordinates;
 
@@ -9,7 +9,7 @@ use crate::spec::Coordinates;
 pub(super) struct Case {
     /// The drop at the start; a custom one has none.
     pub shape: Option<Shape>,
-    pub domain: Corners,
+    pub domain: BoxSpec,
     pub tension: f64,
     pub density_method: DensityChoice,
     pub shifting: Shifting,
@@ -30,9 +30,9 @@ fn growing_smoothing(spacing: f64) -> f64 {
 }
 
 /// A box about the origin with these half edge lengths; in the plane the first two count.
-fn centered_box(dimension: usize, half: [f64; 3]) -> Corners {
+fn centered_box(dimension: usize, half: [f64; 3]) -> BoxSpec {
     let high: Vec<f64> = half.into_iter().take(dimension).collect();
-    Corners { low: Coordinates(high.iter().map(|x| -x).collect()), high: Coordinates(high) }
+    BoxSpec { low: Coordinates(high.iter().map(|x| -x).collect()), high: Coordinates(high), axes: None }
 }
 
 impl Case {

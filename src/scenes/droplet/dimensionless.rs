@@ -2,7 +2,7 @@
 
 use super::cases::Case;
 use super::numbers::{SceneNumbers, least_sound_speed, smallest_radius};
-use super::spec::{Balance, CaseName, Corners, Droplet, FluidSpec, Fluids, ForceChoice, NumbersSpec};
+use super::spec::{Balance, BoxSpec, CaseName, Droplet, FluidSpec, Fluids, ForceChoice, NumbersSpec};
 use crate::scenes::shapes::Shape;
 use crate::schemes::weakly_compressible_sph::dimensionless::{DimensionlessNumbers, Scales};
 use crate::spec::{Coordinates, Given, Group, Parameter, Preset, Violation};
@@ -143,7 +143,7 @@ fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
 /// D/h where none is given.
 const DIAMETER_OVER_H: f64 = 25.6;
 
-fn longest_side(corners: &Corners) -> f64 {
+fn longest_side(corners: &BoxSpec) -> f64 {
     corners.high.iter().zip(corners.low.iter()).map(|(high, low)| high - low).fold(0.0, f64::max)
 }
 
@@ -151,8 +151,8 @@ fn times(numbers: &Coordinates, factor: f64) -> Coordinates {
     Coordinates(numbers.iter().map(|x| factor * x).collect())
 }
 
-fn scaled_corners(Corners { low, high }: Corners, factor: f64) -> Corners {
-    Corners { low: times(&low, factor), high: times(&high, factor) }
+fn scaled_corners(BoxSpec { low, high, axes }: BoxSpec, factor: f64) -> BoxSpec {
+    BoxSpec { low: times(&low, factor), high: times(&high, factor), axes }
 }
 
 /// The ball or ellipsoid of a case about the origin, at another size.
@@ -167,7 +167,7 @@ fn scaled<const D: usize>(shape: Shape, factor: f64) -> Shape {
 }
 
 /// Waves whose length is not given are as long as the box.
-fn name_wavelength(shape: &mut Shape, corners: &Corners) {
+fn name_wavelength(shape: &mut Shape, corners: &BoxSpec) {
     if let (Shape::Layer { wavelength, .. }, [low, ..], [high, ..]) = (shape, &corners.low[..], &corners.high[..]) {
         wavelength.get_or_insert(high - low);
     }

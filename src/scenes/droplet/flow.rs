@@ -3,6 +3,7 @@
 use super::cases::{Case, DEFAULT_DIFFUSION};
 use super::formulation::{Scope, Start};
 use super::own_motion::formula_force;
+use super::room::Room;
 use super::spec::{
     Balance, DensityChoice, DiscretizationChoice, Droplet, FluidSpec, Fluids, ForceChoice, GeometryChoice, KernelWord,
     LatticeWord, Shifting,
@@ -42,15 +43,17 @@ impl Fluids {
     }
 }
 
-/// The body force in a box (lower corner and lengths) until a time.
+/// The body force in a box until a time.
 pub(super) fn body_force<const D: usize>(
     force: &ForceChoice,
     fluids: &Fluids,
-    extent: (&Vector<D>, &Vector<D>, f64),
+    (room, end_time): (&Room<D>, f64),
     errors: &mut Vec<Violation>,
 ) -> Option<BodyForce<D>> {
     match force {
-        ForceChoice::Formula { acceleration, parameters } => formula_force(acceleration, parameters, extent, errors),
+        ForceChoice::Formula { acceleration, parameters } => {
+            formula_force(acceleration, parameters, (&room.low, &room.lengths(), end_time), errors)
+        }
         ForceChoice::None => None,
         ForceChoice::Pulse { coefficient, duration, a, b, c } => {
             let lengths = Vector::<D>::from_fn(|d, _| [*a, *b, *c][d]);
@@ -63,9 +66,10 @@ pub(super) fn body_force<const D: usize>(
             }
             let acceleration_vector = Vector::<D>::from_fn(|d, _| acceleration.get(d).copied().unwrap_or(0.0));
             let (inside, outside) = (fluids.inside.density, fluids.outside.density);
-            if *balance == Balance::None && inside != outside && acceleration_vector.norm() > 0.0 {
-                let detail = "in a periodic box two fluids fall freely together, whatever their densities; balance mean takes the \
-                              mean force out and leaves buoyancy; free_fall lets it through";
+            let is_free = (0..D).any(|d| acceleration_vector[d] != 0.0 && !room.is_bounded(d));
+            if *balance == Balance::None && inside != outside && is_free {
+                let detail = "along a periodic axis two fluids fall freely together, whatever their densities; balance mean takes \
+                              the mean force out and leaves buoyancy; free_fall lets it through";
                 errors.push(Violation::new(
                     "/body_force/balance",
                     "conflict",

@@ -3,7 +3,7 @@
 //! balance, the others have that of the paper.
 
 use super::spec::{
-    Balance, CaseName, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, RedistancingChoice,
+    Balance, BoxSpec, CaseName, Droplet, ForceChoice, GeometryChoice, IntegratorWord, LatticeWord, RedistancingChoice,
     TensionWord, VolumesWord,
 };
 use crate::schemes::weakly_compressible_sph::{LevelUpdate, PressureConfig, PressureForm, Volumes};
@@ -26,6 +26,8 @@ struct Balanced {
     relaxation_at_rest: f64,
     relaxation_in_oscillation: f64,
     relaxation: f64,
+    /// The same of a drop that rises between walls: it deforms for long, and with less some of it is lost.
+    relaxation_in_rise: f64,
     curvature_filter_h: f64,
 }
 
@@ -37,6 +39,7 @@ const BALANCED: Balanced = Balanced {
     relaxation_at_rest: 0.05,
     relaxation_in_oscillation: 0.02,
     relaxation: 0.1,
+    relaxation_in_rise: 0.5,
     curvature_filter_h: 6.0,
 };
 
@@ -122,6 +125,16 @@ fn is_driven(spec: &Droplet) -> bool {
     spec.tension_slope.iter().chain(of_coverage).any(|slope| slope.iter().any(|b| *b != 0.0))
 }
 
+/// Whether gravity moves two fluids of different densities between walls.
+fn is_rising(spec: &Droplet) -> bool {
+    let has_walls = spec.domain.as_ref().is_some_and(BoxSpec::has_walls);
+    let pulls = match &spec.body_force {
+        Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().any(|g| *g != 0.0),
+        Some(_) | None => false,
+    };
+    has_walls && pulls && spec.fluids.inside.density != spec.fluids.outside.density
+}
+
 /// Pressures of a scene; the spec gets what was left open. Densities by continuity have none of these parameters.
 pub(super) fn pressures(spec: &mut Droplet, scope: Scope, errors: &mut Vec<Violation>) -> PressureConfig {
     let is_balanced = spec.tension_force == TensionWord::Balanced;
@@ -185,6 +198,7 @@ pub(super) fn level_and_curvature(
     let is_balanced = spec.tension_force == TensionWord::Balanced && scope.is_summation;
     let default = if is_balanced { with_defaults("transparent") } else { RedistancingChoice::Overwrite };
     let by_case = match spec.case {
+        _ if is_rising(spec) => BALANCED.relaxation_in_rise,
         _ if is_driven(spec) => BALANCED.relaxation,
         CaseName::Static => BALANCED.relaxation_at_rest,
         CaseName::Oscillating => BALANCED.relaxation_in_oscillation,

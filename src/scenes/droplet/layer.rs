@@ -1,11 +1,13 @@
 //! Layers across the box, at rest or with a standing wave on both sides.
 
+use super::room::Room;
 use super::spec::{Droplet, ForceChoice};
 use crate::geometry::Vector;
 use crate::geometry::surfaces::WavyLayer;
 use crate::scenes::shapes::Shape;
 use crate::schemes::capillary_wave::CapillaryWave;
-use crate::schemes::weakly_compressible_sph::StandingWave;
+use crate::schemes::weakly_compressible_sph::steady_flow::{FlowLayer, SteadyFlow};
+use crate::schemes::weakly_compressible_sph::{BodyForce, Fluid, SphConfig, StandingWave};
 use crate::spec::{Parameter, Violation};
 use serde_json::json;
 use std::f64::consts::TAU;
@@ -21,8 +23,8 @@ pub(super) fn layer_of(shape: &Shape, length: f64) -> Option<WavyLayer> {
 const WAVE_SLACK: f64 = 1e-9;
 
 /// Checks that a layer fits into a box; its shape gets the wavelength.
-pub(super) fn check_layer<const D: usize>(shape: &mut Shape, lengths: &Vector<D>, errors: &mut Vec<Violation>) {
-    let got = shape.clone();
+pub(super) fn check_layer<const D: usize>(shape: &mut Shape, room: &Room<D>, errors: &mut Vec<Violation>) {
+    let (got, lengths) = (shape.clone(), room.lengths());
     let Shape::Layer { thickness, amplitude, wavelength, .. } = shape else { return };
     let wavelength = *wavelength.get_or_insert(lengths[0]);
     let waves = lengths[0] / wavelength;
@@ -36,7 +38,7 @@ pub(super) fn check_layer<const D: usize>(shape: &mut Shape, lengths: &Vector<D>
         let allowed = format!("a number < {}", 0.5 * *thickness);
         errors.push(Violation::new("/shape/amplitude", "range", detail, *amplitude, allowed));
     }
-    if *thickness + 2.0 * *amplitude >= lengths[1] {
+    if *thickness + 2.0 * *amplitude >= lengths[1] && !room.is_bounded(1) {
         let detail = "the layer is as thick as the box is high";
         errors.push(Violation::new("/shape", "conflict", detail, got.to_json(), json!(lengths[1])));
     }
@@ -74,8 +76,40 @@ pub(super) fn standing_wave<const D: usize>(
     Some(StandingWave { wavenumber, crest: layer.crest, amplitude: layer.amplitude, theory })
 }
 
-/// Signed distance from the nearest image of a layer, in a box of a height.
-pub(super) fn distance_from_layer<const D: usize>(layer: &WavyLayer, height: f64, x: &Vector<D>) -> f64 {
+/// The steady flow of flat layers between two walls that hold them, driven by the walls and by a force along them.
+pub(super) fn steady_flow<const D: usize>(
+    shape: &Shape,
+    config: &SphConfig<D>,
+    room: &Room<D>,
+) -> Option<SteadyFlow<D>> {
+    let Shape::Layer { height, thickness, amplitude: 0.0, .. } = shape else { return None };
+    let container = room.container.as_ref()?;
+    let bounded: Vec<usize> = (0..D).filter(|d| container.is_bounded(*d)).collect();
+    // Layers lie across y.
+    let [1] = bounded[..] else { return None };
+    let walls = [2, 3].map(|number| container.wall(number));
+    if !walls.iter().all(|wall| wall.holds_fluid) {
+        return None;
+    }
+    let acceleration = match config.body_force {
+        Some(BodyForce::Constant(acceleration)) if acceleration[1] == 0.0 => acceleration,
+        None => Vector::<D>::zeros(),
+        Some(_) => return None,
+    };
+    let (low, gap) = (room.low[1], room.lengths()[1]);
+    let of = |fluid: &Fluid, top: f64| FlowLayer { top, density: fluid.density, viscosity: fluid.viscosity };
+    let (inside, outside) = (&config.fluids.inside, &config.fluids.outside);
+    let ends = [height - 0.5 * thickness - low, height + 0.5 * thickness - low].map(|end| end.clamp(0.0, gap));
+    let layers = [of(outside, ends[0]), of(inside, ends[1]), of(outside, gap)];
+    let moves = acceleration.norm() > 0.0 || walls.iter().any(|wall| wall.velocity.norm() > 0.0);
+    let flows = layers.iter().all(|layer| layer.viscosity > 0.0) && moves;
+    let walls = walls.map(|wall| wall.velocity);
+    flows.then(|| SteadyFlow { axis: 1, low, layers: layers.to_vec(), walls, acceleration })
+}
+
+/// Signed distance from the nearest image of a layer, in a box of a height that is its period; None between walls.
+pub(super) fn distance_from_layer<const D: usize>(layer: &WavyLayer, period: Option<f64>, x: &Vector<D>) -> f64 {
+    let Some(height) = period else { return layer.signed_distance(x) };
     let distance = |turns: f64| {
         let mut image = *x;
         image[1] += turns * height;

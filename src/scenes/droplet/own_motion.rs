@@ -1,5 +1,6 @@
 //! Motion of one's own: velocities at the start and forces from outside that are given by formulas.
 
+use super::room::Room;
 use super::spec::{Droplet, ForceChoice, InitialVelocitySpec};
 use super::vectors::vector;
 use crate::formulas::{Bound, Context, FormulaList, Input, NamedNumbers};
@@ -34,16 +35,19 @@ pub(super) type MotionAtStart<const D: usize> = (Vector<D>, Option<StartMotion>,
 pub(super) fn motion_at_start<const D: usize>(
     spec: &Droplet,
     parts: Option<usize>,
-    (low, lengths): (&Vector<D>, &Vector<D>),
+    room: &Room<D>,
     errors: &mut Vec<Violation>,
 ) -> MotionAtStart<D> {
-    let gravity = match spec.body_force.as_ref() {
-        Some(ForceChoice::Constant { acceleration, .. }) => acceleration.iter().map(|g| g * g).sum::<f64>().sqrt(),
-        Some(ForceChoice::Pulse { .. } | ForceChoice::Formula { .. } | ForceChoice::None) | None => 0.0,
+    let acceleration = match spec.body_force.as_ref() {
+        Some(ForceChoice::Constant { acceleration, .. }) if acceleration.len() == D => {
+            Vector::<D>::from_column_slice(acceleration)
+        }
+        Some(_) | None => Vector::<D>::zeros(),
     };
+    let (gravity, driven) = room.driven(spec, &acceleration);
     let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |v| vector::<D>("/velocity", v, errors));
     let motion = start_motion::<D>(spec, parts, errors);
-    let own_speed = motion.as_ref().map_or(0.0, |motion| motion.top_speed(low, lengths));
+    let own_speed = motion.as_ref().map_or(driven, |motion| driven.max(motion.top_speed(&room.low, &room.lengths())));
     (velocity, motion, [gravity, velocity.norm(), own_speed])
 }
 

@@ -2,18 +2,18 @@
 
 use super::cases::Case;
 use super::dimensionless;
+use super::hydrostatic::Hydrostatic;
 use super::flow::{FlowPlan, body_force};
 use super::formulation::{Scope, level_and_curvature, pressures};
-use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave};
+use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave, steady_flow};
 use super::numbers::{SceneNumbers, smallest_radius};
+use super::room::{Room, check_needs};
 use super::own_motion::{StartMotion, motion_at_start};
 use super::spec::{
-    Corners, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen, TensionWord,
+    BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen, TensionWord,
 };
 use super::start_lattice::StartLattice;
 use super::varying_tension::{StartBox, largest_tension, tension_law};
-use super::vectors::vector;
-use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::Pencils;
 use crate::scene::cloud::{CloudReference, CloudSizes};
@@ -25,7 +25,7 @@ use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
+    BodyForce, DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
     WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{Finding, OutputPlan, Quantity, Region, Simulation};
@@ -40,8 +40,7 @@ pub(super) struct DropletScene<const D: usize> {
     pub(super) motion: Option<StartMotion>,
     /// The surface of the shape; none of a layer, and where points from outside tell it.
     pub(super) surface: Option<ShapeSurface<D>>,
-    pub(super) low: Vector<D>,
-    pub(super) high: Vector<D>,
+    pub(super) room: Room<D>,
     lattice: StartLattice<D>,
     numbers: SceneNumbers,
     pub(super) config: SphConfig<D>,
@@ -99,18 +98,6 @@ fn geometry(
     Ok(Geometry::Pcp { method: planned, half_band, level_update, curvature_filter })
 }
 
-/// The lower and the upper corner of the box.
-fn corners_of<const D: usize>(corners: &Corners, errors: &mut Vec<Violation>) -> (Vector<D>, Vector<D>) {
-    let low = vector::<D>("/domain/low", &corners.low, errors);
-    let high = vector::<D>("/domain/high", &corners.high, errors);
-    let lengths = high - low;
-    if lengths.iter().any(|length| *length <= 0.0) {
-        let detail = "the upper corner must lie above the lower one along every axis";
-        errors.push(Violation::new("/domain/high", "range", detail, corners.high.to_json(), Value::Null));
-    }
-    (low, high)
-}
-
 /// The particles of the start.
 fn start_lattice<const D: usize>(
     spec: &Droplet,
@@ -135,7 +122,7 @@ type DropShape<const D: usize> = (Shape, Option<ShapeSurface<D>>, Option<CloudRe
 fn drop_shape<const D: usize>(
     spec: &mut Droplet,
     case: &Case,
-    lengths: &Vector<D>,
+    (room, corners): (&Room<D>, &BoxSpec),
     errors: &mut Vec<Violation>,
 ) -> Option<DropShape<D>> {
     let Some(shape) = spec.shape.take().or_else(|| case.shape.clone()) else {
@@ -147,10 +134,10 @@ fn drop_shape<const D: usize>(
     let mut shape = shape;
     let mut surface = None;
     if let Shape::Layer { .. } = shape {
-        check_layer(&mut shape, lengths, errors);
+        check_layer(&mut shape, room, errors);
     } else if !shape.is_from_outside() {
         surface = shape.surface::<D>("/shape").map_err(|found| errors.extend(found)).ok();
-        errors.extend(surface.as_ref().and_then(|surface| check_size(surface.whole.as_ref(), lengths, &shape)));
+        errors.extend(surface.as_ref().and_then(|surface| check_size(surface.whole.as_ref(), (room, corners), &shape)));
     }
     spec.shape = Some(shape.clone());
     Some((shape, surface, points))
@@ -161,10 +148,10 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let mut errors = Vec::new();
     let case = Case::new(spec.case, D, spec.spacing);
     let corners = spec.domain.get_or_insert_with(|| case.domain.clone()).clone();
-    let (low, high) = corners_of::<D>(&corners, &mut errors);
-    let lengths = high - low;
+    let mut room = Room::<D>::new(&corners, &mut errors);
+    let (low, lengths) = (room.low, room.lengths());
     let is_box = errors.is_empty();
-    let shape = drop_shape(&mut spec, &case, &lengths, &mut errors);
+    let shape = drop_shape(&mut spec, &case, (&room, &corners), &mut errors);
     let flow = FlowPlan::new(&mut spec, &case, D, &mut errors);
     let lattice = start_lattice(&spec, flow.lattice, &lengths, is_box, &mut errors);
     let given_step = spec.time_step.or(if spec.steps.is_none() { case.time_step } else { None });
@@ -177,12 +164,12 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let tension = *spec.surface_tension.get_or_insert(case.tension);
     let surface = shape.as_ref().and_then(|(_, surface, _)| surface.as_ref());
     let parts = part_count(shape.as_ref().map(|(shape, ..)| shape), surface);
-    let (velocity, motion, speeds) = motion_at_start::<D>(&spec, parts, (&low, &lengths), &mut errors);
+    let (velocity, motion, speeds) = motion_at_start::<D>(&spec, parts, &room, &mut errors);
     let start = StartBox { shape: shape.as_ref().map(|(shape, ..)| shape), surface, low, lengths };
     let tensions = [tension, tension * largest_tension(&spec, &start)];
     let numbers = SceneNumbers::new(start.radius(), tensions, speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
-    let scheme = (geometry, smoothing_length, expected_speed, (&low, &lengths));
+    let scheme = (geometry, smoothing_length, expected_speed, &room);
     let mut config = sph_config(&mut spec, &case, &flow, scheme, given_step, &mut errors);
     config.is_at_rest = motion.is_none();
     config.start_velocity = velocity;
@@ -190,7 +177,16 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     config.wave = shape.as_ref().and_then(|(shape, ..)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     if is_box && lattice.count() >= 1.0 {
-        errors.extend(check_cutoff(&domain_of(&low, &lengths), &config, &corners));
+        room.add_layers(&lattice, config.cutoff());
+        errors.extend(check_cutoff(&room.domain(), &config, &corners));
+    }
+    if room.container.is_some() {
+        check_needs(&spec, flow.scope.is_summation, config.has_tension(), &mut errors);
+        config.container.clone_from(&room.container);
+        let is_flat = |shape: &Shape| matches!(shape, Shape::Layer { amplitude: 0.0, .. });
+        config.starts_in_layers = shape.as_ref().is_some_and(|(shape, ..)| is_flat(shape));
+        config.steady_flow = shape.as_ref().and_then(|(shape, ..)| steady_flow(shape, &config, &room));
+        config.hydrostatic_pressure = pressure_of_height(&spec, &config, &room, &numbers);
     }
     numbers.check_sound_speeds(&spec, &mut errors);
     dimensionless::complete(&mut spec, &numbers, &mut errors);
@@ -206,8 +202,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         shape,
         motion,
         surface,
-        low,
-        high,
+        room,
         lattice,
         numbers,
         config,
@@ -218,6 +213,30 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     }))
 }
 
+/// Pressures by Δρ g D that keep the pressures of fluids positive while a drop of a diameter D rises: with 1 the drop of Hysing et
+/// al. has a rise velocity 2 % too high, with 2 .5 %, with 4 5 % too low (measured; docs/results/wall-notes.md).
+const RISE_PRESSURE: f64 = 2.0;
+
+/// The pressure that keeps the pressures of fluids between walls positive under gravity.
+fn pressure_of_height<const D: usize>(
+    spec: &Droplet,
+    config: &SphConfig<D>,
+    room: &Room<D>,
+    numbers: &SceneNumbers,
+) -> f64 {
+    match &config.body_force {
+        Some(BodyForce::Constant(gravity)) => {
+            let fluids = &config.fluids;
+            Hydrostatic { room, fluids, gravity: *gravity, spacing: config.spacing }.half_pressure()
+        }
+        Some(_) => {
+            let difference = (spec.fluids.inside.density - spec.fluids.outside.density).abs();
+            RISE_PRESSURE * difference * numbers.gravity * 2.0 * numbers.radius.unwrap_or(0.0)
+        }
+        None => 0.0,
+    }
+}
+
 /// Number of parts of a drop; None where its shape is refused.
 fn part_count<const D: usize>(shape: Option<&Shape>, surface: Option<&ShapeSurface<D>>) -> Option<usize> {
     // A layer, and what points from outside tell, is one part.
@@ -226,25 +245,25 @@ fn part_count<const D: usize>(shape: Option<&Shape>, surface: Option<&ShapeSurfa
 }
 
 /// An error where neighbors reach around the box.
-fn check_cutoff<const D: usize>(domain: &Domain<D>, config: &SphConfig<D>, corners: &Corners) -> Option<Violation> {
+fn check_cutoff<const D: usize>(domain: &Domain<D>, config: &SphConfig<D>, corners: &BoxSpec) -> Option<Violation> {
     let error = Pencils::<D>::new(domain, config.cutoff()).err()?;
     Some(Violation::new("/domain", "range", error.to_string(), corners.to_json(), error.least))
 }
 
-/// Geometry, smoothing length, expected speed, and the box by its lower corner and lengths.
-type SchemeParts<'a, const D: usize> = (Option<Geometry>, f64, f64, (&'a Vector<D>, &'a Vector<D>));
+/// Geometry, smoothing length, expected speed, and the box.
+type SchemeParts<'a, const D: usize> = (Option<Geometry>, f64, f64, &'a Room<D>);
 
 /// What the scheme is made of; the spec gets what was left open.
 fn sph_config<const D: usize>(
     spec: &mut Droplet,
     case: &Case,
     flow: &FlowPlan,
-    (geometry, smoothing_length, expected_speed, (low, lengths)): SchemeParts<'_, D>,
+    (geometry, smoothing_length, expected_speed, room): SchemeParts<'_, D>,
     given_step: Option<f64>,
     errors: &mut Vec<Violation>,
 ) -> SphConfig<D> {
     let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
-    let body_force = body_force(force, &spec.fluids, (low, lengths, spec.end_time), errors);
+    let body_force = body_force(force, &spec.fluids, (room, spec.end_time), errors);
     let pressure = pressures(spec, flow.scope, errors);
     SphConfig {
         spacing: spec.spacing,
@@ -271,6 +290,10 @@ fn sph_config<const D: usize>(
         start_velocity: Vector::<D>::zeros(),
         is_at_rest: true,
         wave: None,
+        container: None,
+        starts_in_layers: false,
+        steady_flow: None,
+        hydrostatic_pressure: 0.0,
         expected_speed,
         is_adaptive: given_step.is_none() && spec.steps.is_none(),
         rest_below: spec.stop_when.as_ref().map(|StopWhen::AtRest { velocity }| *velocity),
@@ -307,22 +330,61 @@ fn time_step<const D: usize>(
 /// An error where the drop does not fit into the box.
 pub(super) fn check_size<const D: usize>(
     surface: &dyn Surface<D>,
-    lengths: &Vector<D>,
+    (room, corners): (&Room<D>, &BoxSpec),
     shape: &Shape,
 ) -> Option<Violation> {
-    let (low, high) = surface.bounding_box();
-    let fits = (high - low).iter().zip(lengths.iter()).all(|(size, length)| size < length);
-    let detail = "the drop is as large as the box";
-    (!fits).then(|| Violation::new("/shape", "conflict", detail, shape.to_json(), json!(lengths.as_slice())))
-}
-
-pub(super) fn domain_of<const D: usize>(low: &Vector<D>, lengths: &Vector<D>) -> Domain<D> {
-    Domain::new(std::array::from_fn(|d| Axis::Periodic { start: low[d], length: lengths[d] }))
+    let ((low, high), lengths) = (surface.bounding_box(), room.lengths());
+    let refused =
+        |detail: String, allowed: Value| Some(Violation::new("/shape", "conflict", detail, shape.to_json(), allowed));
+    if let Some((wall, depth)) = room.pierced(corners, &low, &high) {
+        let detail = format!(
+            "the drop reaches {depth:.4} through the wall {wall}; give that wall a contact_angle, so that the drop sits on it, or \
+             move the drop"
+        );
+        return refused(detail, json!([room.low.as_slice(), room.high.as_slice()]));
+    }
+    let misses = |d: usize| room.is_bounded(d) && (high[d] <= room.low[d] || low[d] >= room.high[d]);
+    if (0..D).any(misses) {
+        return refused("the drop lies behind a wall".to_owned(), json!([room.low.as_slice(), room.high.as_slice()]));
+    }
+    let fits = (0..D).all(|d| room.is_bounded(d) || high[d] - low[d] < lengths[d]);
+    if fits { None } else { refused("the drop is as large as the box".to_owned(), json!(lengths.as_slice())) }
 }
 
 impl<const D: usize> DropletScene<D> {
+    /// Signed distances of places from the drop at the start, and its area or volume; NaN where that is not known.
+    fn levels_at(
+        &self,
+        context: &BuildContext,
+        positions: &[Vector<D>],
+    ) -> Result<(Vec<f64>, f64), Vec<Violation>> {
+        let lengths = self.lengths();
+        let found = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
+            let area = lengths.product() / lengths[1];
+            let period = (!self.room.is_bounded(1)).then_some(lengths[1]);
+            // Of a layer that walls cut the first measurement tells.
+            let measure = if period.is_some() { layer.thickness * area } else { f64::NAN };
+            (positions.iter().map(|x| distance_from_layer(&layer, period, x)).collect(), measure)
+        } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(context)? {
+            let (low, high) = whole.bounding_box();
+            let measure = if self.room.cuts(&low, &high) { f64::NAN } else { whole.area_or_volume() };
+            (self.levels(whole.as_ref(), positions), measure)
+        } else {
+            (self.levels_of_points(context, positions).map_err(|found| vec![found])?, f64::NAN)
+        };
+        Ok(found)
+    }
+
+    /// What puts fluids between walls to rest under gravity.
+    fn hydrostatic(&self) -> Option<Hydrostatic<'_, D>> {
+        let Some(BodyForce::Constant(gravity)) = &self.config.body_force else { return None };
+        self.room.container.as_ref()?;
+        let fluids = &self.config.fluids;
+        Some(Hydrostatic { room: &self.room, fluids, gravity: *gravity, spacing: self.config.spacing })
+    }
+
     pub(super) fn lengths(&self) -> Vector<D> {
-        self.high - self.low
+        self.room.lengths()
     }
 
     pub(super) fn count(&self) -> u64 {
@@ -465,22 +527,22 @@ impl<const D: usize> Scene for DropletScene<D> {
 
     fn build(&self, context: BuildContext) -> Result<Box<dyn Simulation>, Vec<Violation>> {
         let lengths = self.lengths();
-        let domain = domain_of(&self.low, &lengths);
-        let positions = self.lattice.positions(&self.low, &lengths);
-        let (level, measure) = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
-            let area = lengths.product() / lengths[1];
-            (positions.iter().map(|x| distance_from_layer(&layer, lengths[1], x)).collect(), layer.thickness * area)
-        } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(&context)? {
-            (self.levels(whole.as_ref(), &positions), whole.area_or_volume())
-        } else {
-            (self.levels_of_points(&context, &positions).map_err(|found| vec![found])?, f64::NAN)
-        };
+        let domain = self.room.domain();
+        let (mut positions, mut behind_walls) = self.lattice.positions(&self.room.low, &lengths, &self.room.layers);
+        let (level, measure) = self.levels_at(&context, &positions)?;
         let cell = lengths.product() / self.count() as f64;
         let velocities = match &self.motion {
             Some(motion) => Some(self.start_velocities(motion, &positions, &level)?),
             None => None,
         };
-        let drop = Drop { positions, level, velocities, measure };
+        let level = match self.hydrostatic() {
+            Some(hydrostatic) => {
+                hydrostatic.settle(&mut positions, &level, &mut behind_walls);
+                self.levels_at(&context, &positions)?.0
+            }
+            None => level,
+        };
+        let drop = Drop { positions, level, velocities, measure, behind_walls };
         let system = SphSystem::new(self.config.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
             vec![Violation::new("/domain", "range", error.to_string(), self.spec.domain.to_json(), error.least)]
         })?;

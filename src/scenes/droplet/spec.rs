@@ -4,7 +4,7 @@ use crate::formulas::{FormulaList, FormulaLists, NamedNumbers, constants};
 use crate::scenes::pcp_spec::PcpSpec;
 use crate::scenes::shapes::Shape;
 use crate::spec::choice::with_defaults;
-use crate::spec::{Coordinates, Interval, Items, NOT_NEGATIVE, POSITIVE, whole};
+use crate::spec::{Coordinates, Interval, Items, Listed, NOT_NEGATIVE, POSITIVE, whole};
 
 crate::words! {
     /// What starts.
@@ -20,13 +20,56 @@ crate::words! {
     }
 }
 
+crate::words! {
+    /// How a fluid moves along a wall.
+    pub enum WallWord {
+        /// with the wall
+        NoSlip = "no_slip",
+        /// freely
+        FreeSlip = "free_slip",
+    }
+}
+
 crate::group! {
-    /// The corners of the box.
-    pub struct Corners {
+    /// A wall.
+    pub struct WallSpec: Default {
+        /// whether the fluid moves with the wall or slips along it
+        slip as "type": WallWord = WallWord::NoSlip;
+        /// velocity of the wall, along itself; 0 when not given
+        velocity: Option<Coordinates>;
+        /// angle in degrees at which the interface meets the wall, measured in the drop; 90 when not given
+        contact_angle: Option<f64>, in Interval::at_least(0.0).and_at_most(180.0);
+        /// angle in degrees above which the contact line advances, with receding_angle in place of contact_angle
+        advancing_angle: Option<f64>, in Interval::at_least(0.0).and_at_most(180.0);
+        /// angle in degrees below which the contact line recedes
+        receding_angle: Option<f64>, in Interval::at_least(0.0).and_at_most(180.0);
+    }
+}
+
+crate::choice! {
+    /// What the box is like along an axis.
+    pub enum AxisSpec untagged "walls" {
+        /// what leaves at one end comes in at the other
+        Periodic = "periodic",
+        /// a wall at each end
+        Walls = "walls" {
+            /// wall at the lower end
+            low: WallSpec = WallSpec::default();
+            /// wall at the upper end
+            high: WallSpec = WallSpec::default();
+        }
+    }
+}
+
+crate::group! {
+    /// The box.
+    pub struct BoxSpec {
         /// lower corner
         low: Coordinates;
         /// upper corner
         high: Coordinates;
+        /// what the box is like along each axis; periodic when not given
+        axes: Option<Listed<AxisSpec>>, in Items(2, 3, ());
     }
 }
 
@@ -191,6 +234,14 @@ crate::group! {
     }
 }
 
+impl BoxSpec {
+    /// Whether there are walls along any axis.
+    #[must_use]
+    pub fn has_walls(&self) -> bool {
+        self.axes.iter().flat_map(|axes| &axes.0).any(|axis| *axis != AxisSpec::Periodic)
+    }
+}
+
 /// Smoothing lengths ε in h.
 const SMOOTHING: Interval = Interval::at_least(1.0).and_at_most(8.0);
 
@@ -330,8 +381,8 @@ crate::group! {
         dimension: Option<usize>, in whole(2, 3);
         /// the drop at the start; by case when not given
         shape: Option<Shape>;
-        /// the box, periodic along every axis; by case when not given
-        domain: Option<Corners>;
+        /// the box; by case, and periodic along every axis, when not given
+        domain: Option<BoxSpec>;
         /// distance h of neighboring particles: the volume of a particle is about h^D, whatever the lattice
         spacing: f64 = 0.031_25, in POSITIVE;
         /// velocity of both fluids at the start; 0 when not given
@@ -371,7 +422,7 @@ crate::group! {
         /// how volumes follow from sums of kernels, for densities by summation; by tension_force when not given
         volumes: Option<VolumesWord>;
         /// pressure p_b in τκ₀, κ₀ the curvature of the smallest drop at the start, for densities by summation; it keeps particles
-        /// apart, and acts as a weak elasticity; by tension_force when not given
+        /// apart, and acts as a weak elasticity; by tension_force when not given. Between walls gravity adds the pressure of its height
         background_pressure: Option<f64>, in NOT_NEGATIVE.and_at_most(100.0);
         /// coefficient β of the pressure −β ρ c ε ∇·u, for densities by summation and kick_drift_kick; by tension_force when not
         /// given; 2 holds, 5 does not

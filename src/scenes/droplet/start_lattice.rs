@@ -5,6 +5,7 @@
 
 use super::spec::LatticeWord;
 use crate::geometry::Vector;
+use crate::geometry::block::indices;
 
 /// A lattice that fills a box.
 #[derive(Debug, Clone)]
@@ -54,20 +55,32 @@ impl<const D: usize> StartLattice<D> {
         self.cells.iter().map(|cells| *cells as f64).product::<f64>() * self.basis.len() as f64
     }
 
-    /// Positions in a box with a lower corner and edge lengths, the first axis fastest.
-    pub fn positions(&self, low: &Vector<D>, lengths: &Vector<D>) -> Vec<Vector<D>> {
-        let mut positions = Vec::with_capacity(self.count() as usize);
-        for k in 0..self.cells.iter().product::<usize>() {
+    /// Edges of a cell in a box with these lengths.
+    pub fn edges(&self, lengths: &Vector<D>) -> Vector<D> {
+        Vector::<D>::from_fn(|d, _| lengths[d] / self.cells[d] as f64)
+    }
+
+    /// Positions in a box with a lower corner and edge lengths, the first axis fastest, and those in layers of so many cells around
+    /// the box.
+    pub fn positions(
+        &self,
+        low: &Vector<D>,
+        lengths: &Vector<D>,
+        layers: &[usize; D],
+    ) -> (Vec<Vector<D>>, Vec<Vector<D>>) {
+        let (mut inside, mut around) = (Vec::with_capacity(self.count() as usize), Vec::new());
+        let counts: [usize; D] = std::array::from_fn(|d| self.cells[d] + 2 * layers[d]);
+        for k in 0..counts.iter().product::<usize>() {
+            let cell = indices(k, &counts);
+            let is_inside = (0..D).all(|d| (layers[d]..layers[d] + self.cells[d]).contains(&cell[d]));
+            let positions = if is_inside { &mut inside } else { &mut around };
             for part in self.basis {
-                let mut rest = k;
                 positions.push(Vector::<D>::from_fn(|d, _| {
-                    let index = rest % self.cells[d];
-                    rest /= self.cells[d];
-                    low[d] + (index as f64 + part[d]) * lengths[d] / self.cells[d] as f64
+                    low[d] + (cell[d] as f64 - layers[d] as f64 + part[d]) * lengths[d] / self.cells[d] as f64
                 }));
             }
         }
-        positions
+        (inside, around)
     }
 }
 
@@ -78,7 +91,8 @@ mod tests {
     fn nearest<const D: usize>(word: LatticeWord, cells: [f64; D]) -> (f64, usize, f64) {
         let lengths = Vector::<D>::from(cells);
         let lattice = StartLattice::new(word, &lengths, 1.0, 1e9);
-        let positions = lattice.positions(&Vector::<D>::zeros(), &lengths);
+        let (positions, around) = lattice.positions(&Vector::<D>::zeros(), &lengths, &[0; D]);
+        assert!(around.is_empty());
         assert_eq!(positions.len() as f64, lattice.count());
         let wrap = |x: Vector<D>| Vector::<D>::from_fn(|d, _| x[d] - (x[d] / lengths[d]).round() * lengths[d]);
         let mut distances: Vec<f64> = positions[1..].iter().map(|x| wrap(x - positions[0]).norm()).collect();

@@ -1,7 +1,7 @@
 //! Signed distances of the particles at the start from the drop, and their velocities.
 
 use super::own_motion::StartMotion;
-use super::plan::{DropletScene, RATIO, check_size, domain_of};
+use super::plan::{DropletScene, RATIO, check_size};
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
@@ -21,7 +21,9 @@ impl<const D: usize> DropletScene<D> {
         let room = (0.0, self.spec.spacing);
         let surface = self.shape.surface_at_build(self.surface.as_ref(), &context.clouds, room)?;
         let whole = surface.as_ref().map(|surface| surface.whole.as_ref());
-        match whole.and_then(|whole| check_size(whole, &self.lengths(), &self.shape)) {
+        let corners = self.spec.domain.as_ref();
+        let too_large = |whole| check_size(whole, (&self.room, corners?), &self.shape);
+        match whole.and_then(too_large) {
             Some(violation) => Err(vec![violation]),
             None => Ok(surface),
         }
@@ -36,6 +38,8 @@ impl<const D: usize> DropletScene<D> {
                 let turns = Vector::<D>::from_fn(|d, _| (image / 3_usize.pow(d as u32) % 3) as f64 - 1.0);
                 turns.component_mul(&lengths)
             })
+            // A wall has no images behind it.
+            .filter(|image: &Vector<D>| (0..D).all(|d| image[d] == 0.0 || !self.room.is_bounded(d)))
             .collect();
         positions
             .par_iter()
@@ -79,7 +83,7 @@ impl<const D: usize> DropletScene<D> {
         if let Some(found) = cloud::check_spacing(&points, self.config.spacing) {
             return Err(found);
         }
-        let domain = domain_of(&self.low, &self.lengths());
+        let domain = self.room.domain();
         let points: Vec<Vector<D>> = points.iter().map(|x| domain.wrap(*x)).collect();
         let method = match &self.config.geometry {
             Geometry::Pcp { method, .. } => method.clone(),

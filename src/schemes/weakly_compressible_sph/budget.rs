@@ -5,6 +5,7 @@ use super::smoothed_delta::smoothed_delta;
 use super::species::Species;
 use super::system::SphSystem;
 use super::varying_tension::VaryingTension;
+use super::walls::{WallSupply, Walls};
 use crate::geometry::Vector;
 use crate::simulation::section::known;
 use crate::simulation::{Component, LoadError, Region, Section, StepError};
@@ -19,7 +20,7 @@ pub(super) struct Contents<const D: usize> {
     pub elastic: f64,
     /// Perimeter or surface area, Σ V δ(φ); NaN without a level set.
     pub interface: f64,
-    /// Energy of the interface: τ times it, or the integral of what varies.
+    /// Energy of the interface, τ times it or the integral of what varies, and of the walls that drops cover.
     pub surface: f64,
     /// Σ m u.
     pub momentum: Vector<D>,
@@ -51,6 +52,7 @@ impl<const D: usize> SphSystem<D> {
         };
         let constant = self.config.tension * contents.interface;
         contents.surface = self.varying.as_ref().map_or(constant, VaryingTension::surface_energy);
+        contents.surface += self.wetting_energy();
         for (i, u) in flow.velocity.iter().enumerate() {
             let mass = flow.mass(i);
             contents.mass += mass;
@@ -92,7 +94,8 @@ impl<const D: usize> SphSystem<D> {
         near.map(|i| self.flow.volume[*i] * smoothed_delta(phi[*i], self.config.smoothing_length)).sum()
     }
 
-    /// Power Σ m a·u and sum Σ m a of what comes from outside at a time: the body force, and what keeps up a slope of the tension.
+    /// Power Σ m a·u and sum Σ m a of what comes from outside at a time: the body force, walls, and what keeps up a slope of the
+    /// tension.
     pub(super) fn body_force_sums(&self, time: f64) -> (f64, Vector<D>) {
         let mut sums = (0.0, Vector::<D>::zeros());
         if let Some(force) = &self.config.body_force {
@@ -105,6 +108,10 @@ impl<const D: usize> SphSystem<D> {
         }
         if let Some(varying) = &self.varying {
             sums.0 += varying.supplied_power(&self.flow.velocity);
+        }
+        if let Some(WallSupply { power, force }) = self.walls.as_ref().map(Walls::supply) {
+            sums.0 += power;
+            sums.1 += force + self.held_by_walls(&self.moment(time));
         }
         sums
     }
@@ -138,9 +145,9 @@ pub(super) struct Budget<const D: usize> {
     pub start_surface: f64,
     /// Enclosed area or volume at the first measurement; NaN before.
     pub start_measure: f64,
-    /// Work of the body force and of what keeps up a slope of the tension, ∫ Σ m a·u dt by trapezoids.
+    /// Work of the body force, of moving walls and of what keeps up a slope of the tension, ∫ Σ m a·u dt by trapezoids.
     pub work: f64,
-    /// ∫ Σ m a dt of the body force by trapezoids.
+    /// ∫ Σ m a dt of the body force and of walls by trapezoids.
     pub impulse: Vector<D>,
     /// Work of surface tension, ∫ Σ m a·u dt by trapezoids.
     pub tension_work: f64,

@@ -36,6 +36,8 @@ pub(super) struct Limits {
     pub mach_doubt: f64,
     /// Work of surface tension at rest in a capillary time √(ρR³/τ), by the surface energy.
     pub creep: f64,
+    /// Distance in h of a particle behind a wall.
+    pub wall_depth: f64,
     /// A run is at rest for the check of creep below this share of kinetic by surface energy.
     pub rest: f64,
 }
@@ -55,8 +57,12 @@ pub(super) const LIMITS: Limits = Limits {
     strays: 1e-2,
     mach_doubt: 0.3,
     creep: 2e-6,
+    wall_depth: 0.5,
     rest: 1e-4,
 };
+
+/// Name of the check that no particle leaves through a wall.
+pub(super) const WALL_DEPTH: &str = "wall_depth";
 
 /// A watched invariant.
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,9 @@ use super::kernel_choice::KernelChoice;
 use super::level_update::LevelUpdate;
 use super::species::Fluids;
 use super::standing_wave::StandingWave;
+use super::steady_flow::SteadyFlow;
 use super::tension_law::TensionLaw;
+use super::walls::Container;
 use crate::closest_point::PcpMethod;
 use crate::geometry::Vector;
 use crate::operators::Support;
@@ -127,6 +129,14 @@ pub struct SphConfig<const D: usize> {
     pub pressure: PressureConfig,
     /// Whether particles are shifted towards an even distribution (PCP eqs. B.15, B.16).
     pub is_shifted: bool,
+    /// The walls; None in a box that is periodic along every axis.
+    pub container: Option<Container<D>>,
+    /// Whether the fluids are flat layers at the start.
+    pub starts_in_layers: bool,
+    /// The steady flow that layers between walls come to.
+    pub steady_flow: Option<SteadyFlow<D>>,
+    /// A background pressure that keeps the pressures of fluids which rest on walls positive.
+    pub hydrostatic_pressure: f64,
     /// A force from outside.
     pub body_force: Option<BodyForce<D>>,
     /// The time integrator.

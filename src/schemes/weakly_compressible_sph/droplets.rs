@@ -1,6 +1,7 @@
 //! Droplets: the connected components of the fluid inside, and the curvature that each would have as a ball.
 
 use super::species::Species;
+use super::walls::Container;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use std::f64::consts::PI;
@@ -14,9 +15,11 @@ struct Tuning {
     smallest: [usize; 2],
     /// The most droplets that are told apart, since a label is one byte; further components count as fragments.
     most: usize,
+    /// Distance from a wall, in h, within which a particle touches it.
+    contact: f64,
 }
 
-const TUNING: Tuning = Tuning { link: 1.5, smallest: [12, 40], most: 250 };
+const TUNING: Tuning = Tuning { link: 1.5, smallest: [12, 40], most: 250, contact: 1.0 };
 
 /// The label of particles that belong to no droplet: fragments, and particles far from any droplet.
 pub(super) const FRAGMENT: u8 = u8::MAX;
@@ -33,6 +36,8 @@ pub(super) struct Droplets<const D: usize> {
     sizes: Vec<usize>,
     /// Whether each is a layer: it reaches across the box and has no curvature as a ball.
     is_layer: Vec<bool>,
+    /// The contact angle of each that touches a wall.
+    contacts: Vec<Option<f64>>,
     /// The area or volume that was enclosed at the start.
     pub initial_measure: f64,
 }
@@ -48,6 +53,7 @@ pub(super) struct Searched<'a, const D: usize> {
     pub spacing: f64,
     /// Distance up to which a particle takes the label of a droplet.
     pub cutoff: f64,
+    pub container: Option<&'a Container<D>>,
 }
 
 impl<const D: usize> Droplets<D> {
@@ -59,6 +65,7 @@ impl<const D: usize> Droplets<D> {
             ball_curvatures: Vec::new(),
             sizes: Vec::new(),
             is_layer: Vec::new(),
+            contacts: Vec::new(),
             initial_measure,
         }
     }
@@ -72,27 +79,69 @@ impl<const D: usize> Droplets<D> {
     /// measure that was enclosed at the start.
     pub fn count(&mut self, searched: &Searched<'_, D>) -> Option<usize> {
         let (sizes, is_layer) = self.components.find(searched, &mut self.label);
+        let (sizes, is_layer) = (sizes.to_vec(), is_layer.to_vec());
+        let contacts = self.find_contacts(searched, sizes.len());
+        let before = self.number();
         let were_layers = self.ball_curvatures.iter().map(|kappa| *kappa == 0.0);
-        if sizes.len() == self.ball_curvatures.len() && were_layers.eq(is_layer.iter().copied()) {
+        let is_same = sizes.len() == before && were_layers.eq(is_layer.iter().copied());
+        if is_same && contacts == self.contacts {
             return None;
         }
-        self.sizes.clear();
-        self.sizes.extend_from_slice(sizes);
-        self.is_layer.clear();
-        self.is_layer.extend_from_slice(is_layer);
+        let is_touching = is_same && !self.contacts.is_empty();
+        (self.sizes, self.is_layer, self.contacts) = (sizes, is_layer, contacts);
         self.renew_ball_curvatures();
-        Some(self.number())
+        // A drop that comes to a wall or leaves it stays one.
+        (!is_touching).then(|| self.number())
+    }
+
+    /// The contact angles of droplets that touch a wall; empty without walls.
+    fn find_contacts(&self, searched: &Searched<'_, D>, droplets: usize) -> Vec<Option<f64>> {
+        let Some(container) = searched.container else { return Vec::new() };
+        let mut contacts = vec![None; droplets];
+        for i in self.components.inside.iter().copied() {
+            let Some(contact) = contacts.get_mut(usize::from(self.label[i])) else { continue };
+            let beside = container.beside(&searched.positions[i]);
+            if let Some(beside) = beside.filter(|beside| beside.distance < TUNING.contact * searched.spacing) {
+                *contact = Some(container.wall(beside.wall).contact.mean());
+            }
+        }
+        contacts
+    }
+
+    /// Whether the droplet that a particle belongs to touches a wall.
+    pub fn is_at_wall(&self, i: usize) -> bool {
+        let droplet = if self.number() > 1 { usize::from(self.label[i]) } else { 0 };
+        self.contacts.get(droplet).is_some_and(Option::is_some)
+    }
+
+    /// The contact angles for a checkpoint; −1 for a droplet at no wall.
+    pub fn saved_contacts(&self) -> Vec<f64> {
+        self.contacts.iter().map(|angle| angle.unwrap_or(-1.0)).collect()
+    }
+
+    /// Loads what [`Self::saved_contacts`] gave.
+    pub fn load_contacts(&mut self, saved: &[f64]) {
+        self.contacts = saved.iter().map(|angle| (*angle >= 0.0).then_some(*angle)).collect();
+    }
+
+    /// Whether any droplet touches a wall.
+    pub fn has_contact(&self) -> bool {
+        self.contacts.iter().any(Option::is_some)
     }
 
     /// Sets κ₀ of each droplet to that of its share of the measure that was enclosed at the start.
     pub fn renew_ball_curvatures(&mut self) {
         let all = self.sizes.iter().sum::<usize>().max(1) as f64;
         self.ball_curvatures.clear();
-        let share = |(size, is_layer): (&usize, &bool)| match is_layer {
-            true => 0.0,
-            false => ball_curvature::<D>(self.initial_measure * *size as f64 / all),
+        let share = |(k, (size, is_layer)): (usize, (&usize, &bool))| {
+            let measure = self.initial_measure * *size as f64 / all;
+            match (is_layer, self.contacts.get(k).copied().flatten()) {
+                (true, _) => 0.0,
+                (false, None) => ball_curvature::<D>(measure),
+                (false, Some(angle)) => cap_curvature::<D>(measure, angle),
+            }
         };
-        self.ball_curvatures.extend(self.sizes.iter().zip(&self.is_layer).map(share));
+        self.ball_curvatures.extend(self.sizes.iter().zip(&self.is_layer).enumerate().map(share));
     }
 
     /// Number of groups that sums over droplets have: one, or one for each label where there are several.
@@ -238,9 +287,25 @@ pub fn ball_curvature<const D: usize>(measure: f64) -> f64 {
     if D == 2 { (PI / measure).sqrt() } else { 2.0 * (4.0 * PI / (3.0 * measure)).cbrt() }
 }
 
+/// The least angle for which a cap is curved: a film on a wall has no curvature.
+const LEAST_ANGLE: f64 = 0.1;
+
+/// The curvature of a cap of a given area or volume that meets a wall at an angle: the ball's times a root of the share of the ball
+/// that the cap is, (θ − sin θ cos θ)/π in the plane and (2 + cos θ)(1 − cos θ)²/4 in space.
+fn cap_curvature<const D: usize>(measure: f64, angle: f64) -> f64 {
+    let angle = angle.clamp(LEAST_ANGLE, PI);
+    let (sine, cosine) = angle.sin_cos();
+    let share = if D == 2 {
+        (angle - sine * cosine) / PI
+    } else {
+        0.25 * (2.0 + cosine) * (1.0 - cosine) * (1.0 - cosine)
+    };
+    ball_curvature::<D>(measure) * share.powf(1.0 / D as f64)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Domain, Droplets, FRAGMENT, Searched, Species, Vector, ball_curvature};
+    use super::{Domain, Droplets, FRAGMENT, Searched, Species, Vector, ball_curvature, cap_curvature};
     use crate::geometry::domain::Axis;
 
     #[test]
@@ -255,7 +320,7 @@ mod tests {
             positions.iter().map(|x| if is_inside(x) { Species::Inside } else { Species::Outside }).collect();
         let all: Vec<usize> = (0..400).collect();
         let mut droplets = Droplets::new(domain.clone(), 400, 30.0);
-        let searched = Searched { positions: &positions, species: &species, near: &all, spacing: 1.0, cutoff: 3.0 };
+        let searched = Searched { positions: &positions, species: &species, near: &all, spacing: 1.0, cutoff: 3.0, container: None };
         assert_eq!(droplets.count(&searched), Some(2));
         assert_eq!(droplets.count(&searched), None, "their number has not changed");
         let at = |x: usize, y: usize| droplets.label[x + 20 * y];
@@ -282,7 +347,7 @@ mod tests {
         let pool = by(&|x| x[1] < 5.0 || is_drop(x));
         let inside = pool.iter().filter(|species| **species == Species::Inside).count();
         let mut droplets = Droplets::new(domain, 400, inside as f64);
-        let searched = |species| Searched { positions: &positions, species, near: &all, spacing: 1.0, cutoff: 3.0 };
+        let searched = |species| Searched { positions: &positions, species, near: &all, spacing: 1.0, cutoff: 3.0, container: None };
         assert_eq!(droplets.count(&searched(&pool)), Some(2));
         assert!(droplets.has_layer() && droplets.ball_curvatures[0] == 0.0);
         // The drop has the curvature of its own particles.
@@ -292,6 +357,15 @@ mod tests {
         let layers = by(&|x| x[1] < 5.0 || (x[1] - 13.0).abs() < 1.0);
         assert_eq!(droplets.count(&searched(&layers)), Some(2), "a layer is no drop");
         assert!(droplets.ball_curvatures.iter().all(|kappa| *kappa == 0.0));
+    }
+
+    #[test]
+    fn caps_have_the_curvature_of_their_angle() {
+        let pi = std::f64::consts::PI;
+        // Half a disk and half a ball of radius 2, and whole ones.
+        assert!((cap_curvature::<2>(2.0 * pi, 0.5 * pi) - 0.5).abs() < 1e-14);
+        assert!((cap_curvature::<3>(16.0 / 3.0 * pi, 0.5 * pi) - 1.0).abs() < 1e-14);
+        assert!((cap_curvature::<3>(32.0 / 3.0 * pi, pi) - 1.0).abs() < 1e-14);
     }
 
     #[test]

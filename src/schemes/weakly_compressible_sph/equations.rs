@@ -4,6 +4,7 @@ use super::config::{DensityMethod, Discretization, PressureForm, SphConfig};
 use super::dcpse::DcpseFlow;
 use super::flow_state::{FlowState, Rates};
 use super::pair_workspace::PairWorkspace;
+use super::walls::Walls;
 use super::{mass_form, volume_form};
 use crate::geometry::{Domain, Vector};
 use crate::parallel::{Interrupt, Interrupted};
@@ -50,17 +51,20 @@ impl<const D: usize> FlowEquations<D> {
         }
     }
 
-    /// Sets accelerations, and rates of integrated densities, to those of the interactions between particles.
+    /// Sets accelerations, and rates of integrated densities, to those of the interactions between particles. Walls go with the
+    /// volume form alone.
     pub fn find_rates(
         &mut self,
         positions: &[Vector<D>],
-        flow: &FlowState<D>,
+        (flow, walls): (&FlowState<D>, Option<&mut Walls<D>>),
         pairs: &mut PairWorkspace<D>,
         rates: &mut Rates<D>,
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         match self {
-            Self::VolumeForm { pressure } => volume_form::accelerate(flow, *pressure, pairs, &mut rates.acceleration),
+            Self::VolumeForm { pressure } => {
+                volume_form::accelerate(flow, walls, *pressure, pairs, &mut rates.acceleration)
+            }
             Self::MassForm { diffusion } => mass_form::find_rates(flow, *diffusion, pairs, rates),
             Self::Fits { fits, spread } => fits.find_rates(positions, flow, *spread, rates, interrupt),
         }

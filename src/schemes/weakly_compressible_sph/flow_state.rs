@@ -22,6 +22,8 @@ pub(super) struct FlowState<const D: usize> {
     pub pressure: Vec<f64>,
     /// The factor a of volumes by summation, V_i = a/Σ_j W_ij.
     pub calibration: f64,
+    /// The factor of viscosities that makes the sums over pairs exact on the lattice of the start; 1 where it is not found.
+    pub viscosity_factor: f64,
     /// The background pressure p_b, the same for both fluids.
     pub background: f64,
     /// Pressures of the bulk damping; empty without it.
@@ -50,6 +52,7 @@ impl<const D: usize> FlowState<D> {
             volume: vec![cell; count],
             pressure: vec![0.0; count],
             calibration: 1.0,
+            viscosity_factor: 1.0,
             background: 0.0,
             bulk_pressure: Vec::new(),
             last_volume: Vec::new(),

@@ -28,6 +28,13 @@ impl Fluid {
         self.sound_speed * self.sound_speed * self.density / self.polytropic * (power - 1.0)
     }
 
+    /// The density at a pressure: the inverse of [`Self::pressure`].
+    #[must_use]
+    pub fn density_at(&self, pressure: f64) -> f64 {
+        let stiffness = self.sound_speed * self.sound_speed * self.density / self.polytropic;
+        self.density * (1.0 + pressure / stiffness).max(0.0).powf(1.0 / self.polytropic)
+    }
+
     /// The elastic energy of a unit of mass at a density, e = ∫ P/ρ² dρ from ρ₀:
     /// c²/γ ((x^(γ−1) − 1)/(γ − 1) + 1/x − 1) with x = ρ/ρ₀.
     #[must_use]
@@ -53,6 +60,7 @@ mod tests {
         for polytropic in [1.0, 1.4, 7.0] {
             let fluid = Fluid { density: 1.3, viscosity: 0.5, sound_speed: 20.0, polytropic };
             assert_eq!(fluid.pressure(1.3), 0.0);
+            assert!((fluid.density_at(fluid.pressure(1.42)) - 1.42).abs() < 1e-12);
             let slope = (fluid.pressure(1.3 + 1e-6) - fluid.pressure(1.3 - 1e-6)) / 2e-6;
             assert!((slope - 400.0).abs() < 1e-3, "{slope}");
             assert_eq!(fluid.elastic_energy(1.3), 0.0);

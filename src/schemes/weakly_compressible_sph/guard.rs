@@ -8,6 +8,7 @@ use super::energy_rise::EnergyRise;
 use super::interactions::TensionForce;
 use super::species::Species;
 use super::system::SphSystem;
+use super::walls::Container;
 use crate::geometry::Vector;
 use crate::schemes::measured_errors::entry;
 use crate::simulation::section::known;
@@ -138,8 +139,8 @@ impl<const D: usize> Guard<D> {
     /// Work of surface tension since the drop came to rest, beyond that of the shrinking interface, in a capillary time
     /// √(ρR³/τ) by the surface energy at the start; NaN in motion, and for the first capillary time of rest.
     fn creep(&mut self, system: &SphSystem<D>, contents: &Contents<D>, time: f64) -> f64 {
-        if system.varying.is_some() {
-            // A slope works, and a surfactant spreads.
+        if system.varying.is_some() || system.droplets.has_contact() {
+            // A slope works, a surfactant spreads, and so does a drop on a wall.
             return f64::NAN;
         }
         let tension = system.config.tension;
@@ -167,6 +168,8 @@ impl<const D: usize> Guard<D> {
             && system.interface.level_set().is_some()
             && !config.is_density_integrated()
             && config.discretization == Discretization::Kernels
+            // A line that rests between two angles has no energy.
+            && !config.container.iter().flat_map(Container::walls).any(|wall| wall.contact.has_hysteresis())
             // The impulse of another integrator is not the trapezoidal rule.
             && config.integrator == Integrator::KickDriftKick
             && !config.is_shifted

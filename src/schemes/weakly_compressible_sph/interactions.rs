@@ -8,6 +8,7 @@
 //! | viscosity, volume form and mass form | pairs | [`viscosity`] |
 //! | shifting | pairs | [`shifting`] |
 //! | surface tension | particles | [`surface_tension`] |
+//! | contact lines at walls | particles | [`contact_line`] |
 //! | body force | particles | [`body_force`] |
 //!
 //! Terms on pairs are combined at compile time into a form of the momentum equation: a tuple of [`PairTerm`]s is a term again.
@@ -15,6 +16,7 @@
 //! so itself ([`LimitsStep`]).
 
 pub mod body_force;
+pub mod contact_line;
 pub mod continuity;
 pub mod density_summation;
 pub mod mass_pair;

@@ -5,7 +5,8 @@ use super::quantities;
 use super::smoothed_delta::{smoothed_delta, smoothed_step};
 use super::species::Species;
 use super::system::SphSystem;
-use crate::closest_point::enclosed_moments::{EnclosedMoments, enclosed_moments};
+use super::walls::Container;
+use crate::closest_point::enclosed_moments::{Bounds, EnclosedMoments, enclosed_moments};
 use crate::geometry::Vector;
 use crate::geometry::domain::Axis;
 use crate::neighbors::{CellList, NeighborSearch};
@@ -108,7 +109,16 @@ impl<const D: usize> SphSystem<D> {
         let Some(interface) = self.interface.level_set() else { return Ok(None) };
         let center = self.circular_center(&interface.surface.sample_points());
         let unwrap = |x: &Vector<D>| center + self.domain.displacement(&center, x);
-        enclosed_moments(&interface.surface, unwrap, &self.interrupt).map(Some)
+        enclosed_moments(&interface.surface, unwrap, &self.bounds(), &self.interrupt).map(Some)
+    }
+
+    /// The space between the walls.
+    fn bounds(&self) -> Bounds<D> {
+        let of_walls = |container: &Container<D>| {
+            let (low, high) = container.bounds();
+            Bounds { low, high }
+        };
+        self.config.container.as_ref().map_or_else(Bounds::none, of_walls)
     }
 
     /// A center from which nothing is cut: along periodic axes opposite to the widest gap between points.

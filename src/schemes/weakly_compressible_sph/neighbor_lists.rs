@@ -11,34 +11,49 @@ pub(super) struct NeighborLists<const D: usize> {
     domain: Domain<D>,
     pub pencils: Pencils<D>,
     skin: f64,
-    /// Positions of the particles when the lists were made.
-    pub reference: Vec<Vector<D>>,
+    /// Positions of the particles when the lists were made, then those of points that stay where they are.
+    reference: Vec<Vector<D>>,
+    /// Number of the particles.
+    count: usize,
 }
 
 impl<const D: usize> NeighborLists<D> {
-    /// Empty lists for `count` particles. The lists cover `cutoff`, which includes the skin.
+    /// Empty lists for `count` particles and, numbered behind them, fixed points. The lists cover `cutoff`, which includes the
+    /// skin.
     ///
     /// # Errors
     /// [`BoxTooSmall`].
-    pub fn new(domain: &Domain<D>, cutoff: f64, skin: f64, count: usize) -> Result<Self, BoxTooSmall> {
-        Ok(Self {
-            domain: domain.clone(),
-            pencils: Pencils::new(domain, cutoff)?,
-            skin,
-            reference: vec![Vector::<D>::zeros(); count],
-        })
+    pub fn new(
+        domain: &Domain<D>,
+        (cutoff, skin): (f64, f64),
+        count: usize,
+        fixed: impl Iterator<Item = Vector<D>>,
+    ) -> Result<Self, BoxTooSmall> {
+        let mut reference = vec![Vector::<D>::zeros(); count];
+        reference.extend(fixed);
+        Ok(Self { domain: domain.clone(), pencils: Pencils::new(domain, cutoff)?, skin, reference, count })
+    }
+
+    /// Positions of the particles when the lists were made.
+    pub fn reference(&self) -> &[Vector<D>] {
+        &self.reference[..self.count]
+    }
+
+    /// The same, to be set by a restart.
+    pub fn reference_mut(&mut self) -> &mut [Vector<D>] {
+        &mut self.reference[..self.count]
     }
 
     /// Whether the lists may miss a neighbor: there are none, or a particle has moved by half of the skin.
     pub fn are_stale(&self, positions: &[Vector<D>]) -> bool {
         let most = 0.25 * self.skin * self.skin;
         let has_moved = |(x, from)| self.domain.displacement(from, x).norm_squared() > most;
-        self.pencils.slot_count() == 0 || positions.iter().zip(&self.reference).any(has_moved)
+        self.pencils.slot_count() == 0 || positions.iter().zip(self.reference()).any(has_moved)
     }
 
     /// Makes the lists of new positions.
     pub fn rebuild(&mut self, positions: &[Vector<D>], interrupt: &Interrupt) -> Result<(), Interrupted> {
-        self.reference.copy_from_slice(positions);
+        self.reference_mut().copy_from_slice(positions);
         self.rebuild_from_reference(interrupt)
     }
 
@@ -47,10 +62,11 @@ impl<const D: usize> NeighborLists<D> {
         self.pencils.rebuild(&self.reference, interrupt)
     }
 
-    /// The position of a particle at the period of its reference position, whatever period it has been wrapped to since.
-    pub fn unwrapped(&self, i: usize, position: &Vector<D>) -> Vector<D> {
+    /// The position of a particle at the period of its reference position, whatever period it has been wrapped to since; that of
+    /// a fixed point.
+    pub fn unwrapped(&self, i: usize, positions: &[Vector<D>]) -> Vector<D> {
         let from = &self.reference[i];
-        from + self.domain.displacement(from, position)
+        positions.get(i).map_or(*from, |position| from + self.domain.displacement(from, position))
     }
 }
 
@@ -72,8 +88,8 @@ mod tests {
             let mut moved = this.positions.clone();
             moved[7] = this.domain.wrap(moved[7] - Vector::<2>::new(share * this.config.skin(), 0.0));
             assert_eq!(lists.are_stale(&moved), is_stale);
-            let unwrapped = lists.unwrapped(7, &moved[7]);
-            assert!((unwrapped - lists.reference[7]).norm() < this.config.skin());
+            let unwrapped = lists.unwrapped(7, &moved);
+            assert!((unwrapped - lists.reference()[7]).norm() < this.config.skin());
         }
     }
 }

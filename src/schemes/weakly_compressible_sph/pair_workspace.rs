@@ -87,7 +87,7 @@ impl<const D: usize> PairWorkspace<D> {
     pub fn gather_positions(&mut self, positions: &[Vector<D>]) {
         let (lists, inverse) = (&self.lists, 1.0 / self.kernel.smoothing_length);
         for (d, column) in self.positions.iter_mut().enumerate() {
-            column.refill(lists.pencils.by_slot(FAR, |i| lists.unwrapped(i, &positions[i])[d] * inverse));
+            column.refill(lists.pencils.by_slot(FAR, |i| lists.unwrapped(i, positions)[d] * inverse));
         }
     }
 

@@ -30,6 +30,13 @@ quantities! {
         PRESSURE_JUMP_MEASURED = "pressure_jump_measured", "mass/(length*time^2)", "Jump of the pressure as particles have it: by the equation of state, and what the force of surface tension takes over summed over the particles.";
         PRESSURE_BALANCED = "pressure_balanced", "mass/(length*time^2)", "Jump tau kappa_0, with the mean tension of the droplet, that the balanced force takes out of the pressure.";
         PRESSURE_INSIDE_COUNT = "pressure_inside_count", "particles", "Particles over which the pressure inside is a mean.";
+        RISE_VELOCITY = "rise_velocity", "length/time", "Mean velocity of the fluid inside against a constant body force.";
+        RISE_HEIGHT = "rise_height", "length", "Mean place of the fluid inside against a constant body force, between walls.";
+        WETTED = "wetted", "length^(D-1)", "Length or area of the walls that the fluid inside covers.";
+        CONTACT_ANGLE = "contact_angle", "degrees", "Mean angle between interface and walls, measured in the fluid inside.";
+        CONTACT_LOW = "contact_low", "length", "Place along x of the contact line that faces low x, in the plane.";
+        CONTACT_WIDTH = "contact_width", "length", "Width between the contact lines of a drop on a wall, in the plane.";
+        CONTACT_HIGH = "contact_high", "length", "Place along x of the contact line that faces high x, in the plane.";
         WAVE_AMPLITUDE = "wave_amplitude", "length", "Amplitude of the wave on the sides of a layer.";
         TENSION_MIN = "tension_min", "", "Least surface tension on the interface, by that of the scene.";
         TENSION_MAX = "tension_max", "", "Largest surface tension on the interface, by that of the scene.";
@@ -68,6 +75,8 @@ quantities! {
         RATIO = "ratio", "", "Mean of the last third of the run by that of the middle third.";
         FREQUENCY = "frequency", "1/time", "Angular frequency of the oscillation.";
         DECAY = "decay", "1/time", "Rate of decay of the oscillation.";
+        LEAST = "least", "of the quantity", "Least value of the run, no error.";
+        BY_GRAVITY = "by_gravity", "", "Largest value of the run by sqrt(g H) of the height between walls.";
         COUNT = "count", "", "Number of items, no error.";
         ZERO_1 = "zero_1", "time", "First time at which the quantity passed zero.";
         ZERO_2 = "zero_2", "time", "Second time at which the quantity passed zero.";

@@ -16,6 +16,7 @@ impl<const D: usize> SphSystem<D> {
         state.put_section("pressure", |section| {
             section.put_real("calibration", self.flow.calibration);
             section.put_real("background", self.flow.background);
+            section.put_real("viscosity_factor", self.flow.viscosity_factor);
             section.put_reals("last_volume", &self.flow.last_volume);
         });
         state.put_section("particles", |section| {
@@ -23,13 +24,14 @@ impl<const D: usize> SphSystem<D> {
             section.put_counts("phase", self.flow.species.iter().map(|species| u64::from(species.code())));
             section.put_vectors("velocity", &self.flow.velocity);
             section.put_vectors("acceleration", &self.rates.acceleration);
-            section.put_vectors("reference", &self.pairs.lists.reference);
+            section.put_vectors("reference", self.pairs.lists.reference());
             section.put_reals("density", &self.flow.density);
             section.put_reals("density_rate", &self.rates.density);
         });
         state.put_section("droplets", |section| {
             section.put_flags("droplet", &self.droplets.label);
             section.put_reals("ball_curvatures", &self.droplets.ball_curvatures);
+            section.put_reals("contacts", &self.droplets.saved_contacts());
             section.put_optional("initial_measure", known(self.droplets.initial_measure));
         });
         if let Some(level_set) = self.interface.level_set() {
@@ -68,12 +70,14 @@ impl<const D: usize> SphSystem<D> {
         // Version 0.2.0 had none of these.
         let lost = if state.has("lost_particles") { state.real("lost_particles")? as i64 } else { 0 };
         let waiting = if state.has("waiting_strays") { state.count("waiting_strays")? } else { 0 };
-        let (calibration, background, last_volume) = match state.has("pressure") {
+        let (calibration, viscosity_factor, background, last_volume) = match state.has("pressure") {
             true => state.section("pressure", |section| {
                 let last_volume = section.reals_of("last_volume", self.flow.last_volume.len())?.to_vec();
-                Ok((section.real("calibration")?, section.real("background")?, last_volume))
+                // Before there were walls, none was found.
+                let factor = if section.has("viscosity_factor") { section.real("viscosity_factor")? } else { 1.0 };
+                Ok((section.real("calibration")?, factor, section.real("background")?, last_volume))
             })?,
-            false => (1.0, 0.0, Vec::new()),
+            false => (1.0, 1.0, 0.0, Vec::new()),
         };
         state.section("particles", |section| check_columns(self, section))?;
         state.section("droplets", |section| check_droplets(self, section))?;
@@ -81,7 +85,8 @@ impl<const D: usize> SphSystem<D> {
         state.section("particles", |section| load_columns(self, section))?;
         state.section("droplets", |section| load_droplets(self, section))?;
         self.flow.species = species;
-        (self.flow.calibration, self.flow.background) = (calibration, background);
+        (self.flow.calibration, self.flow.viscosity_factor, self.flow.background) =
+            (calibration, viscosity_factor, background);
         self.flow.last_volume = last_volume;
         if let (Some((diagnostics, bounded, candidates, repair)), Some(level_set)) =
             (interface, self.interface.level_set_mut())
@@ -143,7 +148,7 @@ fn load_columns<const D: usize>(system: &mut SphSystem<D>, section: &Section) ->
     load_particles(&mut system.particles, section)?;
     copy_vectors(section.reals("velocity")?, &mut system.flow.velocity);
     copy_vectors(section.reals("acceleration")?, &mut system.rates.acceleration);
-    copy_vectors(section.reals("reference")?, &mut system.pairs.lists.reference);
+    copy_vectors(section.reals("reference")?, system.pairs.lists.reference_mut());
     system.flow.density.copy_from_slice(section.reals("density")?);
     system.rates.density.copy_from_slice(section.reals("density_rate")?);
     Ok(())
@@ -153,6 +158,9 @@ fn load_columns<const D: usize>(system: &mut SphSystem<D>, section: &Section) ->
 fn check_droplets<const D: usize>(system: &SphSystem<D>, section: &Section) -> Result<(), LoadError> {
     section.counts_of("droplet", system.droplets.label.len())?;
     section.reals("ball_curvatures")?;
+    if section.has("contacts") {
+        section.reals("contacts")?;
+    }
     section.optional("initial_measure").map(|_| ())
 }
 
@@ -160,6 +168,9 @@ fn check_droplets<const D: usize>(system: &SphSystem<D>, section: &Section) -> R
 fn load_droplets<const D: usize>(system: &mut SphSystem<D>, section: &Section) -> Result<(), LoadError> {
     copy_flags(section.counts("droplet")?, &mut system.droplets.label);
     system.droplets.ball_curvatures = section.reals("ball_curvatures")?.to_vec();
+    if section.has("contacts") {
+        system.droplets.load_contacts(section.reals("contacts")?);
+    }
     system.droplets.initial_measure = section.optional("initial_measure")?.unwrap_or(f64::NAN);
     Ok(())
 }

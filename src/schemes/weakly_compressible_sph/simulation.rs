@@ -1,11 +1,12 @@
 //! Two fluids step by step.
 
-use super::checks::LIMITS;
+use super::checks::{LIMITS, WALL_DEPTH};
 use super::diagnostics::diagnostics;
 use super::droplets::ball_curvature;
 use super::format_1;
 use super::frame_fields;
 use super::guard::Guard;
+use super::interactions::BodyForce;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
 use super::quantities::{TIME, TIME_STEP, WAVE_AMPLITUDE};
@@ -16,12 +17,13 @@ use super::tension_law::TensionLaw;
 use super::tension_record::TensionRecord;
 use super::time_step::{StepLimit, longest_step};
 use super::varying_tension::VaryingTension;
+use super::wall_record::WallRecord;
 use super::wave_record::WaveRecord;
 use crate::geometry::Vector;
 use crate::schemes::measured_errors::entry;
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
 use crate::simulation::{
-    Check, Course, CpuClock, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Region,
+    Check, Course, CpuClock, Divergence, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Region,
     Report, Section, Selection, Simulation, StepError,
 };
 use crate::time::clock::TIME_SLACK;
@@ -46,6 +48,7 @@ pub struct WeaklyCompressibleSph<const D: usize> {
     summary: Summary,
     wave: Option<WaveRecord>,
     tension: Option<TensionRecord<D>>,
+    walls: Option<WallRecord>,
     course: Course,
 }
 
@@ -70,6 +73,8 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let wave = system.config.wave.clone().map(WaveRecord::new);
         let has_surfactant = matches!(system.config.tension_law, Some(TensionLaw::Surfactant(_)));
         let tension = system.varying.as_ref().map(|_| TensionRecord::new(has_surfactant, end_time));
+        let direction = system.config.body_force.as_ref().and_then(BodyForce::constant_direction);
+        let walls = (system.walls.is_some() || direction.is_some()).then_some(WallRecord::UNKNOWN);
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
@@ -84,6 +89,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             summary: Summary::new(end_time),
             wave,
             tension,
+            walls,
             course: Course::new(pace, Phases::new(cpu_clock), method),
         };
         this.failure = this.begin().err();
@@ -106,7 +112,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             self.system.droplets.renew_ball_curvatures();
             self.system.evaluate(instant, &mut self.course.phases).map_err(|error| failed(error, start))?;
         }
-        if self.system.calibrate() {
+        if self.system.calibrate()? {
             self.system.evaluate(instant, &mut self.course.phases).map_err(|error| failed(error, start))?;
         }
         self.summary.droplets = self.system.droplets.number() as f64;
@@ -114,9 +120,12 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         self.take_row()
     }
 
-    /// κ₀ of one droplet that holds everything.
+    /// κ₀ of one droplet that holds everything, as a ball or, on a wall, as a cap.
     fn whole_curvature(&self) -> f64 {
-        ball_curvature::<D>(self.system.droplets.initial_measure)
+        match self.system.droplets.ball_curvatures.as_slice() {
+            [cap] if self.system.droplets.has_contact() => *cap,
+            _ => ball_curvature::<D>(self.system.droplets.initial_measure),
+        }
     }
 
     /// Mean tension over the interface.
@@ -164,6 +173,10 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         }
         if let (Some(record), Some(varying)) = (&mut self.tension, &self.system.varying) {
             record.take(&self.system, varying);
+        }
+        let circularity = self.row_value("circularity");
+        if let Some(walls) = &mut self.walls {
+            walls.take(&self.system, &self.system.moment(time), circularity);
         }
         if is_measured {
             self.summary.largest_speed = self.summary.largest_speed.max(self.system.flow.largest_relative_speed());
@@ -243,6 +256,17 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         first_broken(system.columns.find_broken(&system.particles), next)?;
         if let (Some(record), Some(varying)) = (&mut self.tension, &system.varying) {
             record.check_step(system, varying, next)?;
+        }
+        if let Some((_, depth)) = system.depth_in_walls().filter(|(_, depth)| *depth > LIMITS.wall_depth) {
+            let (value, limit, Clock { step, time }) = (depth, LIMITS.wall_depth, next);
+            return Err(StepError::CheckFailed {
+                check: WALL_DEPTH,
+                divergence: Divergence::Escaped,
+                value,
+                limit,
+                step,
+                time,
+            });
         }
         let largest_speed = system.flow.largest_speed();
         let Fastest { particle, speed, sound_speed } = fastest(system);
@@ -347,6 +371,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         row.extend(names(D).into_iter().zip(self.row.iter().copied()));
         row.extend(self.wave.as_ref().map(|wave| (&WAVE_AMPLITUDE, wave.amplitude)));
         row.extend(self.tension.iter().flat_map(TensionRecord::observables));
+        row.extend(self.walls.iter().flat_map(WallRecord::observables));
         row
     }
 
@@ -372,6 +397,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         }
         if let Some(tension) = &self.tension {
             state.put_section("tension", |section| tension.save(section));
+        }
+        if let Some(walls) = &self.walls {
+            state.put_component("walls", walls);
         }
     }
 
@@ -402,12 +430,17 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             Some(tension) => Some(state.section("tension", |section| tension.load(section))?),
             None => None,
         };
+        // Before there were walls, nothing was recorded of a fall either.
+        let walls = match self.walls {
+            Some(_) if state.has("walls") => Some(state.component("walls")?),
+            walls => walls,
+        };
         self.system.load(state)?;
         // 2. From here on nothing fails.
         // An interrupt ends the run before its next step.
         let _ = self.system.derive();
         self.guard = guard.unwrap_or_else(|| Guard::new(&self.system));
-        (self.failure, self.wave, self.tension) = (None, wave, tension);
+        (self.failure, self.wave, self.tension, self.walls) = (None, wave, tension, walls);
         (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
         (self.row, self.summary) = (row, summary.with_end(self.end_time));
         self.course.pace = pace;
@@ -434,6 +467,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         errors.extend(self.guard.energy_rise(&self.system, self.clock().time));
         errors.extend(self.tension.iter().flat_map(|record| record.errors(&self.system, measure, self.clock().time)));
         errors.extend(self.wave.iter().flat_map(|wave| wave.errors(self.clock().time)));
+        errors.extend(self.walls.iter().flat_map(|walls| walls.errors(&self.system, self.clock().time)));
         Report {
             errors,
             health: self.health(),
@@ -449,6 +483,8 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         let mut checks = vec![Check::at_most("mach", Some(speed / sound_speed), 1.0, "")];
         checks.extend(self.guard.checks(&self.system));
         checks.extend(self.tension.iter().flat_map(TensionRecord::checks));
+        let depth = self.system.depth_in_walls();
+        checks.extend(depth.map(|(_, depth)| Check::at_most(WALL_DEPTH, Some(depth), LIMITS.wall_depth, "spacings")));
         if self.system.interface.level_set().is_some() {
             checks.push(Check::watched(if D == 2 { "area_drift" } else { "volume_drift" }, volume_drift, ""));
             checks.push(Check::watched("absorbed_strays", Some(self.system.strays.absorbed as f64), "particles"));

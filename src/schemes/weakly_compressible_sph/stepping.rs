@@ -171,6 +171,7 @@ mod tests {
                     level: this.level.clone(),
                     velocities: None,
                     measure: 1.0,
+                    behind_walls: Vec::new(),
                 };
                 let mut system =
                     SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();

@@ -4,6 +4,7 @@ use super::config::{Geometry, PressureConfig, SphConfig, Volumes};
 use super::droplets::{Droplets, Searched};
 use super::equations::FlowEquations;
 use super::flow_state::{FlowState, Rates};
+use super::interactions::contact_line::ContactLines;
 use super::interactions::surface_tension::{BandForces, SurfaceTension};
 use super::interactions::{BodyForce, Moment, ParticleForce, TensionForce, density_summation, shifting};
 use super::interface::level_set::{Answering, LevelSetConfig};
@@ -15,6 +16,9 @@ use super::species::{Fluids, Species};
 use super::strays::Strays;
 use super::surfactant::Scales;
 use super::varying_tension::{Surroundings, VaryingTension};
+use super::volume_form::viscosity_share;
+use super::walls::Walls;
+use super::walls::level::Levels;
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
@@ -34,6 +38,8 @@ pub struct Drop<const D: usize> {
     pub velocities: Option<Vec<Vector<D>>>,
     /// The enclosed area or volume; NaN where it is not known.
     pub measure: f64,
+    /// Positions of the points behind walls.
+    pub behind_walls: Vec<Vector<D>>,
 }
 
 /// Two fluids.
@@ -46,6 +52,7 @@ pub struct SphSystem<const D: usize> {
     pub(super) particles: Particles<D>,
     pub(super) columns: SurfaceColumns,
     pub(super) flow: FlowState<D>,
+    pub(super) walls: Option<Walls<D>>,
     pub(super) pairs: PairWorkspace<D>,
     pub(super) interface: Interface<D>,
     pub(super) droplets: Droplets<D>,
@@ -57,6 +64,7 @@ pub struct SphSystem<const D: usize> {
     pub(super) band: BandForces<D>,
     /// Forces on particles, added in this order behind those of the band.
     forces: Vec<Box<dyn ParticleForce<D>>>,
+    pub(super) contact_lines: Option<ContactLines<D>>,
     pub(super) rates: Rates<D>,
     pub(super) interrupt: Interrupt,
 }
@@ -87,7 +95,12 @@ impl<const D: usize> SphSystem<D> {
         interrupt: Interrupt,
     ) -> Result<Self, BoxTooSmall> {
         let count = drop.positions.len();
-        let lists = NeighborLists::new(&domain, config.cutoff(), config.skin(), count)?;
+        let radius = config.kernel.support() * config.smoothing_length;
+        let walls = config.container.clone().map(|container| {
+            Walls::new(container, &drop.behind_walls, &domain, (radius, config.skin()), cell)
+        });
+        let fixed = walls.iter().flat_map(Walls::positions);
+        let lists = NeighborLists::new(&domain, (config.cutoff(), config.skin()), count, fixed)?;
         config.body_force = config.body_force.take().map(|force| balance(force, &config.fluids, &drop.level));
         let kernel = ScaledKernel::new(config.kernel, config.smoothing_length, D);
         let mut particles = Particles::new(drop.positions);
@@ -109,6 +122,12 @@ impl<const D: usize> SphSystem<D> {
         if let Some(force) = &config.body_force {
             forces.push(Box::new(force.clone()));
         }
+        let contact_lines = tension.zip(config.container.clone()).map(|(tension, container)| {
+            ContactLines::new(container, tension, config.tension, config.smoothing_length)
+        });
+        if let Some(lines) = &contact_lines {
+            forces.push(Box::new(lines.clone()));
+        }
         Ok(Self {
             flow: FlowState::in_motion(
                 config.fluids,
@@ -116,6 +135,7 @@ impl<const D: usize> SphSystem<D> {
                 &drop.level,
                 start_velocities(&config, &drop.velocities, count),
             ),
+            walls,
             pairs: PairWorkspace::new(lists, kernel, cell, interrupt.clone()),
             interface,
             droplets: Droplets::new(domain.clone(), count, drop.measure),
@@ -128,6 +148,7 @@ impl<const D: usize> SphSystem<D> {
             varying,
             band: BandForces::default(),
             forces,
+            contact_lines,
             config,
             domain,
             interrupt,
@@ -168,19 +189,27 @@ impl<const D: usize> SphSystem<D> {
             })?;
         }
         phases.measure("sph/momentum", || {
-            let Self { equations, particles, flow, pairs, rates, interrupt, .. } = self;
-            equations.find_rates(particles.positions(), flow, pairs, rates, interrupt)
+            let Self { equations, particles, flow, walls, pairs, rates, interrupt, config, .. } = self;
+            if let Some(walls) = walls {
+                walls.continue_flow(particles.positions(), flow, config.body_force.as_ref(), time);
+            }
+            equations.find_rates(particles.positions(), (flow, walls.as_mut()), pairs, rates, interrupt)
         })?;
         phases.measure("sph/tension", || self.add_forces(time));
         Ok(changed)
     }
 
     fn list_where_stale(&mut self, phases: &mut Phases) -> Result<bool, Interrupted> {
-        let Self { pairs, interface, particles, columns, strays, flow, config, .. } = self;
+        let Self { pairs, walls, interface, particles, columns, strays, flow, config, .. } = self;
         if !pairs.lists.are_stale(particles.positions()) {
             return Ok(false);
         }
-        phases.measure("neighbors", || pairs.list(particles.positions()))?;
+        phases.measure("neighbors", || {
+            if let Some(walls) = walls {
+                walls.list(particles.positions());
+            }
+            pairs.list(particles.positions())
+        })?;
         if let Interface::LevelSet(level_set) = interface {
             phases.measure("redistancing/detection", || level_set.select(particles, columns));
             if config.is_shifted && config.fluids.are_equal() {
@@ -201,7 +230,13 @@ impl<const D: usize> SphSystem<D> {
         phases: &mut Phases,
     ) -> Result<Option<usize>, EvaluationError> {
         if let Interface::LevelSet(level_set) = &mut self.interface {
-            level_set.rebuild(&self.particles, &self.columns, &self.interrupt, phases)?;
+            if let Some(walls) = &mut self.walls {
+                let level = self.particles.scalar(level_set.carried());
+                let (positions, reach) = (self.particles.positions(), level_set.keep());
+                walls.extend_level(Levels { positions, level, reach });
+            }
+            let extension = self.walls.as_ref().map(|walls| &walls.extension);
+            level_set.rebuild(&self.particles, &self.columns, extension, &self.interrupt, phases)?;
         }
         if self.config.is_shifted && may_shift {
             phases.measure("sph/shifting", || self.shift(elapsed))?;
@@ -217,15 +252,25 @@ impl<const D: usize> SphSystem<D> {
     /// Sets what pressures are measured by: the volumes of the start fill the box, and the background pressure follows from the
     /// curvature κ₀ of the smallest droplet. A layer has none; 2 by the shortest side of the box stands for it.
     ///
+    /// Between walls viscosities are calibrated, too: there friction decides the flow.
+    ///
     /// Returns whether anything changed, so that the rates have to be found again.
-    pub(super) fn calibrate(&mut self) -> bool {
+    pub(super) fn calibrate(&mut self) -> Result<bool, Interrupted> {
         let PressureConfig { volumes, background, .. } = self.config.pressure;
-        if self.config.is_density_integrated() || (volumes == Volumes::Plain && background <= 0.0) {
-            return false;
+        let has_background = background > 0.0 || self.config.hydrostatic_pressure > 0.0;
+        if self.config.is_density_integrated() || (volumes == Volumes::Plain && !has_background) {
+            return Ok(false);
         }
         if volumes == Volumes::Calibrated {
-            let filled: f64 = self.flow.volume.iter().sum();
-            self.flow.calibration *= self.flow.cell * self.flow.count() as f64 / filled;
+            let of_walls: &[f64] = self.walls.as_ref().map_or(&[], |walls| &walls.volume);
+            let filled: f64 = self.flow.volume.iter().chain(of_walls).sum();
+            self.flow.calibration *= self.flow.cell * (self.flow.count() + of_walls.len()) as f64 / filled;
+            if self.walls.is_some() {
+                // Volumes scale with the calibration, and so does the share.
+                self.sum_densities()?;
+                let share = viscosity_share(&self.flow, self.walls.as_ref(), &mut self.pairs)?;
+                self.flow.viscosity_factor = 1.0 / share;
+            }
         }
         let sides = self.domain.axes().iter().map(|axis| match axis {
             Axis::Unbounded => f64::INFINITY,
@@ -233,13 +278,16 @@ impl<const D: usize> SphSystem<D> {
         });
         let kappa = self.droplets.ball_curvatures.iter().copied().fold(0.0, f64::max);
         let kappa = if kappa > 0.0 { kappa } else { 2.0 / sides.fold(f64::INFINITY, f64::min) };
-        self.flow.background = background * self.config.tension * kappa;
-        true
+        self.flow.background = background * self.config.tension * kappa + self.config.hydrostatic_pressure;
+        Ok(true)
     }
 
     /// Everything that is derived from columns and not found again at every evaluation, as a restart needs it.
     pub(super) fn derive(&mut self) -> Result<(), Interrupted> {
         self.pairs.list_reference()?;
+        if let Some(walls) = &mut self.walls {
+            walls.list(self.pairs.lists.reference());
+        }
         if let Some(level_set) = self.interface.level_set_mut() {
             level_set.list_candidates();
         }
@@ -292,7 +340,9 @@ impl<const D: usize> SphSystem<D> {
     }
 
     fn sum_densities(&mut self) -> Result<(), Interrupted> {
-        density_summation::sum_volumes(&mut self.pairs, self.flow.calibration, &mut self.flow.volume)?;
+        let Self { pairs, flow, walls, .. } = self;
+        let of_walls: &mut [f64] = walls.as_mut().map_or(&mut [], |walls| &mut walls.volume);
+        density_summation::sum_volumes(pairs, flow.calibration, &mut flow.volume, of_walls)?;
         self.flow.derive_densities();
         Ok(())
     }
@@ -310,6 +360,13 @@ impl<const D: usize> SphSystem<D> {
         for force in forces.iter() {
             force.add_to(&mut rates.acceleration, &moment);
         }
+    }
+
+    /// What forces on particles depend on at a time.
+    pub(super) fn moment(&self, time: f64) -> Moment<'_, D> {
+        let Self { particles, columns, flow, interface, droplets, varying, .. } = self;
+        let tension = varying.as_ref().map(|varying| &varying.field);
+        Moment { time, particles, columns, flow, interface, droplets, tension }
     }
 
     /// The force of surface tension, where there is one.
@@ -336,6 +393,7 @@ impl<const D: usize> SphSystem<D> {
             near: interface.candidates(),
             spacing: config.spacing,
             cutoff: interface.level_set().map_or(0.0, LevelSet::keep),
+            container: config.container.as_ref(),
         })
     }
 }
@@ -404,7 +462,7 @@ mod tests {
     use crate::simulation::{CpuClock, Phases};
 
     fn evaluated(this: &Setting<2>, config: SphConfig<2>, level: Vec<f64>) -> SphSystem<2> {
-        let drop = Drop { positions: this.positions.clone(), level, velocities: None, measure: 2.0 };
+        let drop = Drop { positions: this.positions.clone(), level, velocities: None, measure: 2.0, behind_walls: Vec::new() };
         let mut system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
         system.flow.predicted.clone_from(&this.velocity);
         system.evaluate(Instant::default(), &mut Phases::new(CpuClock::still())).unwrap();

@@ -49,6 +49,10 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
         expected_speed: 3.0,
         is_adaptive: true,
         rest_below: None,
+        container: None,
+        starts_in_layers: false,
+        steady_flow: None,
+        hydrostatic_pressure: 0.0,
     };
     let length = side as f64 * h;
     let domain = Domain::new([Axis::Periodic { start: -0.7, length }; D]);
@@ -70,7 +74,7 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
 impl<const D: usize> Setting<D> {
     pub fn lists(&self) -> NeighborLists<D> {
         let (cutoff, skin) = (self.config.cutoff(), self.config.skin());
-        NeighborLists::new(&self.domain, cutoff, skin, self.positions.len()).unwrap()
+        NeighborLists::new(&self.domain, (cutoff, skin), self.positions.len(), std::iter::empty()).unwrap()
     }
 
     /// Positions listed and gathered.

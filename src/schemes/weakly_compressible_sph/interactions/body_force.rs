@@ -132,6 +132,17 @@ impl<const D: usize> BodyForce<D> {
         Self::BySpecies { whole: acceleration, inside: share(Species::Inside), outside: share(Species::Outside) }
     }
 
+    /// Direction of a constant acceleration.
+    #[must_use]
+    pub fn constant_direction(&self) -> Option<Vector<D>> {
+        match self {
+            Self::Constant(whole) | Self::WithoutMean(whole) | Self::BySpecies { whole, .. } => {
+                whole.try_normalize(0.0)
+            }
+            Self::Pulse { .. } | Self::Formula(_) => None,
+        }
+    }
+
     /// Size g of a constant acceleration, whether or not its mean force is taken out; 0 of other forces.
     #[must_use]
     pub fn constant_strength(&self) -> f64 {

@@ -7,12 +7,13 @@ use crate::schemes::weakly_compressible_sph::pair_sums::Shares;
 use crate::schemes::weakly_compressible_sph::pair_workspace::PairWorkspace;
 use crate::smoothing_kernels::RadialKernel;
 
-/// Sets the volume of every particle, V_i = a/Σ_j W_ij with the particle itself in the sum. `calibration` is a, without
-/// dimension; 1 in PCP eq. B.1.
+/// Sets the volume of every particle, and of the points of walls behind them, V_i = a/Σ_j W_ij with the particle itself in the
+/// sum. `calibration` is a, without dimension; 1 in PCP eq. B.1.
 pub fn sum_volumes<const D: usize>(
     pairs: &mut PairWorkspace<D>,
     calibration: f64,
     volume: &mut [f64],
+    wall_volume: &mut [f64],
 ) -> Result<(), Interrupted> {
     with_kernel!(pairs.kernel.choice, K => pairs.sum_pairs::<1, 0, 1>(|pair| {
         let value: Lanes = K::value(pair.q());
@@ -20,7 +21,9 @@ pub fn sum_volumes<const D: usize>(
     }))?;
     let (own, normalization) = (pairs.kernel.value(0.0), pairs.kernel.normalization);
     for (place, i) in pairs.occupied() {
-        volume[i] = calibration / (normalization * (own + pairs.sum(0, place)));
+        let count = volume.len();
+        let found = if i < count { &mut volume[i] } else { &mut wall_volume[i - count] };
+        *found = calibration / (normalization * (own + pairs.sum(0, place)));
     }
     Ok(())
 }
@@ -32,7 +35,7 @@ mod tests {
 
     fn check<const D: usize>(this: &Setting<D>) {
         let mut volume = vec![0.0; this.positions.len()];
-        sum_volumes(&mut this.gathered(), 1.0, &mut volume).unwrap();
+        sum_volumes(&mut this.gathered(), 1.0, &mut volume, &mut []).unwrap();
         for i in this.probes() {
             let mut number = this.w(0.0);
             this.each(i, |_, _, r| number += this.w(r));

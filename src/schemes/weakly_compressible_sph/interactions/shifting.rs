@@ -89,7 +89,7 @@ mod tests {
         let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
         let mut pairs = this.gathered();
         let mut volume = vec![0.0; this.positions.len()];
-        sum_volumes(&mut pairs, 1.0, &mut volume).unwrap();
+        sum_volumes(&mut pairs, 1.0, &mut volume, &mut []).unwrap();
         let mut gradients = vec![Vector::<2>::zeros(); volume.len()];
         concentration(&mut pairs, &volume, this.config.spacing, |i, g| gradients[i] = g).unwrap();
         for i in this.probes() {

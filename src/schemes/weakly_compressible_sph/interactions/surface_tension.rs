@@ -153,12 +153,14 @@ impl SurfaceTension {
         let phi = moment.particles.scalar(moment.columns.phi);
         sums.clear();
         sums.resize(droplets.groups(), (Vector::<D>::zeros(), 0.0));
-        for (i, force) in forces.iter() {
+        // A wall holds a drop that touches it.
+        let floats = |i: usize| !droplets.is_at_wall(i);
+        for (i, force) in forces.iter().filter(|(i, _)| floats(*i)) {
             let (net, shares) = &mut sums[droplets.group(*i)];
             *net += force * flow.mass(*i);
             *shares += flow.volume[*i] * self.profile(phi[*i]);
         }
-        for (i, force) in forces {
+        for (i, force) in forces.iter_mut().filter(|(i, _)| floats(*i)) {
             let (net, shares) = sums[droplets.group(*i)];
             *force -= net * (flow.volume[*i] * self.profile(phi[*i]) / (shares * flow.mass(*i)));
         }

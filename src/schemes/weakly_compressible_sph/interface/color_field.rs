@@ -153,7 +153,7 @@ mod tests {
         let away: Vec<Vector<2>> = this.positions.iter().map(|x| this.domain.displacement(&center, x)).collect();
         let (mut pairs, mut flow) = (this.gathered(), this.flow());
         flow.species = away.iter().map(|dx| Species::from_level(dx.norm() - radius)).collect();
-        sum_volumes(&mut pairs, 1.0, &mut flow.volume).unwrap();
+        sum_volumes(&mut pairs, 1.0, &mut flow.volume, &mut []).unwrap();
         let count = flow.count();
         let mut field = ColorField::new(count);
         field.find(&flow, &mut pairs).unwrap();

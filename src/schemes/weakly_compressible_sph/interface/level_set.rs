@@ -20,6 +20,7 @@ use crate::particles::{Particles, ScalarKey};
 use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::schemes::weakly_compressible_sph::droplets::Droplets;
 use crate::schemes::weakly_compressible_sph::level_update::LevelUpdate;
+use crate::schemes::weakly_compressible_sph::walls::level::Extension;
 use crate::simulation::Phases;
 
 /// Constants of the selection.
@@ -205,11 +206,12 @@ impl<const D: usize> LevelSet<D> {
         self.candidates.extend((0..self.is_candidate.len()).filter(|i| self.is_candidate[*i] == 1));
     }
 
-    /// Fits the surface to the level that the candidates carry.
+    /// Fits the surface to the level that the candidates carry, and to its extension behind walls.
     pub fn rebuild(
         &mut self,
         particles: &Particles<D>,
         columns: &SurfaceColumns,
+        extension: Option<&Extension<D>>,
         interrupt: &Interrupt,
         phases: &mut Phases,
     ) -> Result<(), InterfaceError> {
@@ -219,6 +221,11 @@ impl<const D: usize> LevelSet<D> {
         self.normals.clear();
         self.normals.extend(self.candidates.iter().map(|i| normal[*i]));
         self.gather(particles);
+        if let Some(Extension { positions, level, normals }) = extension {
+            self.positions.extend_from_slice(positions);
+            self.level.extend_from_slice(level);
+            self.normals.extend_from_slice(normals);
+        }
         let normals = Some(self.normals.as_slice());
         rebuild(&mut self.surface, &self.positions, &self.level, normals, interrupt, phases)?;
         if self.surface.is_lost() { Err(InterfaceError::Lost) } else { Ok(()) }

@@ -1,0 +1,192 @@
+//! The box of a scene: its corners, its walls, and the layers of points behind them.
+
+use super::spec::{AxisSpec, BoxSpec, Droplet, GeometryChoice, Shifting, WallSpec, WallWord};
+use super::start_lattice::StartLattice;
+use super::vectors::vector;
+use crate::geometry::domain::Axis;
+use crate::geometry::{Domain, Vector};
+use crate::schemes::weakly_compressible_sph::walls::{ContactAngle, Container, Wall};
+use crate::spec::{Choice, Parameter, Violation};
+use serde_json::{Value, json};
+
+/// The space for the fluids, and what is around it.
+#[derive(Debug, Clone)]
+pub(super) struct Room<const D: usize> {
+    pub low: Vector<D>,
+    pub high: Vector<D>,
+    pub container: Option<Container<D>>,
+    /// Cells of the lattice behind each end of each axis; 0 along periodic ones.
+    pub layers: [usize; D],
+    /// Thickness of these layers.
+    depth: Vector<D>,
+}
+
+impl<const D: usize> Room<D> {
+    /// The box of a spec.
+    pub fn new(spec: &BoxSpec, errors: &mut Vec<Violation>) -> Self {
+        let low = vector::<D>("/domain/low", &spec.low, errors);
+        let high = vector::<D>("/domain/high", &spec.high, errors);
+        if (high - low).iter().any(|length| *length <= 0.0) {
+            let detail = "the upper corner must lie above the lower one along every axis";
+            errors.push(Violation::new("/domain/high", "range", detail, spec.high.to_json(), Value::Null));
+        }
+        let container = sides(spec, errors).map(|sides| Container::new(low, high, sides));
+        Self { low, high, container, layers: [0; D], depth: Vector::<D>::zeros() }
+    }
+
+    /// Lengths of the space for the fluids.
+    pub fn lengths(&self) -> Vector<D> {
+        self.high - self.low
+    }
+
+    /// Whether an axis has walls.
+    pub fn is_bounded(&self, axis: usize) -> bool {
+        self.container.as_ref().is_some_and(|container| container.is_bounded(axis))
+    }
+
+    /// Adds layers of the lattice behind the walls, as thick as neighbors reach.
+    pub fn add_layers(&mut self, lattice: &StartLattice<D>, cutoff: f64) {
+        let edges = lattice.edges(&self.lengths());
+        for d in (0..D).filter(|d| self.container.as_ref().is_some_and(|container| container.is_bounded(*d))) {
+            self.layers[d] = (cutoff / edges[d]).ceil().clamp(1.0, 1e6) as usize;
+            self.depth[d] = self.layers[d] as f64 * edges[d];
+        }
+    }
+
+    /// The space in which positions are compared: with its layers a box is periodic along every axis, and what lies behind one wall
+    /// is farther from what lies behind the other than neighbors reach.
+    pub fn domain(&self) -> Domain<D> {
+        let lengths = self.lengths() + self.depth * 2.0;
+        Domain::new(std::array::from_fn(|d| Axis::Periodic { start: self.low[d] - self.depth[d], length: lengths[d] }))
+    }
+
+    /// Gravity as it presses on walls, and the speed that walls and a gravity along them set the fluids going at.
+    ///
+    /// Along a periodic axis a force meets no wall: between walls that hold the fluids it drives the flow of Poiseuille, at most
+    /// |g| H²/(8ν), or what falls freely until then.
+    pub fn driven(&self, spec: &Droplet, acceleration: &Vector<D>) -> (f64, f64) {
+        let Some(container) = &self.container else { return (acceleration.norm(), 0.0) };
+        let bounded = |d: usize| if container.is_bounded(d) { acceleration[d] } else { 0.0 };
+        let across = Vector::<D>::from_fn(|d, _| bounded(d));
+        let along = (acceleration - across).norm();
+        let holds = container.walls().any(|wall| wall.holds_fluid);
+        let kinematic = [&spec.fluids.inside, &spec.fluids.outside].map(|fluid| fluid.viscosity / fluid.density);
+        let least = kinematic[0].min(kinematic[1]);
+        let poiseuille = self.gap().filter(|_| holds).map_or(f64::INFINITY, |gap| along * gap * gap / (8.0 * least));
+        let falling = (2.0 * along * self.lengths().max()).sqrt();
+        let slide = if along > 0.0 { poiseuille.min(falling) } else { 0.0 };
+        (across.norm(), slide.max(self.wall_speed()))
+    }
+
+    /// The largest speed of a wall.
+    pub fn wall_speed(&self) -> f64 {
+        let walls = self.container.iter().flat_map(Container::walls);
+        walls.map(|wall| wall.velocity.norm()).fold(0.0, f64::max)
+    }
+
+    /// The shortest distance of walls that face each other.
+    pub fn gap(&self) -> Option<f64> {
+        let lengths = self.lengths();
+        (0..D).filter(|d| self.is_bounded(*d)).map(|d| lengths[d]).reduce(f64::min)
+    }
+
+    /// By how much a drop between two corners reaches through a wall, and through which, of those walls that have no contact angle.
+    pub fn pierced(&self, spec: &BoxSpec, low: &Vector<D>, high: &Vector<D>) -> Option<(String, f64)> {
+        let has_angle = |wall: &WallSpec| {
+            wall.contact_angle.is_some() || wall.advancing_angle.is_some() || wall.receding_angle.is_some()
+        };
+        let axes = spec.axes.iter().flat_map(|axes| axes.0.iter().enumerate());
+        let walls = axes.filter_map(|(d, axis)| match axis {
+            AxisSpec::Walls { low, high } => Some((d, [("low", has_angle(low)), ("high", has_angle(high))])),
+            AxisSpec::Periodic => None,
+        });
+        let beyond = |d: usize, end: usize| if end == 0 { self.low[d] - low[d] } else { high[d] - self.high[d] };
+        let all = walls.flat_map(|(d, ends)| {
+            ends.into_iter().enumerate().map(move |(end, (name, has_angle))| (d, end, name, has_angle))
+        });
+        let pierced = all.filter(|(d, end, _, has_angle)| !has_angle && beyond(*d, *end) > 0.0);
+        pierced.map(|(d, end, name, _)| (format!("/domain/axes/{d}/{name}"), beyond(d, end))).next()
+    }
+
+    /// Whether a part between two corners lies behind walls.
+    pub fn cuts(&self, low: &Vector<D>, high: &Vector<D>) -> bool {
+        (0..D).any(|d| self.is_bounded(d) && (low[d] < self.low[d] || high[d] > self.high[d]))
+    }
+}
+
+/// The walls along each axis; None where there are none.
+fn sides<const D: usize>(spec: &BoxSpec, errors: &mut Vec<Violation>) -> Option<[Option<[Wall<D>; 2]>; D]> {
+    let axes = &spec.axes.as_ref()?.0;
+    if axes.len() != D {
+        let detail = format!("the scene has {D} dimensions");
+        errors.push(Violation::new("/domain/axes", "conflict", detail, axes.len(), json!(D)));
+        return None;
+    }
+    let mut sides = [const { None }; D];
+    for (d, axis) in axes.iter().enumerate() {
+        if let AxisSpec::Walls { low, high } = axis {
+            let place = |name: &str| format!("/domain/axes/{d}/{name}");
+            sides[d] = Some([wall(low, d, &place("low"), errors), wall(high, d, &place("high"), errors)]);
+        }
+    }
+    sides.iter().any(Option::is_some).then_some(sides)
+}
+
+/// A wall across an axis.
+fn wall<const D: usize>(spec: &WallSpec, axis: usize, place: &str, errors: &mut Vec<Violation>) -> Wall<D> {
+    let at = format!("{place}/velocity");
+    let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |given| vector::<D>(&at, given, errors));
+    if velocity[axis] != 0.0 {
+        let mut along = velocity;
+        along[axis] = 0.0;
+        let (got, allowed) = (json!(velocity.as_slice()), json!(along.as_slice()));
+        errors.push(Violation::new(at, "range", "a wall moves along itself", got, allowed));
+    }
+    Wall { velocity, holds_fluid: spec.slip == WallWord::NoSlip, contact: contact(spec, place, errors) }
+}
+
+fn contact(spec: &WallSpec, place: &str, errors: &mut Vec<Violation>) -> ContactAngle {
+    /// Without an angle given, neither fluid wets a wall more.
+    const NEUTRAL: f64 = 90.0;
+    let (receding, advancing) = match (spec.contact_angle, spec.receding_angle, spec.advancing_angle) {
+        (angle, None, None) => (angle.unwrap_or(NEUTRAL), angle.unwrap_or(NEUTRAL)),
+        (None, Some(receding), Some(advancing)) if receding <= advancing => (receding, advancing),
+        (None, Some(receding), Some(advancing)) => {
+            let detail = "a contact line recedes below the receding angle and advances above the advancing one, which is the larger";
+            let at = format!("{place}/receding_angle");
+            errors.push(Violation::new(at, "range", detail, receding, format!("a number ≤ {advancing}")));
+            (advancing, advancing)
+        }
+        (Some(angle), ..) => {
+            let detail = "a wall has one contact angle, or a receding and an advancing one";
+            errors.push(Violation::new(format!("{place}/contact_angle"), "conflict", detail, angle, Value::Null));
+            (angle, angle)
+        }
+        (None, receding, advancing) => {
+            let missing = if receding.is_none() { "receding_angle" } else { "advancing_angle" };
+            let detail = "a contact line with hysteresis has a receding and an advancing angle";
+            let angle = receding.or(advancing).unwrap_or(NEUTRAL);
+            errors.push(Violation::new(format!("{place}/{missing}"), "required", detail, Value::Null, angle));
+            (angle, angle)
+        }
+    };
+    ContactAngle { receding: receding.to_radians(), advancing: advancing.to_radians() }
+}
+
+/// Errors where the rest of a scene does not suit walls.
+pub(super) fn check_needs(spec: &Droplet, is_summation: bool, has_tension: bool, errors: &mut Vec<Violation>) {
+    let density = spec.density_method.as_ref().map_or(Value::Null, Parameter::to_json);
+    let needs = [
+        (is_summation, "/density_method", density, json!("summation")),
+        (spec.shifting != Some(Shifting::Pst), "/shifting", json!("pst"), json!("none")),
+        (
+            !has_tension || spec.geometry != GeometryChoice::Colorfield,
+            "/geometry",
+            json!(spec.geometry.name()),
+            json!("pcp"),
+        ),
+    ];
+    for (_, pointer, got, allowed) in needs.into_iter().filter(|(holds, ..)| !holds) {
+        errors.push(Violation::new(pointer, "conflict", "it does not go with walls", got, allowed));
+    }
+}

@@ -1,0 +1,170 @@
+//! The walls of a scene: which there are, where they stand, and what they ask of the fluids.
+
+use crate::geometry::Vector;
+
+/// A wall.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wall<const D: usize> {
+    /// Velocity of the wall; it slides along itself.
+    pub velocity: Vector<D>,
+    /// Whether the fluid moves with the wall; otherwise it slips along it.
+    pub holds_fluid: bool,
+    /// The angle at which an interface meets the wall.
+    pub contact: ContactAngle,
+}
+
+/// The angle between a wall and an interface, measured in the fluid inside, in radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactAngle {
+    /// The line recedes below this angle.
+    pub receding: f64,
+    /// The line advances above this angle.
+    pub advancing: f64,
+}
+
+impl ContactAngle {
+    /// Neither fluid wets the wall more.
+    pub const NEUTRAL: Self = Self { receding: std::f64::consts::FRAC_PI_2, advancing: std::f64::consts::FRAC_PI_2 };
+
+    /// One angle of equilibrium.
+    #[must_use]
+    pub fn of(angle: f64) -> Self {
+        Self { receding: angle, advancing: angle }
+    }
+
+    /// The cosine of the angle that a line is drawn to from one with this cosine: the nearest that rests.
+    #[must_use]
+    pub fn target(&self, cosine: f64) -> f64 {
+        cosine.clamp(self.advancing.cos(), self.receding.cos())
+    }
+
+    /// Whether a line rests between two angles.
+    #[must_use]
+    pub fn has_hysteresis(&self) -> bool {
+        self.receding < self.advancing
+    }
+
+    /// The mean of both angles.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        0.5 * (self.receding + self.advancing)
+    }
+}
+
+/// A place beside the nearest wall.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside<const D: usize> {
+    /// Distance from the wall; negative behind it.
+    pub distance: f64,
+    /// Direction into the wall.
+    pub normal: Vector<D>,
+    /// The wall, as [`Container::wall`] counts them.
+    pub wall: usize,
+}
+
+/// A box with walls at some of its sides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Container<const D: usize> {
+    low: Vector<D>,
+    high: Vector<D>,
+    /// The walls at the lower and the upper end of each axis; None along a periodic one.
+    sides: [Option<[Wall<D>; 2]>; D],
+}
+
+impl<const D: usize> Container<D> {
+    /// The box between two corners.
+    #[must_use]
+    pub fn new(low: Vector<D>, high: Vector<D>, sides: [Option<[Wall<D>; 2]>; D]) -> Self {
+        Self { low, high, sides }
+    }
+
+    /// The wall of a number.
+    ///
+    /// # Panics
+    /// Where [`Self::beside`] gave no such number.
+    #[must_use]
+    pub fn wall(&self, number: usize) -> &Wall<D> {
+        let Some(walls) = &self.sides[number / 2] else { unreachable!("walls stand at the ends of their own axis") };
+        &walls[number % 2]
+    }
+
+    /// Whether an axis has walls.
+    #[must_use]
+    pub fn is_bounded(&self, axis: usize) -> bool {
+        self.sides[axis].is_some()
+    }
+
+    /// Lower and upper corner of the space for the fluids, infinite along periodic axes.
+    #[must_use]
+    pub fn bounds(&self) -> (Vector<D>, Vector<D>) {
+        let of = |corner: &Vector<D>, none: f64| {
+            Vector::<D>::from_fn(|d, _| if self.is_bounded(d) { corner[d] } else { none })
+        };
+        (of(&self.low, f64::NEG_INFINITY), of(&self.high, f64::INFINITY))
+    }
+
+    /// All walls.
+    pub fn walls(&self) -> impl Iterator<Item = &Wall<D>> {
+        self.sides.iter().flatten().flatten()
+    }
+
+    /// A place between the walls: beside the nearest of them. None where there is no wall.
+    #[must_use]
+    pub fn beside(&self, x: &Vector<D>) -> Option<Beside<D>> {
+        let mut nearest: Option<Beside<D>> = None;
+        for d in (0..D).filter(|d| self.is_bounded(*d)) {
+            for (end, distance) in [x[d] - self.low[d], self.high[d] - x[d]].into_iter().enumerate() {
+                if nearest.as_ref().is_none_or(|known| distance < known.distance) {
+                    let mut normal = Vector::<D>::zeros();
+                    normal[d] = if end == 0 { -1.0 } else { 1.0 };
+                    nearest = Some(Beside { distance, normal, wall: 2 * d + end });
+                }
+            }
+        }
+        nearest
+    }
+
+    /// The nearest place of the fluids' space.
+    #[must_use]
+    pub fn foot(&self, x: &Vector<D>) -> Vector<D> {
+        let (low, high) = self.bounds();
+        Vector::<D>::from_fn(|d, _| x[d].clamp(low[d], high[d]))
+    }
+
+    /// Whether a place lies in the space for the fluids.
+    #[must_use]
+    pub fn contains(&self, x: &Vector<D>) -> bool {
+        self.foot(x) == *x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ContactAngle, Container, Vector, Wall};
+
+    #[test]
+    fn places_lie_beside_the_nearest_wall() {
+        let wall = |velocity: f64| Wall {
+            velocity: Vector::<2>::new(velocity, 0.0),
+            holds_fluid: true,
+            contact: ContactAngle::of(1.0),
+        };
+        let sides = [None, Some([wall(0.0), wall(2.0)])];
+        let container = Container::new(Vector::<2>::new(0.0, -1.0), Vector::<2>::new(4.0, 1.0), sides);
+        let beside = container.beside(&Vector::<2>::new(0.1, 0.7)).unwrap();
+        assert!((beside.distance - 0.3).abs() < 1e-15);
+        assert_eq!((beside.normal[1], container.wall(beside.wall).velocity[0]), (1.0, 2.0));
+        let behind = Vector::<2>::new(-9.0, -1.25);
+        assert_eq!(container.beside(&behind).unwrap().distance, -0.25);
+        assert_eq!(container.foot(&behind), Vector::<2>::new(-9.0, -1.0));
+        assert!(!container.contains(&behind) && container.contains(&Vector::<2>::new(7.0, 0.0)));
+    }
+
+    #[test]
+    fn a_line_rests_between_its_two_angles() {
+        let contact = ContactAngle { receding: 1.0, advancing: 2.0 };
+        assert_eq!(contact.target(1.5_f64.cos()), 1.5_f64.cos());
+        assert_eq!(contact.target(0.5_f64.cos()), 1.0_f64.cos());
+        assert_eq!(contact.target(2.5_f64.cos()), 2.0_f64.cos());
+    }
+}
