@@ -16,6 +16,8 @@ mod own_inputs;
 mod shapes;
 #[path = "scenes/surfaces.rs"]
 mod surfaces;
+#[path = "scenes/walls.rs"]
+mod walls;
 
 use meniscus::parallel::Interrupt;
 use meniscus::scene::{BuildContext, Cloud, CloudSizes, Clouds};

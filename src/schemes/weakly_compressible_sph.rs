@@ -14,7 +14,7 @@
 //! | a tension that varies | [`tension_law`], `varying_tension`, `surfactant`, `tension_record`, `migration` |
 //! | one evaluation | `system` |
 //! | steps in time | `stepping`, [`time_step`] |
-//! | walls | [`walls`] |
+//! | walls | [`walls`], [`steady_flow`], `wall_record` |
 //! | what a run watches | `budget`, `checks`, `guard` |
 //! | the simulation and what it shows | `simulation`, `saved_state`, `diagnostics`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
 

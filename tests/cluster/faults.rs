@@ -254,8 +254,10 @@ fn files_that_come_late_are_waited_for() {
         assert_eq!(job["attempt"], 1, "{job}");
         check(&service, id, &expected);
     }
-    // A checkpoint that was just written is read on the other node.
-    let id = service.submit(&longer());
+    // A checkpoint that was just written is read on the other node. The job lasts until its files are seen.
+    let mut body = longer();
+    body["scene"]["end_time"] = serde_json::json!(0.3 * f64::from(seconds));
+    let id = service.submit(&body);
     wait_for_checkpoint(&service, &id);
     service.act(&id, "pause");
     service.wait_for(&id, &["paused"]);

@@ -40,10 +40,7 @@ fn every_job_ends_as_undisturbed_under_random_kills() {
     }
     let mut attempts = 0;
     for id in &ids {
-        let job = eventually("the job ends", Duration::from_secs(900), || {
-            let job = service.try_job(id)?;
-            ["succeeded", "failed", "canceled"].contains(&job["state"].as_str()?).then_some(job)
-        });
+        let job = end_of(&cluster, &service, id);
         assert_eq!(job["state"], "succeeded", "{job}");
         attempts += job["attempt"].as_u64().unwrap();
         check(&service, id, &expected);
@@ -59,6 +56,24 @@ fn every_job_ends_as_undisturbed_under_random_kills() {
         kills[2],
         began.elapsed().as_secs_f64()
     );
+}
+
+/// Waits for the end of a job; what keeps it from one is told.
+fn end_of(cluster: &Cluster, service: &Service, id: &str) -> serde_json::Value {
+    let began = Instant::now();
+    loop {
+        let job = service.try_job(id).unwrap_or_default();
+        if job["state"].as_str().is_some_and(|state| ["succeeded", "failed", "canceled"].contains(&state)) {
+            return job;
+        }
+        if began.elapsed() > Duration::from_secs(900) {
+            let nodes = cluster.ask("sinfo", &["-N", "-o", "%N %T %E"]);
+            let metrics = service.get("/metrics").text();
+            let slurm: Vec<&str> = metrics.lines().filter(|line| line.starts_with("meniscus_slurm")).collect();
+            panic!("{job} does not end; queue {:?}, nodes {nodes:?}, {slurm:#?}", cluster.queue("%j %T %r %N"));
+        }
+        std::thread::sleep(Duration::from_millis(200));
+    }
 }
 
 /// Kills the service (0), the controller (1) or the daemon of a node (2, 3), and starts it again after a while.
