@@ -147,9 +147,12 @@ pub fn enclosed_moments<const D: usize>(
     let low = low.add_scalar(-2.0 * spacing).sup(&bounds.low);
     let high = high.add_scalar(2.0 * spacing).inf(&bounds.high);
     let counts: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
-    let edges = Vector::<D>::from_fn(|d, _| {
-        if high[d] == bounds.high[d] { (high[d] - low[d]) / counts[d] as f64 } else { edge }
-    });
+    let edges =
+        Vector::<D>::from_fn(
+            |d, _| {
+                if high[d] == bounds.high[d] { (high[d] - low[d]) / counts[d] as f64 } else { edge }
+            },
+        );
     let rows: usize = counts[1..].iter().product();
     let sums: Vec<EnclosedMoments<D>> = (0..rows)
         .into_par_iter()

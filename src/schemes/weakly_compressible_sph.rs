@@ -16,7 +16,7 @@
 //! | steps in time | `stepping`, [`time_step`] |
 //! | walls | [`walls`], [`steady_flow`], `wall_record` |
 //! | what a run watches | `budget`, `checks`, `guard` |
-//! | the simulation and what it shows | `simulation`, `saved_state`, `diagnostics`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
+//! | the simulation and what it shows | `simulation`, `start`, `saved_state`, `fastest`, `diagnostics`, `pacing`, `frame_fields`, `quantities`, `monitors`, `summary` |
 
 mod budget;
 mod checks;
@@ -28,6 +28,7 @@ pub mod dimensionless;
 mod droplets;
 mod energy_rise;
 mod equations;
+mod fastest;
 mod flow_state;
 pub mod fluids;
 mod format_1;
@@ -51,6 +52,7 @@ mod simulation;
 pub mod species;
 mod smoothed_delta;
 mod standing_wave;
+mod start;
 pub mod steady_flow;
 mod stepping;
 mod strays;

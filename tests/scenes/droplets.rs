@@ -68,7 +68,7 @@ pub fn bodies() -> Vec<Value> {
     })));
     bodies.push(json!({
         "kind": "droplet", "dimension": 3, "case": "custom", "spacing": 0.15, "steps": 4, "end_time": 4e-3, "allow_soft": true,
-        "domain": {"low": [-0.8, -0.8, -0.6], "high": [0.8, 0.8, 0.6], "axes": ["periodic", "periodic", {"low": {"contact_angle": 60}, "high": {}}]},
+        "domain": {"low": [-1, -1, -0.6], "high": [1, 1, 0.6], "axes": ["periodic", "periodic", {"low": {"contact_angle": 60}, "high": {}}]},
         "shape": {"type": "sphere", "center": [0, 0, -0.6], "radius": 0.6}, "body_force": {"type": "constant", "acceleration": [0, 0, -9]}
     }));
     bodies.push(json!({

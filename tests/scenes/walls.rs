@@ -5,7 +5,7 @@ use meniscus::scene::parse;
 use meniscus::scenes::SCENES;
 use serde_json::{Value, json};
 
-fn body(axes: Value, more: Value) -> Value {
+fn body(axes: &Value, more: &Value) -> Value {
     let mut body = json!({
         "kind": "droplet", "case": "custom", "spacing": 0.05, "end_time": 0.02, "surface_tension": 1,
         "domain": {"low": [0, 0], "high": [1, 1], "axes": axes}, "shape": {"type": "circle", "center": [0.5, 0.5], "radius": 0.2},
@@ -34,20 +34,25 @@ fn what_does_not_fit_walls_is_refused_at_its_place() {
         (walls.clone(), json!({"geometry": "colorfield"}), "/geometry", "walls"),
         (json!(["periodic", {"low": {"velocity": [0, 1]}}]), json!({}), "/domain/axes/1/low/velocity", "along itself"),
         (json!([{"type": "periodic", "contact_angle": 60}, "periodic"]), json!({}), "/domain/axes/0/contact_angle", ""),
-        (json!(["periodic", {"low": {"receding_angle": 60}}]), json!({}), "/domain/axes/1/low/advancing_angle", "hysteresis"),
+        (
+            json!(["periodic", {"low": {"receding_angle": 60}}]),
+            json!({}),
+            "/domain/axes/1/low/advancing_angle",
+            "hysteresis",
+        ),
         (json!(["periodic", "periodic", "periodic"]), json!({}), "/domain/axes", "2 dimensions"),
     ] {
-        let found = refusals(&body(axes, more));
+        let found = refusals(&body(&axes, &more));
         assert!(found.iter().any(|(at, detail)| at == pointer && detail.contains(said)), "{pointer}: {found:?}");
     }
     // A wall with an angle may cut a drop, and gravity across walls needs no balance.
-    assert!(refusals(&body(angle, through)).is_empty());
+    assert!(refusals(&body(&angle, &through)).is_empty());
     let unequal = json!({
         "fluids": {"inside": {"density": 0.5, "sound_speed": 30}, "outside": {"sound_speed": 30}},
         "body_force": {"type": "constant", "acceleration": [0, -1]}
     });
-    assert!(refusals(&body(walls, unequal.clone())).is_empty());
-    assert_eq!(refusals(&body(json!(["periodic", "periodic"]), unequal))[0].0, "/body_force/balance");
+    assert!(refusals(&body(&walls, &unequal)).is_empty());
+    assert_eq!(refusals(&body(&json!(["periodic", "periodic"]), &unequal))[0].0, "/body_force/balance");
 }
 
 #[test]
@@ -56,7 +61,7 @@ fn a_drop_on_a_wall_keeps_its_angle_and_a_flow_between_walls_its_profile() {
         "spacing": 0.04, "end_time": 0.1, "shape": {"type": "circle", "center": [0.5, -0.2], "radius": 0.4},
         "fluids": {"inside": {"viscosity": 0.1, "sound_speed": 30}, "outside": {"viscosity": 0.1, "sound_speed": 30}}
     });
-    let report = run(&body(json!(["periodic", {"low": {"contact_angle": 60}}]), on_wall));
+    let report = run(&body(&json!(["periodic", {"low": {"contact_angle": 60}}]), &on_wall));
     assert!(error(&report, "contact_angle", "max", None) < 0.5);
     assert!(error(&report, "contact_width", "relative", None) < 0.01);
     let depth = report.health.checks.iter().find(|check| check.name == "wall_depth").unwrap();
@@ -65,7 +70,7 @@ fn a_drop_on_a_wall_keeps_its_angle_and_a_flow_between_walls_its_profile() {
         "surface_tension": 0, "end_time": 4, "shape": {"type": "layer", "height": 0, "thickness": 1}, "spacing": 0.1,
         "fluids": {"inside": {"sound_speed": 10, "viscosity": 0.2}, "outside": {"sound_speed": 10, "viscosity": 0.2}}
     });
-    let mut flow = body(json!(["periodic", {"high": {"velocity": [1, 0]}}]), between);
+    let mut flow = body(&json!(["periodic", {"high": {"velocity": [1, 0]}}]), &between);
     flow["domain"]["high"] = json!([1.2, 1]);
     assert!(error(&run(&flow), "velocity", "relative", None) < 5e-3);
 }
@@ -73,8 +78,8 @@ fn a_drop_on_a_wall_keeps_its_angle_and_a_flow_between_walls_its_profile() {
 #[test]
 fn particles_stay_between_walls() {
     let moved = body(
-        json!([{"low": {"type": "free_slip"}}, {"low": {}, "high": {"velocity": [2, 0]}}]),
-        json!({"body_force": {"type": "constant", "acceleration": [3, -3], "balance": "mean"}, "end_time": 0.3}),
+        &json!([{"low": {"type": "free_slip"}}, {"low": {}, "high": {"velocity": [2, 0]}}]),
+        &json!({"body_force": {"type": "constant", "acceleration": [3, -3], "balance": "mean"}, "end_time": 0.3}),
     );
     assert_eq!(scene(&moved).dimension(), 2);
     let mut simulation = crate::support::build(&moved, crate::support::PLAN);

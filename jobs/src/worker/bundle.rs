@@ -47,7 +47,7 @@ pub fn read_list(file: &Path) -> io::Result<Vec<PathBuf>> {
 /// # Errors
 /// When signals cannot be received, or this is another program than the one that was ordered.
 pub fn run(bundle: &Bundle) -> io::Result<()> {
-    // Before anything that takes time: a signal that nobody listens to ends the process.
+    // Before anything that takes time: without a listener a signal ends the process.
     let mut signals = Signals::new([SIGTERM, SIGUSR1])?;
     if let Some(cause) = detached::foreign_build(&bundle.terms)? {
         // Each says why it did not begin.

@@ -40,7 +40,7 @@ const CONTROL_INTERVAL: Duration = Duration::from_secs(1);
 /// # Errors
 /// When the specification cannot be read, the records cannot be opened or signals cannot be received.
 pub fn run(directory: &Path, terms: &Terms) -> io::Result<Verdict> {
-    // Before anything that takes time: a signal that nobody listens to ends the process.
+    // Before anything that takes time: without a listener a signal ends the process.
     let signals = Signals::new([SIGTERM, SIGUSR1])?;
     let life = Life::new(directory);
     let foreign = foreign_build(terms).unwrap_or_else(|error| Some(format!("the program cannot be read: {error}")));

@@ -1,6 +1,6 @@
 //! The cases: what holds for each when it is not given.
 
-use super::spec::{CaseName, BoxSpec, DensityChoice, ForceChoice, Shifting};
+use super::spec::{BoxSpec, CaseName, DensityChoice, ForceChoice, Shifting};
 use crate::scenes::shapes::Shape;
 use crate::spec::Coordinates;
 

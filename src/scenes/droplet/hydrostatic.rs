@@ -4,9 +4,11 @@
 //! A volume V at the pressure p is V₀ ρ₀/ρ(p), so that places move to y(y₀) = ∫ ρ₀/ρ(p) dy₀; the pressure at one end is such that the
 //! walls stay where they are. The layers behind the walls are compressed on as the fluid next to them.
 
+use super::numbers::SceneNumbers;
 use super::room::Room;
+use super::spec::Droplet;
 use crate::geometry::Vector;
-use crate::schemes::weakly_compressible_sph::{Fluids, Species};
+use crate::schemes::weakly_compressible_sph::{BodyForce, Fluids, Species, SphConfig};
 
 /// Nodes of the integrals for each spacing.
 const NODES: f64 = 8.0;
@@ -38,6 +40,30 @@ impl<const D: usize> Hydrostatic<'_, D> {
         let lengths = self.room.lengths();
         let bounded = (0..D).filter(|d| self.room.is_bounded(*d));
         0.5 * density * bounded.map(|d| self.gravity[d].abs() * lengths[d]).sum::<f64>()
+    }
+}
+
+/// Pressures by Δρ g D that keep the pressures of fluids positive while a drop of a diameter D rises: with 1 the drop of Hysing et
+/// al. has a rise velocity 2 % too high, with 2 .5 %, with 4 5 % too low (measured; docs/results/wall-notes.md).
+const RISE_PRESSURE: f64 = 2.0;
+
+/// The pressure that keeps the pressures of fluids between walls positive under gravity.
+pub(super) fn pressure_of_height<const D: usize>(
+    spec: &Droplet,
+    config: &SphConfig<D>,
+    room: &Room<D>,
+    numbers: &SceneNumbers,
+) -> f64 {
+    match &config.body_force {
+        Some(BodyForce::Constant(gravity)) => {
+            let fluids = &config.fluids;
+            Hydrostatic { room, fluids, gravity: *gravity, spacing: config.spacing }.half_pressure()
+        }
+        Some(_) => {
+            let difference = (spec.fluids.inside.density - spec.fluids.outside.density).abs();
+            RISE_PRESSURE * difference * numbers.gravity * 2.0 * numbers.radius.unwrap_or(0.0)
+        }
+        None => 0.0,
     }
 }
 

@@ -2,19 +2,19 @@
 
 use super::cases::Case;
 use super::dimensionless;
-use super::hydrostatic::Hydrostatic;
 use super::flow::{FlowPlan, body_force};
 use super::formulation::{Scope, level_and_curvature, pressures};
-use super::layer::{check_layer, distance_from_layer, layer_of, standing_wave, steady_flow};
+use super::hydrostatic::{Hydrostatic, pressure_of_height};
+use super::layer::{check_layer, standing_wave, steady_flow};
 use super::numbers::{SceneNumbers, smallest_radius};
-use super::room::{Room, check_needs};
 use super::own_motion::{StartMotion, motion_at_start};
+use super::room::{Room, check_needs, check_size};
 use super::spec::{
     BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen, TensionWord,
 };
 use super::start_lattice::StartLattice;
 use super::varying_tension::{StartBox, largest_tension, tension_law};
-use crate::geometry::{Domain, Surface, Vector};
+use crate::geometry::{Domain, Vector};
 use crate::neighbors::Pencils;
 use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
@@ -25,8 +25,8 @@ use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
 use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
-    BodyForce, DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem, TensionForce,
-    WeaklyCompressibleSph, measurement_interval,
+    BodyForce, DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem,
+    TensionForce, WeaklyCompressibleSph, measurement_interval,
 };
 use crate::simulation::{Finding, OutputPlan, Quantity, Region, Simulation};
 use crate::spec::{Parameter, Violation};
@@ -180,14 +180,8 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         room.add_layers(&lattice, config.cutoff());
         errors.extend(check_cutoff(&room.domain(), &config, &corners));
     }
-    if room.container.is_some() {
-        check_needs(&spec, flow.scope.is_summation, config.has_tension(), &mut errors);
-        config.container.clone_from(&room.container);
-        let is_flat = |shape: &Shape| matches!(shape, Shape::Layer { amplitude: 0.0, .. });
-        config.starts_in_layers = shape.as_ref().is_some_and(|(shape, ..)| is_flat(shape));
-        config.steady_flow = shape.as_ref().and_then(|(shape, ..)| steady_flow(shape, &config, &room));
-        config.hydrostatic_pressure = pressure_of_height(&spec, &config, &room, &numbers);
-    }
+    let named = shape.as_ref().map(|(shape, ..)| shape);
+    enclose(&mut config, named, &spec, (&room, &numbers, flow.scope), &mut errors);
     numbers.check_sound_speeds(&spec, &mut errors);
     dimensionless::complete(&mut spec, &numbers, &mut errors);
     let Some((shape, surface, points)) = shape.filter(|_| errors.is_empty()) else {
@@ -213,28 +207,22 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     }))
 }
 
-/// Pressures by Δρ g D that keep the pressures of fluids positive while a drop of a diameter D rises: with 1 the drop of Hysing et
-/// al. has a rise velocity 2 % too high, with 2 .5 %, with 4 5 % too low (measured; docs/results/wall-notes.md).
-const RISE_PRESSURE: f64 = 2.0;
-
-/// The pressure that keeps the pressures of fluids between walls positive under gravity.
-fn pressure_of_height<const D: usize>(
+/// Puts walls around the fluids, where there are any.
+fn enclose<const D: usize>(
+    config: &mut SphConfig<D>,
+    shape: Option<&Shape>,
     spec: &Droplet,
-    config: &SphConfig<D>,
-    room: &Room<D>,
-    numbers: &SceneNumbers,
-) -> f64 {
-    match &config.body_force {
-        Some(BodyForce::Constant(gravity)) => {
-            let fluids = &config.fluids;
-            Hydrostatic { room, fluids, gravity: *gravity, spacing: config.spacing }.half_pressure()
-        }
-        Some(_) => {
-            let difference = (spec.fluids.inside.density - spec.fluids.outside.density).abs();
-            RISE_PRESSURE * difference * numbers.gravity * 2.0 * numbers.radius.unwrap_or(0.0)
-        }
-        None => 0.0,
+    (room, numbers, scope): (&Room<D>, &SceneNumbers, Scope),
+    errors: &mut Vec<Violation>,
+) {
+    if room.container.is_none() {
+        return;
     }
+    check_needs(spec, scope.is_summation, config.has_tension(), errors);
+    config.container.clone_from(&room.container);
+    config.starts_in_layers = shape.is_some_and(|shape| matches!(shape, Shape::Layer { amplitude: 0.0, .. }));
+    config.steady_flow = shape.and_then(|shape| steady_flow(shape, config, room));
+    config.hydrostatic_pressure = pressure_of_height(spec, config, room, numbers);
 }
 
 /// Number of parts of a drop; None where its shape is refused.
@@ -327,54 +315,7 @@ fn time_step<const D: usize>(
     (time_step, steps as u64, bound)
 }
 
-/// An error where the drop does not fit into the box.
-pub(super) fn check_size<const D: usize>(
-    surface: &dyn Surface<D>,
-    (room, corners): (&Room<D>, &BoxSpec),
-    shape: &Shape,
-) -> Option<Violation> {
-    let ((low, high), lengths) = (surface.bounding_box(), room.lengths());
-    let refused =
-        |detail: String, allowed: Value| Some(Violation::new("/shape", "conflict", detail, shape.to_json(), allowed));
-    if let Some((wall, depth)) = room.pierced(corners, &low, &high) {
-        let detail = format!(
-            "the drop reaches {depth:.4} through the wall {wall}; give that wall a contact_angle, so that the drop sits on it, or \
-             move the drop"
-        );
-        return refused(detail, json!([room.low.as_slice(), room.high.as_slice()]));
-    }
-    let misses = |d: usize| room.is_bounded(d) && (high[d] <= room.low[d] || low[d] >= room.high[d]);
-    if (0..D).any(misses) {
-        return refused("the drop lies behind a wall".to_owned(), json!([room.low.as_slice(), room.high.as_slice()]));
-    }
-    let fits = (0..D).all(|d| room.is_bounded(d) || high[d] - low[d] < lengths[d]);
-    if fits { None } else { refused("the drop is as large as the box".to_owned(), json!(lengths.as_slice())) }
-}
-
 impl<const D: usize> DropletScene<D> {
-    /// Signed distances of places from the drop at the start, and its area or volume; NaN where that is not known.
-    fn levels_at(
-        &self,
-        context: &BuildContext,
-        positions: &[Vector<D>],
-    ) -> Result<(Vec<f64>, f64), Vec<Violation>> {
-        let lengths = self.lengths();
-        let found = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
-            let area = lengths.product() / lengths[1];
-            let period = (!self.room.is_bounded(1)).then_some(lengths[1]);
-            // Of a layer that walls cut the first measurement tells.
-            let measure = if period.is_some() { layer.thickness * area } else { f64::NAN };
-            (positions.iter().map(|x| distance_from_layer(&layer, period, x)).collect(), measure)
-        } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(context)? {
-            let (low, high) = whole.bounding_box();
-            let measure = if self.room.cuts(&low, &high) { f64::NAN } else { whole.area_or_volume() };
-            (self.levels(whole.as_ref(), positions), measure)
-        } else {
-            (self.levels_of_points(context, positions).map_err(|found| vec![found])?, f64::NAN)
-        };
-        Ok(found)
-    }
-
     /// What puts fluids between walls to rest under gravity.
     fn hydrostatic(&self) -> Option<Hydrostatic<'_, D>> {
         let Some(BodyForce::Constant(gravity)) = &self.config.body_force else { return None };

@@ -4,7 +4,8 @@ use super::spec::{AxisSpec, BoxSpec, Droplet, GeometryChoice, Shifting, WallSpec
 use super::start_lattice::StartLattice;
 use super::vectors::vector;
 use crate::geometry::domain::Axis;
-use crate::geometry::{Domain, Vector};
+use crate::geometry::{Domain, Surface, Vector};
+use crate::scenes::shapes::Shape;
 use crate::schemes::weakly_compressible_sph::walls::{ContactAngle, Container, Wall};
 use crate::spec::{Choice, Parameter, Violation};
 use serde_json::{Value, json};
@@ -171,6 +172,30 @@ fn contact(spec: &WallSpec, place: &str, errors: &mut Vec<Violation>) -> Contact
         }
     };
     ContactAngle { receding: receding.to_radians(), advancing: advancing.to_radians() }
+}
+
+/// An error where the drop does not fit into the box.
+pub(super) fn check_size<const D: usize>(
+    surface: &dyn Surface<D>,
+    (room, corners): (&Room<D>, &BoxSpec),
+    shape: &Shape,
+) -> Option<Violation> {
+    let ((low, high), lengths) = (surface.bounding_box(), room.lengths());
+    let refused =
+        |detail: String, allowed: Value| Some(Violation::new("/shape", "conflict", detail, shape.to_json(), allowed));
+    if let Some((wall, depth)) = room.pierced(corners, &low, &high) {
+        let detail = format!(
+            "the drop reaches {depth:.4} through the wall {wall}; give that wall a contact_angle, so that the drop sits on it, or \
+             move the drop"
+        );
+        return refused(detail, json!([room.low.as_slice(), room.high.as_slice()]));
+    }
+    let misses = |d: usize| room.is_bounded(d) && (high[d] <= room.low[d] || low[d] >= room.high[d]);
+    if (0..D).any(misses) {
+        return refused("the drop lies behind a wall".to_owned(), json!([room.low.as_slice(), room.high.as_slice()]));
+    }
+    let fits = (0..D).all(|d| room.is_bounded(d) || high[d] - low[d] < lengths[d]);
+    if fits { None } else { refused("the drop is as large as the box".to_owned(), json!(lengths.as_slice())) }
 }
 
 /// Errors where the rest of a scene does not suit walls.

@@ -1,7 +1,9 @@
 //! Signed distances of the particles at the start from the drop, and their velocities.
 
+use super::layer::{distance_from_layer, layer_of};
 use super::own_motion::StartMotion;
-use super::plan::{DropletScene, RATIO, check_size};
+use super::plan::{DropletScene, RATIO};
+use super::room::check_size;
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
@@ -16,6 +18,29 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 
 impl<const D: usize> DropletScene<D> {
+    /// Signed distances of places from the drop at the start, and its area or volume; NaN where that is not known.
+    pub(super) fn levels_at(
+        &self,
+        context: &BuildContext,
+        positions: &[Vector<D>],
+    ) -> Result<(Vec<f64>, f64), Vec<Violation>> {
+        let lengths = self.lengths();
+        let found = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
+            let area = lengths.product() / lengths[1];
+            let period = (!self.room.is_bounded(1)).then_some(lengths[1]);
+            // Of a layer that walls cut the first measurement tells.
+            let measure = if period.is_some() { layer.thickness * area } else { f64::NAN };
+            (positions.iter().map(|x| distance_from_layer(&layer, period, x)).collect(), measure)
+        } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(context)? {
+            let (low, high) = whole.bounding_box();
+            let measure = if self.room.cuts(&low, &high) { f64::NAN } else { whole.area_or_volume() };
+            (self.levels(whole.as_ref(), positions), measure)
+        } else {
+            (self.levels_of_points(context, positions).map_err(|found| vec![found])?, f64::NAN)
+        };
+        Ok(found)
+    }
+
     /// The surface of the drop, if it has one; that of a mesh must fit into the box.
     pub(super) fn surface_at_build(&self, context: &BuildContext) -> Result<Option<ShapeSurface<D>>, Vec<Violation>> {
         let room = (0.0, self.spec.spacing);

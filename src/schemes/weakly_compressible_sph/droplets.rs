@@ -295,11 +295,8 @@ const LEAST_ANGLE: f64 = 0.1;
 fn cap_curvature<const D: usize>(measure: f64, angle: f64) -> f64 {
     let angle = angle.clamp(LEAST_ANGLE, PI);
     let (sine, cosine) = angle.sin_cos();
-    let share = if D == 2 {
-        (angle - sine * cosine) / PI
-    } else {
-        0.25 * (2.0 + cosine) * (1.0 - cosine) * (1.0 - cosine)
-    };
+    let share =
+        if D == 2 { (angle - sine * cosine) / PI } else { 0.25 * (2.0 + cosine) * (1.0 - cosine) * (1.0 - cosine) };
     ball_curvature::<D>(measure) * share.powf(1.0 / D as f64)
 }
 
@@ -320,7 +317,14 @@ mod tests {
             positions.iter().map(|x| if is_inside(x) { Species::Inside } else { Species::Outside }).collect();
         let all: Vec<usize> = (0..400).collect();
         let mut droplets = Droplets::new(domain.clone(), 400, 30.0);
-        let searched = Searched { positions: &positions, species: &species, near: &all, spacing: 1.0, cutoff: 3.0, container: None };
+        let searched = Searched {
+            positions: &positions,
+            species: &species,
+            near: &all,
+            spacing: 1.0,
+            cutoff: 3.0,
+            container: None,
+        };
         assert_eq!(droplets.count(&searched), Some(2));
         assert_eq!(droplets.count(&searched), None, "their number has not changed");
         let at = |x: usize, y: usize| droplets.label[x + 20 * y];
@@ -347,7 +351,14 @@ mod tests {
         let pool = by(&|x| x[1] < 5.0 || is_drop(x));
         let inside = pool.iter().filter(|species| **species == Species::Inside).count();
         let mut droplets = Droplets::new(domain, 400, inside as f64);
-        let searched = |species| Searched { positions: &positions, species, near: &all, spacing: 1.0, cutoff: 3.0, container: None };
+        let searched = |species| Searched {
+            positions: &positions,
+            species,
+            near: &all,
+            spacing: 1.0,
+            cutoff: 3.0,
+            container: None,
+        };
         assert_eq!(droplets.count(&searched(&pool)), Some(2));
         assert!(droplets.has_layer() && droplets.ball_curvatures[0] == 0.0);
         // The drop has the curvature of its own particles.

@@ -1,6 +1,7 @@
 //! The interface between the species, by one of two methods: a level set with closest points, or a color field.
 
 pub mod color_field;
+pub mod extension;
 pub mod level_set;
 mod surface_filter;
 

@@ -16,7 +16,9 @@ impl<const D: usize> SphSystem<D> {
         state.put_section("pressure", |section| {
             section.put_real("calibration", self.flow.calibration);
             section.put_real("background", self.flow.background);
-            section.put_real("viscosity_factor", self.flow.viscosity_factor);
+            if self.walls.is_some() {
+                section.put_real("viscosity_factor", self.flow.viscosity_factor);
+            }
             section.put_reals("last_volume", &self.flow.last_volume);
         });
         state.put_section("particles", |section| {
@@ -31,7 +33,9 @@ impl<const D: usize> SphSystem<D> {
         state.put_section("droplets", |section| {
             section.put_flags("droplet", &self.droplets.label);
             section.put_reals("ball_curvatures", &self.droplets.ball_curvatures);
-            section.put_reals("contacts", &self.droplets.saved_contacts());
+            if self.walls.is_some() {
+                section.put_reals("contacts", &self.droplets.saved_contacts());
+            }
             section.put_optional("initial_measure", known(self.droplets.initial_measure));
         });
         if let Some(level_set) = self.interface.level_set() {

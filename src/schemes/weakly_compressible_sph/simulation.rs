@@ -3,6 +3,7 @@
 use super::checks::{LIMITS, WALL_DEPTH};
 use super::diagnostics::diagnostics;
 use super::droplets::ball_curvature;
+use super::fastest::{Fastest, fastest};
 use super::format_1;
 use super::frame_fields;
 use super::guard::Guard;
@@ -23,8 +24,8 @@ use crate::geometry::Vector;
 use crate::schemes::measured_errors::entry;
 use crate::simulation::course::{check_finite, check_finite_vectors, first_broken, is_finite};
 use crate::simulation::{
-    Check, Course, CpuClock, Divergence, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan, Phases, Region,
-    Report, Section, Selection, Simulation, StepError,
+    Check, Course, CpuClock, Divergence, ErrorEntry, Fields, Finding, Health, LoadError, Observables, OutputPlan,
+    Phases, Region, Report, Section, Selection, Simulation, StepError,
 };
 use crate::time::clock::TIME_SLACK;
 use crate::time::{Clock, FixedStep, Pace};
@@ -291,27 +292,6 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         }
         Ok(())
     }
-}
-
-/// The particle that is fastest by the speed of sound in its fluid.
-struct Fastest {
-    particle: usize,
-    speed: f64,
-    /// Speed of sound in its fluid.
-    sound_speed: f64,
-}
-
-fn fastest<const D: usize>(system: &SphSystem<D>) -> Fastest {
-    let mut fastest = (0, 0.0);
-    for (i, u) in system.flow.velocity.iter().enumerate() {
-        let square = u.norm_squared() / system.flow.fluid(i).sound_speed.powi(2);
-        if square > fastest.1 {
-            fastest = (i, square);
-        }
-    }
-    let particle = fastest.0;
-    let speed = system.flow.velocity[particle].norm();
-    Fastest { particle, speed, sound_speed: system.flow.fluid(particle).sound_speed }
 }
 
 fn failed(error: EvaluationError, at: Clock) -> StepError {

@@ -6,13 +6,14 @@ use super::equations::FlowEquations;
 use super::flow_state::{FlowState, Rates};
 use super::interactions::contact_line::ContactLines;
 use super::interactions::surface_tension::{BandForces, SurfaceTension};
-use super::interactions::{BodyForce, Moment, ParticleForce, TensionForce, density_summation, shifting};
+use super::interactions::{Moment, ParticleForce, TensionForce, density_summation, shifting};
 use super::interface::level_set::{Answering, LevelSetConfig};
 use super::interface::{ColorField, Interface, InterfaceError, LevelSet};
 use super::kernel_choice::ScaledKernel;
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
-use super::species::{Fluids, Species};
+use super::species::Species;
+use super::start::{balance, forces_on_particles, start_velocities, stray_allowance};
 use super::strays::Strays;
 use super::surfactant::Scales;
 use super::varying_tension::{Surroundings, VaryingTension};
@@ -96,9 +97,10 @@ impl<const D: usize> SphSystem<D> {
     ) -> Result<Self, BoxTooSmall> {
         let count = drop.positions.len();
         let radius = config.kernel.support() * config.smoothing_length;
-        let walls = config.container.clone().map(|container| {
-            Walls::new(container, &drop.behind_walls, &domain, (radius, config.skin()), cell)
-        });
+        let walls = config
+            .container
+            .clone()
+            .map(|container| Walls::new(container, &drop.behind_walls, &domain, (radius, config.skin()), cell));
         let fixed = walls.iter().flat_map(Walls::positions);
         let lists = NeighborLists::new(&domain, (config.cutoff(), config.skin()), count, fixed)?;
         config.body_force = config.body_force.take().map(|force| balance(force, &config.fluids, &drop.level));
@@ -115,19 +117,10 @@ impl<const D: usize> SphSystem<D> {
         };
         let law = config.tension_law.filter(|_| interface.level_set().is_some());
         let varying = law.map(|law| VaryingTension::new((law, config.tension), &domain, scales, &mut particles));
-        let mut forces: Vec<Box<dyn ParticleForce<D>>> = Vec::new();
-        if let Some(tension) = tension {
-            forces.push(Box::new(tension));
-        }
-        if let Some(force) = &config.body_force {
-            forces.push(Box::new(force.clone()));
-        }
-        let contact_lines = tension.zip(config.container.clone()).map(|(tension, container)| {
-            ContactLines::new(container, tension, config.tension, config.smoothing_length)
-        });
-        if let Some(lines) = &contact_lines {
-            forces.push(Box::new(lines.clone()));
-        }
+        let contact_lines = tension
+            .zip(config.container.clone())
+            .map(|(tension, container)| ContactLines::new(container, tension, config.tension, config.smoothing_length));
+        let forces = forces_on_particles(tension.as_ref(), config.body_force.as_ref(), contact_lines.as_ref());
         Ok(Self {
             flow: FlowState::in_motion(
                 config.fluids,
@@ -398,34 +391,6 @@ impl<const D: usize> SphSystem<D> {
     }
 }
 
-/// The velocities of the particles at the start.
-fn start_velocities<const D: usize>(
-    config: &SphConfig<D>,
-    own: &Option<Vec<Vector<D>>>,
-    count: usize,
-) -> Vec<Vector<D>> {
-    match own {
-        Some(own) => own.iter().map(|velocity| velocity + config.start_velocity).collect(),
-        None => vec![config.start_velocity; count],
-    }
-}
-
-/// The most particles that drops may lose to strays: half of what ends a run. The forces of version 0.1 and of the paper set none.
-fn stray_allowance<const D: usize>(config: &SphConfig<D>, level: &[f64]) -> i64 {
-    let inside = level.iter().filter(|level| Species::from_level(**level) == Species::Inside).count();
-    match config.tension_force {
-        TensionForce::Balanced => inside as i64 / 200,
-        TensionForce::BalancedUncorrected | TensionForce::Csf => i64::MAX,
-    }
-}
-
-/// The body force with its mean taken out, where it asks for that.
-fn balance<const D: usize>(force: BodyForce<D>, fluids: &Fluids, level: &[f64]) -> BodyForce<D> {
-    let densities = level.iter().map(|level| fluids[Species::from_level(*level)].density);
-    let mean = densities.sum::<f64>() / level.len() as f64;
-    force.without_mean(mean, fluids)
-}
-
 fn new_interface<const D: usize>(
     config: &SphConfig<D>,
     domain: &Domain<D>,
@@ -462,7 +427,8 @@ mod tests {
     use crate::simulation::{CpuClock, Phases};
 
     fn evaluated(this: &Setting<2>, config: SphConfig<2>, level: Vec<f64>) -> SphSystem<2> {
-        let drop = Drop { positions: this.positions.clone(), level, velocities: None, measure: 2.0, behind_walls: Vec::new() };
+        let drop =
+            Drop { positions: this.positions.clone(), level, velocities: None, measure: 2.0, behind_walls: Vec::new() };
         let mut system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
         system.flow.predicted.clone_from(&this.velocity);
         system.evaluate(Instant::default(), &mut Phases::new(CpuClock::still())).unwrap();

@@ -1,7 +1,7 @@
 //! What a series shows of drops between walls: how they rise, and how they meet the walls.
 
-use super::interactions::{BodyForce, Moment};
 use super::interactions::contact_line::AtLine;
+use super::interactions::{BodyForce, Moment};
 use super::quantities::{CONTACT_ANGLE, CONTACT_HIGH, CONTACT_LOW, RISE_HEIGHT, RISE_VELOCITY, WETTED};
 use super::smoothed_delta::smoothed_step;
 use super::species::Species;
@@ -9,8 +9,8 @@ use super::system::SphSystem;
 use super::walls::ContactAngle;
 use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
-use crate::simulation::section::known;
 use crate::schemes::measured_errors::entry;
+use crate::simulation::section::known;
 use crate::simulation::{Component, ErrorEntry, LoadError, Quantity, Section};
 use std::f64::consts::PI;
 
@@ -276,7 +276,8 @@ impl<const D: usize> SphSystem<D> {
             let of_band = self.band.forces.iter().filter(|(i, _)| self.droplets.is_at_wall(*i));
             force += of_band.map(|(i, a)| a * self.flow.mass(*i)).sum::<Vector<D>>();
             for at in lines.particles(moment) {
-                force += at.along * (lines.strength(&at) * self.flow.mass(at.particle) / self.flow.density[at.particle]);
+                force +=
+                    at.along * (lines.strength(&at) * self.flow.mass(at.particle) / self.flow.density[at.particle]);
             }
         }
         force

@@ -15,9 +15,9 @@ pub(super) mod level;
 
 pub use container::{Beside, ContactAngle, Container, Wall};
 
-use self::level::Extension;
 use super::flow_state::FlowState;
 use super::interactions::BodyForce;
+use super::interface::extension::Extension;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::{CellList, NeighborSearch};
 use rayon::prelude::{IndexedParallelIterator, IntoParallelRefIterator, IntoParallelRefMutIterator, ParallelIterator};
@@ -98,7 +98,7 @@ impl<const D: usize> Walls<D> {
             volume: vec![cell; points.len()],
             continued: vec![at_rest; points.len()],
             force: vec![Vector::<D>::zeros(); points.len()],
-            extension: Extension { positions: Vec::new(), level: Vec::new(), normals: Vec::new() },
+            extension: Extension::default(),
             domain: domain.clone(),
             container,
             points,
@@ -150,9 +150,11 @@ impl<const D: usize> Walls<D> {
         let Self { domain, container, points, radius, neighbors, begins, continued, .. } = self;
         let around = Around { domain, radius: *radius, positions };
         let fluid = Fluid { around, container, flow, force, time };
-        continued.par_iter_mut().zip(points.par_iter()).enumerate().with_min_len(64).for_each(|(k, (continued, point))| {
-            *continued = fluid.continued(point, &neighbors[begins[k]..begins[k + 1]]);
-        });
+        continued.par_iter_mut().zip(points.par_iter()).enumerate().with_min_len(64).for_each(
+            |(k, (continued, point))| {
+                *continued = fluid.continued(point, &neighbors[begins[k]..begins[k + 1]]);
+            },
+        );
     }
 
     /// Power and force of the walls at the last evaluation.
@@ -251,8 +253,7 @@ struct Sums<const D: usize> {
 
 impl<const D: usize> Fluid<'_, D> {
     fn sums(&self, point: &Point<D>, wall: &Wall<D>, neighbors: &[u32]) -> Sums<D> {
-        let mut sums =
-            Sums { moments: [0.0; 5], velocity: [Vector::<D>::zeros(); 3], pressure: 0.0, viscosity: 0.0 };
+        let mut sums = Sums { moments: [0.0; 5], velocity: [Vector::<D>::zeros(); 3], pressure: 0.0, viscosity: 0.0 };
         for i in neighbors.iter().map(|i| *i as usize) {
             let Around { positions, radius, .. } = self.around;
             let way = self.around.way(point, i);
@@ -345,11 +346,7 @@ mod tests {
 
     /// Fluid above a wall at y = 0, with points below it; the upper wall is far away.
     fn setting(holds_fluid: bool, velocity: f64) -> (Walls<2>, Vec<Vector<2>>) {
-        let wall = Wall {
-            velocity: Vector::<2>::new(velocity, 0.0),
-            holds_fluid,
-            contact: ContactAngle::NEUTRAL,
-        };
+        let wall = Wall { velocity: Vector::<2>::new(velocity, 0.0), holds_fluid, contact: ContactAngle::NEUTRAL };
         let (low, high) = (Vector::<2>::zeros(), Vector::<2>::new(12.0, 40.0));
         let container = Container::new(low, high, [None, Some([wall.clone(), wall])]);
         let axis = |start, length| Axis::Periodic { start, length };

@@ -11,6 +11,7 @@
 //! that covers the motion of particles until the next selection.
 
 use super::InterfaceError;
+use super::extension::Extension;
 use super::surface_filter::{CURVATURE, LEVEL, Place, SurfaceFilter, share_across};
 use crate::closest_point::{ClosestPoints, LevelSurface, PcpMethod, Redistancing, SurfaceColumns};
 use crate::geometry::{Domain, Vector};
@@ -20,7 +21,6 @@ use crate::particles::{Particles, ScalarKey};
 use crate::schemes::measured_redistancing::{query, rebuild};
 use crate::schemes::weakly_compressible_sph::droplets::Droplets;
 use crate::schemes::weakly_compressible_sph::level_update::LevelUpdate;
-use crate::schemes::weakly_compressible_sph::walls::level::Extension;
 use crate::simulation::Phases;
 
 /// Constants of the selection.

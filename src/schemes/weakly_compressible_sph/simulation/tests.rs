@@ -10,7 +10,13 @@ use crate::simulation::{CpuClock, OutputPlan, Simulation, StepError};
 use std::collections::BTreeMap;
 
 fn run(this: &Setting<2>, config: SphConfig<2>, time_step: f64) -> WeaklyCompressibleSph<2> {
-    let drop = Drop { positions: this.positions.clone(), level: this.level.clone(), velocities: None, measure: 1.0, behind_walls: Vec::new() };
+    let drop = Drop {
+        positions: this.positions.clone(),
+        level: this.level.clone(),
+        velocities: None,
+        measure: 1.0,
+        behind_walls: Vec::new(),
+    };
     let system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
     let plan = OutputPlan { every_time: None, series_every_steps: 1000 };
     WeaklyCompressibleSph::new(system, time_step, 1000.0 * time_step, plan, CpuClock::still(), BTreeMap::new())

@@ -13,14 +13,6 @@ use crate::geometry::Vector;
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
-/// The level behind walls, at points next to an interface.
-#[derive(Debug, Default)]
-pub struct Extension<const D: usize> {
-    pub positions: Vec<Vector<D>>,
-    pub level: Vec<f64>,
-    pub normals: Vec<Vector<D>>,
-}
-
 /// Coefficients of the fit in space; in the plane the last is not used.
 const COEFFICIENTS: usize = 5;
 /// Particles to a coefficient at least.
