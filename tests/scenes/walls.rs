@@ -58,7 +58,7 @@ fn what_does_not_fit_walls_is_refused_at_its_place() {
 #[test]
 fn a_drop_on_a_wall_keeps_its_angle_and_a_flow_between_walls_its_profile() {
     let on_wall = json!({
-        "spacing": 0.04, "end_time": 0.1, "shape": {"type": "circle", "center": [0.5, -0.2], "radius": 0.4},
+        "spacing": 0.03, "end_time": 0.1, "shape": {"type": "circle", "center": [0.5, -0.2], "radius": 0.4},
         "fluids": {"inside": {"viscosity": 0.1, "sound_speed": 30}, "outside": {"viscosity": 0.1, "sound_speed": 30}}
     });
     let report = run(&body(&json!(["periodic", {"low": {"contact_angle": 60}}]), &on_wall));
@@ -78,8 +78,9 @@ fn a_drop_on_a_wall_keeps_its_angle_and_a_flow_between_walls_its_profile() {
 #[test]
 fn particles_stay_between_walls() {
     let moved = body(
-        &json!([{"low": {"type": "free_slip"}}, {"low": {}, "high": {"velocity": [2, 0]}}]),
-        &json!({"body_force": {"type": "constant", "acceleration": [3, -3], "balance": "mean"}, "end_time": 0.3}),
+        &json!([{"low": {"type": "free_slip"}}, {"low": {}, "high": {"velocity": [0.5, 0]}}]),
+        &json!({"body_force": {"type": "constant", "acceleration": [1, -1], "balance": "mean"}, "end_time": 0.3,
+            "shape": {"type": "circle", "center": [0.5, 0.5], "radius": 0.3}}),
     );
     assert_eq!(scene(&moved).dimension(), 2);
     let mut simulation = crate::support::build(&moved, crate::support::PLAN);
