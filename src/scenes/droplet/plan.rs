@@ -8,14 +8,13 @@ use super::hydrostatic::{Hydrostatic, pressure_of_height};
 use super::layer::{check_layer, standing_wave, steady_flow};
 use super::numbers::{SceneNumbers, smallest_radius};
 use super::own_motion::{StartMotion, motion_at_start};
-use super::room::{Room, check_needs, check_size};
+use super::room::{Room, check_needs, check_size, surround};
 use super::spec::{
     BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen, TensionWord,
 };
 use super::start_lattice::StartLattice;
 use super::varying_tension::{StartBox, largest_tension, tension_law};
-use crate::geometry::{Domain, Vector};
-use crate::neighbors::Pencils;
+use crate::geometry::Vector;
 use crate::scene::cloud::{CloudReference, CloudSizes};
 use crate::scene::work::{Course, PhaseWork};
 use crate::scene::{self, BuildContext, Estimate, Planned, Scene, SceneSpec, View};
@@ -176,10 +175,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
     config.wave = shape.as_ref().and_then(|(shape, ..)| standing_wave(shape, &spec, tension, &lengths));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
-    if is_box && lattice.count() >= 1.0 {
-        room.add_layers(&lattice, config.cutoff());
-        errors.extend(check_cutoff(&room.domain(), &config, &corners));
-    }
+    errors.extend(surround(&mut room, (&lattice, is_box), &config, &corners));
     let named = shape.as_ref().map(|(shape, ..)| shape);
     enclose(&mut config, named, &spec, (&room, &numbers, flow.scope), &mut errors);
     numbers.check_sound_speeds(&spec, &mut errors);
@@ -230,12 +226,6 @@ fn part_count<const D: usize>(shape: Option<&Shape>, surface: Option<&ShapeSurfa
     // A layer, and what points from outside tell, is one part.
     let is_one = |shape: &&Shape| shape.is_from_outside() || matches!(shape, Shape::Layer { .. });
     surface.map(|surface| surface.parts.len()).or_else(|| shape.filter(is_one).map(|_| 1))
-}
-
-/// An error where neighbors reach around the box.
-fn check_cutoff<const D: usize>(domain: &Domain<D>, config: &SphConfig<D>, corners: &BoxSpec) -> Option<Violation> {
-    let error = Pencils::<D>::new(domain, config.cutoff()).err()?;
-    Some(Violation::new("/domain", "range", error.to_string(), corners.to_json(), error.least))
 }
 
 /// Geometry, smoothing length, expected speed, and the box.

@@ -5,7 +5,9 @@ use super::start_lattice::StartLattice;
 use super::vectors::vector;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
+use crate::neighbors::Pencils;
 use crate::scenes::shapes::Shape;
+use crate::schemes::weakly_compressible_sph::SphConfig;
 use crate::schemes::weakly_compressible_sph::walls::{ContactAngle, Container, Wall};
 use crate::spec::{Choice, Parameter, Violation};
 use serde_json::{Value, json};
@@ -196,6 +198,26 @@ pub(super) fn check_size<const D: usize>(
     }
     let fits = (0..D).all(|d| room.is_bounded(d) || high[d] - low[d] < lengths[d]);
     if fits { None } else { refused("the drop is as large as the box".to_owned(), json!(lengths.as_slice())) }
+}
+
+/// Adds the layers behind walls; an error where neighbors reach around the box.
+pub(super) fn surround<const D: usize>(
+    room: &mut Room<D>,
+    (lattice, is_box): (&StartLattice<D>, bool),
+    config: &SphConfig<D>,
+    corners: &BoxSpec,
+) -> Option<Violation> {
+    if !is_box || lattice.count() < 1.0 {
+        return None;
+    }
+    room.add_layers(lattice, config.cutoff());
+    check_cutoff(&room.domain(), config, corners)
+}
+
+/// An error where neighbors reach around the box.
+fn check_cutoff<const D: usize>(domain: &Domain<D>, config: &SphConfig<D>, corners: &BoxSpec) -> Option<Violation> {
+    let error = Pencils::<D>::new(domain, config.cutoff()).err()?;
+    Some(Violation::new("/domain", "range", error.to_string(), corners.to_json(), error.least))
 }
 
 /// Errors where the rest of a scene does not suit walls.
