@@ -72,9 +72,9 @@ pub fn bodies() -> Vec<Value> {
         "shape": {"type": "sphere", "center": [0, 0, -0.6], "radius": 0.6}, "body_force": {"type": "constant", "acceleration": [0, 0, -9]}
     }));
     bodies.push(json!({
-        "kind": "droplet", "case": "custom", "spacing": 0.05, "steps": 40, "end_time": 0.2, "surface_tension": 0,
+        "kind": "droplet", "case": "custom", "spacing": 0.05, "steps": 80, "end_time": 0.2, "surface_tension": 0,
         "domain": {"low": [0, 0], "high": [1, 1], "axes": ["periodic", {"low": {}, "high": {}}]},
-        "shape": {"type": "layer", "height": 0, "thickness": 1}, "fluids": {"inside": {"density": 2, "viscosity": 0.1}, "outside": {"viscosity": 0.05}},
+        "shape": {"type": "layer", "height": 0, "thickness": 1}, "fluids": {"inside": {"density": 2, "viscosity": 0.1, "sound_speed": 15}, "outside": {"viscosity": 0.05, "sound_speed": 15}},
         "body_force": {"type": "constant", "acceleration": [0, -1]}
     }));
     bodies

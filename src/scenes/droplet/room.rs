@@ -47,17 +47,20 @@ impl<const D: usize> Room<D> {
         self.container.as_ref().is_some_and(|container| container.is_bounded(axis))
     }
 
-    /// Adds layers of the lattice behind the walls, as thick as neighbors reach.
-    pub fn add_layers(&mut self, lattice: &StartLattice<D>, cutoff: f64) {
+    /// Adds layers of the lattice behind the walls, at least of a thickness.
+    pub fn add_layers(&mut self, lattice: &StartLattice<D>, thickness: f64) {
         let edges = lattice.edges(&self.lengths());
-        for d in (0..D).filter(|d| self.container.as_ref().is_some_and(|container| container.is_bounded(*d))) {
-            self.layers[d] = (cutoff / edges[d]).ceil().clamp(1.0, 1e6) as usize;
+        for d in 0..D {
+            if !self.is_bounded(d) {
+                continue;
+            }
+            self.layers[d] = (thickness / edges[d]).ceil().clamp(1.0, 1e6) as usize;
             self.depth[d] = self.layers[d] as f64 * edges[d];
         }
     }
 
     /// The space in which positions are compared: with its layers a box is periodic along every axis, and what lies behind one wall
-    /// is farther from what lies behind the other than neighbors reach.
+    /// is farther from what lies in front of the other than anything reaches.
     pub fn domain(&self) -> Domain<D> {
         let lengths = self.lengths() + self.depth * 2.0;
         Domain::new(std::array::from_fn(|d| Axis::Periodic { start: self.low[d] - self.depth[d], length: lengths[d] }))
@@ -210,7 +213,7 @@ pub(super) fn surround<const D: usize>(
     if !is_box || lattice.count() < 1.0 {
         return None;
     }
-    room.add_layers(lattice, config.cutoff());
+    room.add_layers(lattice, config.layer_thickness());
     check_cutoff(&room.domain(), config, corners)
 }
 

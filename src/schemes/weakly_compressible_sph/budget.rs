@@ -111,7 +111,7 @@ impl<const D: usize> SphSystem<D> {
         }
         if let Some(WallSupply { power, force }) = self.walls.as_ref().map(Walls::supply) {
             sums.0 += power;
-            sums.1 += force + self.held_by_walls(&self.moment(time));
+            sums.1 += force + self.held_by_walls();
         }
         sums
     }

@@ -2,6 +2,7 @@
 
 use super::interactions::surface_tension::SurfaceTension;
 use super::interactions::{BodyForce, TensionForce};
+use super::interface::level_set;
 use super::kernel_choice::KernelChoice;
 use super::level_update::LevelUpdate;
 use super::species::Fluids;
@@ -166,6 +167,18 @@ impl<const D: usize> SphConfig<D> {
     #[must_use]
     pub fn cutoff(&self) -> f64 {
         self.kernel.support() * self.smoothing_length + self.skin()
+    }
+
+    /// Thickness of the layers of points behind walls: beyond it no particle reaches through the layers of two walls, for its neighbors
+    /// and for an interface that is continued behind one of them.
+    #[must_use]
+    pub fn layer_thickness(&self) -> f64 {
+        match &self.geometry {
+            Geometry::Pcp { method, half_band, .. } if self.has_tension() => {
+                self.cutoff().max(level_set::reach::<D>(method, *half_band, self.spacing))
+            }
+            Geometry::Pcp { .. } | Geometry::ColorField => self.cutoff(),
+        }
     }
 
     /// The time ½ √(ρh³/(2πτ)) of capillary waves as long as the spacing, in which a carried level is repaired by its share.

@@ -124,6 +124,13 @@ impl<const D: usize> Droplets<D> {
         self.contacts = saved.iter().map(|angle| (*angle >= 0.0).then_some(*angle)).collect();
     }
 
+    /// The contact angle of the droplets that touch a wall, where it is one.
+    pub fn contact_angle(&self) -> Option<f64> {
+        let mut angles = self.contacts.iter().flatten();
+        let first = *angles.next()?;
+        angles.all(|angle| *angle == first).then_some(first)
+    }
+
     /// Whether any droplet touches a wall.
     pub fn has_contact(&self) -> bool {
         self.contacts.iter().any(Option::is_some)

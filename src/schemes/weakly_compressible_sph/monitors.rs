@@ -109,16 +109,8 @@ impl<const D: usize> SphSystem<D> {
         let Some(interface) = self.interface.level_set() else { return Ok(None) };
         let center = self.circular_center(&interface.surface.sample_points());
         let unwrap = |x: &Vector<D>| center + self.domain.displacement(&center, x);
-        enclosed_moments(&interface.surface, unwrap, &self.bounds(), &self.interrupt).map(Some)
-    }
-
-    /// The space between the walls.
-    fn bounds(&self) -> Bounds<D> {
-        let of_walls = |container: &Container<D>| {
-            let (low, high) = container.bounds();
-            Bounds { low, high }
-        };
-        self.config.container.as_ref().map_or_else(Bounds::none, of_walls)
+        let bounds = self.config.container.as_ref().map_or_else(Bounds::none, Container::bounds);
+        enclosed_moments(&interface.surface, unwrap, &bounds, &self.interrupt).map(Some)
     }
 
     /// A center from which nothing is cut: along periodic axes opposite to the widest gap between points.

@@ -7,7 +7,6 @@ use super::fastest::{Fastest, fastest};
 use super::format_1;
 use super::frame_fields;
 use super::guard::Guard;
-use super::interactions::BodyForce;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
 use super::quantities::{TIME, TIME_STEP, WAVE_AMPLITUDE};
@@ -74,8 +73,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let wave = system.config.wave.clone().map(WaveRecord::new);
         let has_surfactant = matches!(system.config.tension_law, Some(TensionLaw::Surfactant(_)));
         let tension = system.varying.as_ref().map(|_| TensionRecord::new(has_surfactant, end_time));
-        let direction = system.config.body_force.as_ref().and_then(BodyForce::constant_direction);
-        let walls = (system.walls.is_some() || direction.is_some()).then_some(WallRecord::UNKNOWN);
+        let walls = system.walls.as_ref().map(|_| WallRecord::UNKNOWN);
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
@@ -258,8 +256,8 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         if let (Some(record), Some(varying)) = (&mut self.tension, &system.varying) {
             record.check_step(system, varying, next)?;
         }
-        if let Some((_, depth)) = system.depth_in_walls().filter(|(_, depth)| *depth > LIMITS.wall_depth) {
-            let (value, limit, Clock { step, time }) = (depth, LIMITS.wall_depth, next);
+        if let Some(value) = system.depth_in_walls().filter(|depth| *depth > LIMITS.wall_depth) {
+            let (limit, Clock { step, time }) = (LIMITS.wall_depth, next);
             return Err(StepError::CheckFailed {
                 check: WALL_DEPTH,
                 divergence: Divergence::Escaped,
@@ -410,10 +408,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             Some(tension) => Some(state.section("tension", |section| tension.load(section))?),
             None => None,
         };
-        // Before there were walls, nothing was recorded of a fall either.
         let walls = match self.walls {
-            Some(_) if state.has("walls") => Some(state.component("walls")?),
-            walls => walls,
+            Some(_) => Some(state.component("walls")?),
+            None => None,
         };
         self.system.load(state)?;
         // 2. From here on nothing fails.
@@ -464,7 +461,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         checks.extend(self.guard.checks(&self.system));
         checks.extend(self.tension.iter().flat_map(TensionRecord::checks));
         let depth = self.system.depth_in_walls();
-        checks.extend(depth.map(|(_, depth)| Check::at_most(WALL_DEPTH, Some(depth), LIMITS.wall_depth, "spacings")));
+        checks.extend(depth.map(|depth| Check::at_most(WALL_DEPTH, Some(depth), LIMITS.wall_depth, "spacings")));
         if self.system.interface.level_set().is_some() {
             checks.push(Check::watched(if D == 2 { "area_drift" } else { "volume_drift" }, volume_drift, ""));
             checks.push(Check::watched("absorbed_strays", Some(self.system.strays.absorbed as f64), "particles"));

@@ -1,25 +1,9 @@
-//! What a system starts with: forces, velocities, and how many particles drops may lose.
+//! What a system starts with: velocities, the mean of a force, and how many particles drops may lose.
 
 use super::config::SphConfig;
-use super::interactions::contact_line::ContactLines;
-use super::interactions::surface_tension::SurfaceTension;
-use super::interactions::{BodyForce, ParticleForce, TensionForce};
+use super::interactions::{BodyForce, TensionForce};
 use super::species::{Fluids, Species};
 use crate::geometry::Vector;
-
-/// The forces on particles, in the order in which they are added.
-pub(super) fn forces_on_particles<const D: usize>(
-    tension: Option<&SurfaceTension>,
-    body: Option<&BodyForce<D>>,
-    lines: Option<&ContactLines<D>>,
-) -> Vec<Box<dyn ParticleForce<D>>> {
-    fn boxed<const D: usize, F: ParticleForce<D> + Clone + 'static>(
-        force: Option<&F>,
-    ) -> Option<Box<dyn ParticleForce<D>>> {
-        force.map(|force| Box::new(force.clone()) as Box<dyn ParticleForce<D>>)
-    }
-    [boxed(tension), boxed(body), boxed(lines)].into_iter().flatten().collect()
-}
 
 /// The velocities of the particles at the start.
 pub(super) fn start_velocities<const D: usize>(

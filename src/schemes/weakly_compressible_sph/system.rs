@@ -13,7 +13,7 @@ use super::kernel_choice::ScaledKernel;
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
 use super::species::Species;
-use super::start::{balance, forces_on_particles, start_velocities, stray_allowance};
+use super::start::{balance, start_velocities, stray_allowance};
 use super::strays::Strays;
 use super::surfactant::Scales;
 use super::varying_tension::{Surroundings, VaryingTension};
@@ -66,6 +66,8 @@ pub struct SphSystem<const D: usize> {
     /// Forces on particles, added in this order behind those of the band.
     forces: Vec<Box<dyn ParticleForce<D>>>,
     pub(super) contact_lines: Option<ContactLines<D>>,
+    /// Accelerations of the particles next to contact lines, at the last evaluation.
+    pub(super) line_forces: Vec<(usize, Vector<D>)>,
     pub(super) rates: Rates<D>,
     pub(super) interrupt: Interrupt,
 }
@@ -96,11 +98,7 @@ impl<const D: usize> SphSystem<D> {
         interrupt: Interrupt,
     ) -> Result<Self, BoxTooSmall> {
         let count = drop.positions.len();
-        let radius = config.kernel.support() * config.smoothing_length;
-        let walls = config
-            .container
-            .clone()
-            .map(|container| Walls::new(container, &drop.behind_walls, &domain, (radius, config.skin()), cell));
+        let walls = new_walls(&config, &domain, &drop.behind_walls, cell);
         let fixed = walls.iter().flat_map(Walls::positions);
         let lists = NeighborLists::new(&domain, (config.cutoff(), config.skin()), count, fixed)?;
         config.body_force = config.body_force.take().map(|force| balance(force, &config.fluids, &drop.level));
@@ -120,7 +118,9 @@ impl<const D: usize> SphSystem<D> {
         let contact_lines = tension
             .zip(config.container.clone())
             .map(|(tension, container)| ContactLines::new(container, tension, config.tension, config.smoothing_length));
-        let forces = forces_on_particles(tension.as_ref(), config.body_force.as_ref(), contact_lines.as_ref());
+        let mut forces: Vec<Box<dyn ParticleForce<D>>> = Vec::new();
+        forces.extend(tension.map(|tension| Box::new(tension) as Box<dyn ParticleForce<D>>));
+        forces.extend(config.body_force.clone().map(|force| Box::new(force) as Box<dyn ParticleForce<D>>));
         Ok(Self {
             flow: FlowState::in_motion(
                 config.fluids,
@@ -142,6 +142,7 @@ impl<const D: usize> SphSystem<D> {
             band: BandForces::default(),
             forces,
             contact_lines,
+            line_forces: Vec::new(),
             config,
             domain,
             interrupt,
@@ -342,11 +343,18 @@ impl<const D: usize> SphSystem<D> {
 
     fn add_forces(&mut self, time: f64) {
         let Self { particles, columns, flow, interface, droplets, tension, varying, band, forces, rates, .. } = self;
+        let (contact_lines, line_forces) = (&self.contact_lines, &mut self.line_forces);
         let field = varying.as_ref().map(|varying| &varying.field);
         let moment = Moment { time, particles, columns, flow, interface, droplets, tension: field };
         if let Some(tension) = tension {
             tension.find_band_forces(band, &moment);
             for (i, force) in &band.forces {
+                rates.acceleration[*i] += force;
+            }
+        }
+        if let Some(lines) = contact_lines {
+            lines.find_forces(line_forces, &moment);
+            for (i, force) in line_forces.iter() {
                 rates.acceleration[*i] += force;
             }
         }
@@ -389,6 +397,18 @@ impl<const D: usize> SphSystem<D> {
             container: config.container.as_ref(),
         })
     }
+}
+
+/// The walls of a configuration, with points behind them.
+fn new_walls<const D: usize>(
+    config: &SphConfig<D>,
+    domain: &Domain<D>,
+    behind: &[Vector<D>],
+    cell: f64,
+) -> Option<Walls<D>> {
+    let radius = config.kernel.support() * config.smoothing_length;
+    let container = config.container.clone()?;
+    Some(Walls::new(container, behind, domain, (radius, config.skin()), cell))
 }
 
 fn new_interface<const D: usize>(

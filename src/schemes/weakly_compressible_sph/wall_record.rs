@@ -6,7 +6,7 @@ use super::quantities::{CONTACT_ANGLE, CONTACT_HIGH, CONTACT_LOW, RISE_HEIGHT, R
 use super::smoothed_delta::smoothed_step;
 use super::species::Species;
 use super::system::SphSystem;
-use super::walls::ContactAngle;
+use crate::closest_point::enclosed_moments::Bounds;
 use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
 use crate::schemes::measured_errors::entry;
@@ -68,9 +68,10 @@ impl WallRecord {
         let mut add = |quantity, norm, value: f64, reference| {
             errors.extend(value.is_finite().then(|| entry(quantity, norm, value, time, reference)));
         };
-        if let Some(expected) = one_angle(system) {
+        if let Some(expected) = system.droplets.contact_angle().map(f64::to_degrees) {
             let reference = "the contact angle of the wall, in degrees";
-            add("contact_angle", "max", (self.values[3] - expected).abs(), reference);
+            let [_, _, _, angle, ..] = self.values;
+            add("contact_angle", "max", (angle - expected).abs(), reference);
             let reference = "the width between the contact lines of the cap of the area at the start";
             add("contact_width", "relative", self.width_error(system, expected), reference);
         }
@@ -103,16 +104,6 @@ impl WallRecord {
     }
 }
 
-/// The contact angle that all walls have, in degrees; None without a drop at a wall.
-fn one_angle<const D: usize>(system: &SphSystem<D>) -> Option<f64> {
-    let container = system.config.container.as_ref().filter(|_| system.droplets.has_contact())?;
-    let first = container.walls().next()?.contact;
-    let touched = container.walls().filter(|wall| wall.contact != ContactAngle::NEUTRAL);
-    let contact = touched.map(|wall| wall.contact).next().unwrap_or(first);
-    let is_one = container.walls().all(|wall| wall.contact == contact || wall.contact == ContactAngle::NEUTRAL);
-    (is_one && !contact.has_hysteresis()).then(|| contact.mean() * 180.0 / PI)
-}
-
 /// Largest and root mean square difference of the pressure from ρgh, by its largest difference. Only of layers across a gravity that
 /// walls hold.
 ///
@@ -130,7 +121,8 @@ fn hydrostatic_errors<const D: usize>(system: &SphSystem<D>) -> Option<[f64; 2]>
     let mut order: Vec<usize> = (0..flow.count()).collect();
     let positions = system.particles.positions();
     order.sort_by(|a, b| positions[*a][axis].total_cmp(&positions[*b][axis]));
-    let length = container.bounds().1[axis] - container.bounds().0[axis];
+    let bounds = container.bounds();
+    let length = bounds.high[axis] - bounds.low[axis];
     let section = flow.cell * flow.count() as f64 / length;
     let mut below = 0.0;
     let mut differences = vec![0.0; order.len()];
@@ -173,7 +165,7 @@ fn means_over_kernel<const D: usize>(system: &SphSystem<D>, values: &[f64]) -> V
 fn fall_speed<const D: usize>(system: &SphSystem<D>) -> Option<f64> {
     let (force, container) = (system.config.body_force.as_ref()?, system.config.container.as_ref()?);
     let down = force.constant_direction()?;
-    let (low, high) = container.bounds();
+    let Bounds { low, high } = container.bounds();
     let height: f64 = (0..D).filter(|d| container.is_bounded(*d)).map(|d| down[d].abs() * (high[d] - low[d])).sum();
     (height > 0.0).then(|| (force.constant_strength() * height).sqrt())
 }
@@ -229,11 +221,9 @@ fn way_along_wall((cosine, height): (f64, f64), curvature: f64) -> f64 {
 }
 
 impl<const D: usize> SphSystem<D> {
-    /// The particle that is deepest in a wall and how deep, in h.
-    pub(super) fn depth_in_walls(&self) -> Option<(usize, f64)> {
-        let walls = self.walls.as_ref()?;
-        let (particle, depth) = walls.deepest(self.particles.positions());
-        Some((particle, depth / self.config.spacing))
+    /// How deep in a wall the deepest particle is, in h.
+    pub(super) fn depth_in_walls(&self) -> Option<f64> {
+        Some(self.walls.as_ref()?.depth(self.particles.positions()) / self.config.spacing)
     }
 
     /// The length or area of the walls that the fluid inside covers, Σ V δ_w(s) H(−φ), each wall times a factor.
@@ -270,17 +260,9 @@ impl<const D: usize> SphSystem<D> {
     }
 
     /// The momentum by time that walls give to drops which touch them, through surface tension.
-    pub(super) fn held_by_walls(&self, moment: &Moment<'_, D>) -> Vector<D> {
-        let mut force = Vector::<D>::zeros();
-        if let Some(lines) = &self.contact_lines {
-            let of_band = self.band.forces.iter().filter(|(i, _)| self.droplets.is_at_wall(*i));
-            force += of_band.map(|(i, a)| a * self.flow.mass(*i)).sum::<Vector<D>>();
-            for at in lines.particles(moment) {
-                force +=
-                    at.along * (lines.strength(&at) * self.flow.mass(at.particle) / self.flow.density[at.particle]);
-            }
-        }
-        force
+    pub(super) fn held_by_walls(&self) -> Vector<D> {
+        let of_band = self.band.forces.iter().filter(|(i, _)| self.droplets.is_at_wall(*i));
+        of_band.chain(&self.line_forces).map(|(i, a)| a * self.flow.mass(*i)).sum()
     }
 }
 

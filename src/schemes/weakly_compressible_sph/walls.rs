@@ -52,9 +52,13 @@ pub(super) struct Walls<const D: usize> {
     /// Radius of the weights.
     radius: f64,
     skin: f64,
-    /// Particles around the feet, behind each other, and where those of each point begin.
+    /// Particles next to walls.
+    near: Vec<usize>,
+    /// Those around the feet, as places in `near`, behind each other, and where those of each point begin.
     neighbors: Vec<u32>,
     begins: Vec<usize>,
+    /// What the particles next to walls have, in the order of `near`.
+    front: Vec<InFront<D>>,
     /// Volumes, by summation.
     pub volume: Vec<f64>,
     continued: Vec<Continued<D>>,
@@ -93,6 +97,8 @@ impl<const D: usize> Walls<D> {
         let points: Vec<Point<D>> = positions.iter().map(point).collect();
         let at_rest = Continued { velocity: Vector::<D>::zeros(), pressure: 0.0, viscosity: 0.0 };
         Self {
+            near: Vec::new(),
+            front: Vec::new(),
             neighbors: Vec::new(),
             begins: Vec::new(),
             volume: vec![cell; points.len()],
@@ -115,16 +121,15 @@ impl<const D: usize> Walls<D> {
     /// Lists the particles around the feet; it holds as long as the neighbor lists do.
     pub fn list(&mut self, positions: &[Vector<D>]) {
         let reach = self.radius + self.skin;
-        let near: Vec<usize> = (0..positions.len())
-            .filter(|i| self.container.beside(&positions[*i]).is_some_and(|beside| beside.distance < reach))
-            .collect();
+        let is_near = |i: &usize| self.container.beside(&positions[*i]).is_some_and(|beside| beside.distance < reach);
+        self.near = (0..positions.len()).filter(is_near).collect();
         let mut cells = CellList::new(self.domain.clone());
-        cells.rebuild(near.iter().map(|i| positions[*i]), reach);
+        cells.rebuild(self.near.iter().map(|i| positions[*i]), reach);
         let around = |point: &Point<D>| {
             let mut found = Vec::new();
             // A point that is too deep for any particle has none.
             if point.depth < reach {
-                cells.for_each_within(&point.foot, reach, |k, _, _| found.push(near[k] as u32));
+                cells.for_each_within(&point.foot, reach, |k, _, _| found.push(k as u32));
             }
             found.sort_unstable();
             found
@@ -147,9 +152,21 @@ impl<const D: usize> Walls<D> {
         force: Option<&BodyForce<D>>,
         time: f64,
     ) {
-        let Self { domain, container, points, radius, neighbors, begins, continued, .. } = self;
-        let around = Around { domain, radius: *radius, positions };
-        let fluid = Fluid { around, container, flow, force, time };
+        let Self { domain, container, points, radius, near, front, neighbors, begins, continued, .. } = self;
+        let around = Around { domain, radius: *radius, positions, near };
+        front.clear();
+        front.extend(near.iter().map(|i| {
+            let (x, species) = (&positions[*i], flow.species[*i]);
+            InFront {
+                distance: container.beside(x).map_or(0.0, |beside| beside.distance) / *radius,
+                velocity: flow.predicted[*i],
+                pressure: flow.pair_pressure(*i),
+                weight: force.map_or_else(Vector::<D>::zeros, |force| force.acceleration(x, time, species))
+                    * flow.density[*i],
+                viscosity: flow.fluid(*i).viscosity,
+            }
+        }));
+        let fluid = Fluid { around, container, front, background: flow.background };
         continued.par_iter_mut().zip(points.par_iter()).enumerate().with_min_len(64).for_each(
             |(k, (continued, point))| {
                 *continued = fluid.continued(point, &neighbors[begins[k]..begins[k + 1]]);
@@ -167,11 +184,10 @@ impl<const D: usize> Walls<D> {
         supply
     }
 
-    /// The particle that is deepest in a wall, and how deep.
-    pub fn deepest(&self, positions: &[Vector<D>]) -> (usize, f64) {
+    /// How deep in a wall the deepest particle is.
+    pub fn depth(&self, positions: &[Vector<D>]) -> f64 {
         let depth = |x: &Vector<D>| self.container.beside(x).map_or(0.0, |beside| -beside.distance);
-        let deepest = positions.iter().enumerate().map(|(i, x)| (i, depth(x)));
-        deepest.fold((0, f64::NEG_INFINITY), |most, one| if one.1 > most.1 { one } else { most })
+        positions.iter().map(depth).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -209,18 +225,31 @@ impl<const D: usize> FlowAndWalls<'_, D> {
     }
 }
 
+/// A particle in front of a wall.
+#[derive(Debug, Clone, Copy)]
+struct InFront<const D: usize> {
+    /// Distance from the wall by the radius of the weights.
+    distance: f64,
+    velocity: Vector<D>,
+    pressure: f64,
+    /// ρ g of the body force.
+    weight: Vector<D>,
+    viscosity: f64,
+}
+
 /// The particles around feet.
 #[derive(Clone, Copy)]
 struct Around<'a, const D: usize> {
     domain: &'a Domain<D>,
     radius: f64,
     positions: &'a [Vector<D>],
+    near: &'a [usize],
 }
 
 impl<const D: usize> Around<'_, D> {
-    /// The way from the foot of a point to a particle.
-    fn way(&self, point: &Point<D>, i: usize) -> Vector<D> {
-        self.domain.displacement(&point.foot, &self.positions[i])
+    /// The way from the foot of a point to a particle next to walls.
+    fn way(&self, point: &Point<D>, k: usize) -> Vector<D> {
+        self.domain.displacement(&point.foot, &self.positions[self.near[k]])
     }
 
     /// The length of a way by the radius, and the weight (1 − q)⁴ (1 + 4q) of a particle there.
@@ -235,9 +264,9 @@ impl<const D: usize> Around<'_, D> {
 struct Fluid<'a, const D: usize> {
     around: Around<'a, D>,
     container: &'a Container<D>,
-    flow: &'a FlowState<D>,
-    force: Option<&'a BodyForce<D>>,
-    time: f64,
+    front: &'a [InFront<D>],
+    /// The pressure where there are no particles.
+    background: f64,
 }
 
 /// Weighted sums over the particles around a foot, distances in units of the radius.
@@ -254,31 +283,25 @@ struct Sums<const D: usize> {
 impl<const D: usize> Fluid<'_, D> {
     fn sums(&self, point: &Point<D>, wall: &Wall<D>, neighbors: &[u32]) -> Sums<D> {
         let mut sums = Sums { moments: [0.0; 5], velocity: [Vector::<D>::zeros(); 3], pressure: 0.0, viscosity: 0.0 };
-        for i in neighbors.iter().map(|i| *i as usize) {
-            let Around { positions, radius, .. } = self.around;
-            let way = self.around.way(point, i);
+        for k in neighbors.iter().map(|k| *k as usize) {
+            let way = self.around.way(point, k);
             let (_, weight) = self.around.weight(&way);
             if weight <= 0.0 {
                 continue;
             }
-            let s = self.container.beside(&positions[i]).map_or(0.0, |beside| beside.distance) / radius;
-            let velocity = self.flow.predicted[i] - wall.velocity;
+            let particle = &self.front[k];
+            let velocity = particle.velocity - wall.velocity;
             let mut share = weight;
-            for k in 0..5 {
-                sums.moments[k] += share;
-                if k < 3 {
-                    sums.velocity[k] += velocity * share;
+            for power in 0..5 {
+                sums.moments[power] += share;
+                if power < 3 {
+                    sums.velocity[power] += velocity * share;
                 }
-                share *= s;
+                share *= particle.distance;
             }
-            let mut pressure = self.flow.pair_pressure(i);
-            if let Some(force) = self.force {
-                let acceleration = force.acceleration(&positions[i], self.time, self.flow.species[i]);
-                let to_point = point.normal * point.depth - way;
-                pressure += self.flow.density[i] * acceleration.dot(&to_point);
-            }
-            sums.pressure += weight * pressure;
-            sums.viscosity += weight * self.flow.fluid(i).viscosity;
+            let to_point = point.normal * point.depth - way;
+            sums.pressure += weight * (particle.pressure + particle.weight.dot(&to_point));
+            sums.viscosity += weight * particle.viscosity;
         }
         sums
     }
@@ -288,7 +311,7 @@ impl<const D: usize> Fluid<'_, D> {
         let sums = self.sums(point, wall, neighbors);
         let all = sums.moments[0];
         if all <= 0.0 {
-            return Continued { velocity: wall.velocity, pressure: self.flow.background, viscosity: 0.0 };
+            return Continued { velocity: wall.velocity, pressure: self.background, viscosity: 0.0 };
         }
         let s = -point.depth / self.around.radius;
         let about_wall = if wall.holds_fluid {
@@ -346,7 +369,7 @@ mod tests {
 
     /// Fluid above a wall at y = 0, with points below it; the upper wall is far away.
     fn setting(holds_fluid: bool, velocity: f64) -> (Walls<2>, Vec<Vector<2>>) {
-        let wall = Wall { velocity: Vector::<2>::new(velocity, 0.0), holds_fluid, contact: ContactAngle::NEUTRAL };
+        let wall = Wall { velocity: Vector::<2>::new(velocity, 0.0), holds_fluid, contact: ContactAngle::of(1.5) };
         let (low, high) = (Vector::<2>::zeros(), Vector::<2>::new(12.0, 40.0));
         let container = Container::new(low, high, [None, Some([wall.clone(), wall])]);
         let axis = |start, length| Axis::Periodic { start, length };

@@ -13,10 +13,9 @@
 //! the direction m into the wall and the curvature κ of the drop as a cap. With the curvature at the particle itself a bend next to
 //! the wall would tell of an angle that it does not have, and grow (measured: the line of 120° runs away from a start at 90°).
 
+use super::Moment;
 use super::surface_tension::SurfaceTension;
-use super::{Moment, ParticleForce};
 use crate::geometry::Vector;
-use crate::schemes::weakly_compressible_sph::interface::Interface;
 use crate::schemes::weakly_compressible_sph::smoothed_delta::smoothed_delta;
 use crate::schemes::weakly_compressible_sph::walls::Container;
 
@@ -56,17 +55,22 @@ impl<const D: usize> ContactLines<D> {
         2.0 * smoothed_delta(distance.max(0.0), self.width)
     }
 
-    /// τ (cos θ_e − cos θ).
-    pub fn strength(&self, at: &AtLine<D>) -> f64 {
-        self.coefficient * (at.target - at.cosine)
+    /// Finds the accelerations of the particles next to contact lines.
+    pub fn find_forces(&self, forces: &mut Vec<(usize, Vector<D>)>, moment: &Moment<'_, D>) {
+        forces.clear();
+        forces.extend(self.particles(moment).map(|at| {
+            let strength = self.coefficient * (at.target - at.cosine) / moment.flow.density[at.particle];
+            (at.particle, at.along * strength)
+        }));
     }
 
-    /// The particles next to contact lines.
+    /// The particles next to contact lines, of droplets that touch a wall.
     pub fn particles<'a>(&'a self, moment: &'a Moment<'_, D>) -> impl Iterator<Item = AtLine<D>> + 'a {
         let candidates = moment.interface.candidates();
         let (particles, columns) = (moment.particles, moment.columns);
         let band = particles.flag(columns.in_band);
-        candidates.iter().copied().filter(|i| band[*i] == 1).filter_map(move |i| {
+        let is_next = move |i: &usize| band[*i] == 1 && moment.droplets.is_at_wall(*i);
+        candidates.iter().copied().filter(is_next).filter_map(move |i| {
             let x = particles.positions()[i];
             let beside = self.container.beside(&x)?;
             let wall_delta = self.wall_profile(beside.distance);
@@ -76,24 +80,12 @@ impl<const D: usize> ContactLines<D> {
             }
             let normal = particles.vector(columns.normal)[i];
             let (across, foot) = (normal.dot(&beside.normal), particles.vector(columns.closest_point)[i]);
-            // The foot may lie in the next period.
-            let height = beside.distance - (foot - x).dot(&beside.normal).clamp(-self.width, self.width);
+            let height = beside.distance - (foot - x).dot(&beside.normal);
             let curvature = moment.droplets.ball_curvature(i) / (D - 1) as f64;
             let cosine = (-across - height * curvature).clamp(-1.0, 1.0);
             let target = self.container.wall(beside.wall).contact.target(cosine);
             let along = (normal - beside.normal * across) * (delta * wall_delta);
             Some(AtLine { particle: i, cosine, target, along, height })
         })
-    }
-}
-
-impl<const D: usize> ParticleForce<D> for ContactLines<D> {
-    fn add_to(&self, acceleration: &mut [Vector<D>], moment: &Moment<'_, D>) {
-        if !matches!(moment.interface, Interface::LevelSet(_)) {
-            return;
-        }
-        for at in self.particles(moment) {
-            acceleration[at.particle] += at.along * (self.strength(&at) / moment.flow.density[at.particle]);
-        }
     }
 }

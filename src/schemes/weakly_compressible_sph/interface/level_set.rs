@@ -52,6 +52,11 @@ const TUNING: Tuning = Tuning {
     sides_slack: 0.05,
 };
 
+/// Distance from the surface up to which particles are candidates, for fits and a band of half a width.
+pub fn reach<const D: usize>(method: &PcpMethod, half_band: f64, spacing: f64) -> f64 {
+    half_band.max(method.fit_band_h::<D>() * spacing) + TUNING.margin * spacing
+}
+
 /// How a level set treats the level and the curvature that it finds.
 #[derive(Debug, Clone, Copy)]
 pub struct LevelSetConfig {
@@ -124,7 +129,7 @@ impl<const D: usize> LevelSet<D> {
         columns: &SurfaceColumns,
     ) -> Self {
         let (spacing, count) = (config.spacing, particles.len());
-        let keep = config.half_band.max(method.fit_band_h::<D>() * spacing) + TUNING.margin * spacing;
+        let keep = reach::<D>(&method, config.half_band, spacing);
         let carried = match config.update {
             LevelUpdate::Overwrite => columns.phi,
             LevelUpdate::Transparent { .. } => {

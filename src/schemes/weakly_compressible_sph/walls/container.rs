@@ -1,5 +1,6 @@
 //! The walls of a scene: which there are, where they stand, and what they ask of the fluids.
 
+use crate::closest_point::enclosed_moments::Bounds;
 use crate::geometry::Vector;
 
 /// A wall.
@@ -23,9 +24,6 @@ pub struct ContactAngle {
 }
 
 impl ContactAngle {
-    /// Neither fluid wets the wall more.
-    pub const NEUTRAL: Self = Self { receding: std::f64::consts::FRAC_PI_2, advancing: std::f64::consts::FRAC_PI_2 };
-
     /// One angle of equilibrium.
     #[must_use]
     pub fn of(angle: f64) -> Self {
@@ -94,13 +92,13 @@ impl<const D: usize> Container<D> {
         self.sides[axis].is_some()
     }
 
-    /// Lower and upper corner of the space for the fluids, infinite along periodic axes.
+    /// The space for the fluids, infinite along periodic axes.
     #[must_use]
-    pub fn bounds(&self) -> (Vector<D>, Vector<D>) {
+    pub fn bounds(&self) -> Bounds<D> {
         let of = |corner: &Vector<D>, none: f64| {
             Vector::<D>::from_fn(|d, _| if self.is_bounded(d) { corner[d] } else { none })
         };
-        (of(&self.low, f64::NEG_INFINITY), of(&self.high, f64::INFINITY))
+        Bounds { low: of(&self.low, f64::NEG_INFINITY), high: of(&self.high, f64::INFINITY) }
     }
 
     /// All walls.
@@ -127,14 +125,8 @@ impl<const D: usize> Container<D> {
     /// The nearest place of the fluids' space.
     #[must_use]
     pub fn foot(&self, x: &Vector<D>) -> Vector<D> {
-        let (low, high) = self.bounds();
+        let Bounds { low, high } = self.bounds();
         Vector::<D>::from_fn(|d, _| x[d].clamp(low[d], high[d]))
-    }
-
-    /// Whether a place lies in the space for the fluids.
-    #[must_use]
-    pub fn contains(&self, x: &Vector<D>) -> bool {
-        self.foot(x) == *x
     }
 }
 
@@ -157,7 +149,6 @@ mod tests {
         let behind = Vector::<2>::new(-9.0, -1.25);
         assert_eq!(container.beside(&behind).unwrap().distance, -0.25);
         assert_eq!(container.foot(&behind), Vector::<2>::new(-9.0, -1.0));
-        assert!(!container.contains(&behind) && container.contains(&Vector::<2>::new(7.0, 0.0)));
     }
 
     #[test]

@@ -20,6 +20,10 @@ const PARTICLES: usize = 2;
 /// The largest curvature, by the inverse radius of the weights.
 const LARGEST_CURVATURE: f64 = 1.0;
 
+/// The largest root mean square, by the radius, that a fit may leave: half way between two interfaces the level has a ridge, and no
+/// circle follows it.
+const LARGEST_REST: f64 = 5e-3;
+
 /// What is known of particles for the continuation.
 #[derive(Clone, Copy)]
 pub struct Levels<'a, const D: usize> {
@@ -33,14 +37,13 @@ pub struct Levels<'a, const D: usize> {
 impl<const D: usize> Walls<D> {
     /// Continues the level behind the walls.
     pub fn extend_level(&mut self, levels: Levels<'_, D>) {
-        let Self { points, neighbors, begins, extension, domain, radius, .. } = self;
+        let Self { points, near, neighbors, begins, extension, domain, radius, .. } = self;
         let found: Vec<Option<(Vector<D>, f64, Vector<D>)>> = (0..points.len())
             .into_par_iter()
             .with_min_len(64)
             .map(|k| {
-                let near = &neighbors[begins[k]..begins[k + 1]];
-                let around = Around { domain, radius: *radius, positions: levels.positions };
-                continued(&points[k], near, around, levels)
+                let around = Around { domain, radius: *radius, positions: levels.positions, near };
+                continued(&points[k], &neighbors[begins[k]..begins[k + 1]], around, levels)
             })
             .collect();
         extension.positions.clear();
@@ -61,17 +64,18 @@ fn continued<const D: usize>(
     around: Around<'_, D>,
     levels: Levels<'_, D>,
 ) -> Option<(Vector<D>, f64, Vector<D>)> {
-    let least = neighbors.iter().map(|i| levels.level[*i as usize].abs()).fold(f64::INFINITY, f64::min);
+    let level_of = |k: u32| levels.level[around.near[k as usize]];
+    let least = neighbors.iter().map(|k| level_of(*k).abs()).fold(f64::INFINITY, f64::min);
     if least > levels.reach {
         return None;
     }
-    let Circle { level, slope, curvature } = fit_circle(point, neighbors, around, levels.level)?;
+    let Circle { level, slope, curvature } = fit_circle(point, neighbors, around, level_of)?;
     let way = point.normal * (point.depth / around.radius);
     let right = level + slope.dot(&way) + 0.5 * curvature * way.norm_squared();
     // The root next to 0, as it is without curvature.
-    let found = 2.0 * right / (1.0 + (1.0 + 2.0 * curvature * right).max(0.0).sqrt());
+    let found = 2.0 * right / (1.0 + (1.0 + 2.0 * curvature * right).max(0.0).sqrt()) * around.radius;
     let normal = (slope + way * curvature).try_normalize(0.0)?;
-    Some((point.position, found * around.radius, normal))
+    (found.abs() <= levels.reach).then_some((point.position, found, normal))
 }
 
 /// A circle or sphere, lengths in units of the radius of the weights: c, n and κ.
@@ -85,15 +89,15 @@ fn fit_circle<const D: usize>(
     point: &Point<D>,
     neighbors: &[u32],
     around: Around<'_, D>,
-    level: &[f64],
+    level_of: impl Fn(u32) -> f64,
 ) -> Option<Circle<D>> {
     let mut matrix = SMatrix::<f64, COEFFICIENTS, COEFFICIENTS>::zeros();
     let mut right = SVector::<f64, COEFFICIENTS>::zeros();
-    let mut count = 0;
-    for i in neighbors.iter().map(|i| *i as usize) {
-        let way = around.way(point, i) / around.radius;
-        let (_, weight) = around.weight(&(way * around.radius));
-        let psi = level[i] / around.radius;
+    let (mut count, mut squares) = (0, 0.0);
+    for k in neighbors {
+        let way = around.way(point, *k as usize);
+        let (_, weight) = around.weight(&way);
+        let (way, psi) = (way / around.radius, level_of(*k) / around.radius);
         count += usize::from(weight > 0.0);
         let mut row = SVector::<f64, COEFFICIENTS>::zeros();
         row[0] = 1.0;
@@ -103,6 +107,7 @@ fn fit_circle<const D: usize>(
         }
         matrix += row * row.transpose() * weight;
         right += row * (weight * psi);
+        squares += weight * psi * psi;
     }
     if count < PARTICLES * (D + 2) {
         return None;
@@ -110,8 +115,12 @@ fn fit_circle<const D: usize>(
     for k in D + 2..COEFFICIENTS {
         matrix[(k, k)] = 1.0;
     }
+    let all = matrix[(0, 0)];
     let found = matrix.cholesky()?.solve(&right);
+    // The mean square of what the fit leaves.
+    let left = ((squares - found.dot(&right)) / all).max(0.0);
     let slope = Vector::<D>::from_fn(|d, _| found[2 + d]);
-    let is_sound = found[1].abs() <= LARGEST_CURVATURE && found.iter().all(|value| value.is_finite());
+    let is_one = left.sqrt() <= LARGEST_REST && found[1].abs() <= LARGEST_CURVATURE;
+    let is_sound = is_one && found.iter().all(|value| value.is_finite());
     is_sound.then_some(Circle { level: found[0], slope, curvature: found[1] })
 }
