@@ -94,7 +94,7 @@ pub fn enclosed_area_or_volume<const D: usize>(
     surface: &LevelSurface<D>,
     interrupt: &Interrupt,
 ) -> Result<f64, Interrupted> {
-    enclosed_moments(surface, |x| *x, &Bounds::none(), interrupt).map(|moments| moments.area_or_volume)
+    enclosed_moments(surface, |x| *x, &Space::whole(), interrupt).map(|moments| moments.area_or_volume)
 }
 
 /// A box outside of which nothing counts; infinite where it is open.
@@ -114,9 +114,40 @@ impl<const D: usize> Bounds<D> {
     }
 }
 
+/// The signed distance of a place from the nearest body, negative within, and the direction towards it.
+pub type FromBodies<'a, const D: usize> = &'a (dyn Fn(&Vector<D>) -> (f64, Vector<D>) + Sync);
+
+/// The space in which an interface counts.
+#[derive(Clone, Copy)]
+pub struct Space<'a, const D: usize> {
+    /// A box around it.
+    pub bounds: Bounds<D>,
+    /// Bodies within, where nothing counts.
+    pub bodies: Option<FromBodies<'a, D>>,
+}
+
+impl<const D: usize> Space<'_, D> {
+    /// Everything.
+    #[must_use]
+    pub fn whole() -> Self {
+        Self { bounds: Bounds::none(), bodies: None }
+    }
+
+    /// The share of a cell that is not within bodies; None where they cut it and it is to be halved.
+    fn share_of_cell(&self, center: &Vector<D>, edges: &Vector<D>, is_smallest: bool) -> Option<f64> {
+        let Some(bodies) = self.bodies else { return Some(1.0) };
+        let (distance, direction) = bodies(center);
+        if distance.abs() >= 0.5 * edges.norm() {
+            return Some(if distance > 0.0 { 1.0 } else { 0.0 });
+        }
+        let edge = edges.max();
+        is_smallest.then(|| share_below_plane(&(direction.component_mul(edges) / edge), -distance / edge))
+    }
+}
+
 /// Moments of the set with negative level.
 ///
-/// In a periodic domain, `unwrap` must move the points of the surface to connected images. Only what lies between the bounds
+/// In a periodic domain, `unwrap` must move the points of the surface to connected images. Only what lies within `space`
 /// counts.
 ///
 /// # Errors
@@ -124,9 +155,10 @@ impl<const D: usize> Bounds<D> {
 pub fn enclosed_moments<const D: usize>(
     surface: &LevelSurface<D>,
     unwrap: impl Fn(&Vector<D>) -> Vector<D>,
-    bounds: &Bounds<D>,
+    space: &Space<'_, D>,
     interrupt: &Interrupt,
 ) -> Result<EnclosedMoments<D>, Interrupted> {
+    let bounds = &space.bounds;
     if surface.is_lost() {
         return Ok(EnclosedMoments::zero());
     }
@@ -167,7 +199,7 @@ pub fn enclosed_moments<const D: usize>(
             for k in 0..counts[0] {
                 corner[0] = low[0] + k as f64 * edges[0];
                 if !interrupt.is_raised() {
-                    inside_of_cell(surface, &corner, &edges, halvings, &mut sum);
+                    inside_of_cell((surface, space), &corner, &edges, halvings, &mut sum);
                 }
             }
             sum
@@ -184,7 +216,7 @@ pub fn enclosed_moments<const D: usize>(
 
 /// Adds the inside part of a cell with these edges. The part of a cut cell is added at the center of the cell.
 fn inside_of_cell<const D: usize>(
-    surface: &LevelSurface<D>,
+    (surface, space): (&LevelSurface<D>, &Space<'_, D>),
     corner: &Vector<D>,
     edges: &Vector<D>,
     halvings: u32,
@@ -194,6 +226,10 @@ fn inside_of_cell<const D: usize>(
     let center = corner + edges * 0.5;
     let half_diagonal = 0.5 * edges.norm();
     let Some(foot) = surface.query(&center, f64::INFINITY) else { return };
+    let free = space.share_of_cell(&center, edges, halvings == 0);
+    if free == Some(0.0) {
+        return;
+    }
     let mut add = |area_or_volume: f64| {
         sum.area_or_volume += area_or_volume;
         sum.first += center * area_or_volume;
@@ -201,12 +237,14 @@ fn inside_of_cell<const D: usize>(
         sum.mixed += Vector::<D>::from_fn(|d, _| center[d] * center[(d + 1) % D]) * area_or_volume;
     };
     if foot.distance >= half_diagonal {
-        if surface.is_inside(&center, &foot) {
-            add(whole);
+        if !surface.is_inside(&center, &foot) {
+            return;
         }
-        return;
-    }
-    if halvings == 0 {
+        if let Some(free) = free {
+            add(whole * free);
+            return;
+        }
+    } else if halvings == 0 {
         // In units of the longest edge.
         let edge = edges.max();
         let signed = if foot.is_outside { foot.distance } else { -foot.distance };
@@ -215,6 +253,7 @@ fn inside_of_cell<const D: usize>(
         let mean_deviation = (foot.curvature * edge).clamp(-1.0, 1.0) / 24.0;
         let offset = signed / edge + mean_deviation;
         let normal = foot.normal.component_mul(edges) / edge;
+        let whole = whole * free.unwrap_or(1.0);
         add(whole * share_below_plane(&normal, offset));
         sum.surface += whole / edge * section_by_plane(&normal, offset);
         return;
@@ -222,7 +261,7 @@ fn inside_of_cell<const D: usize>(
     let half = edges * 0.5;
     for octant in 0..1_usize << D {
         let child = Vector::<D>::from_fn(|d, _| corner[d] + half[d] * (octant >> d & 1) as f64);
-        inside_of_cell(surface, &child, &half, halvings - 1, sum);
+        inside_of_cell((surface, space), &child, &half, halvings - 1, sum);
     }
 }
 

@@ -8,6 +8,7 @@ mod formulation;
 mod hydrostatic;
 mod layer;
 mod numbers;
+mod obstacles;
 mod own_motion;
 mod plan;
 mod preset;

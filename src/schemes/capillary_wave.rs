@@ -1,14 +1,14 @@
-//! A standing capillary wave between two viscous fluids, from rest.
+//! A standing wave between two viscous fluids, from rest: by surface tension and gravity.
 
 mod scaled_erfc;
 
 use nalgebra::Complex;
 use scaled_erfc::scaled_erfc;
 
-/// The wave on the plane surface between two unbounded layers of equal kinematic viscosity, without gravity. It starts
-/// at rest with the shape a₀ cos(kx).
+/// The wave on the plane surface between two unbounded layers of equal kinematic viscosity. It starts at rest with the shape
+/// a₀ cos(kx). Where the heavier fluid is above, it grows (Rayleigh and Taylor).
 ///
-/// Exact for small amplitudes (Prosperetti 1981). With ε = νk², ω₀² = τk³/(ρ₁ + ρ₂) and
+/// Exact for small amplitudes (Prosperetti 1981). With ε = νk², ω₀² = (τk³ + (ρ₁ − ρ₂)gk)/(ρ₁ + ρ₂), ρ₁ below, and
 /// β = ρ₁ρ₂/(ρ₁ + ρ₂)²:
 ///
 /// `a/a₀ = 4(1−4β)ε²/(8(1−4β)ε² + ω₀²) erfc √(εt) + Σ (z/Z) ω₀²/(z² − ε) exp((z² − ε)t) erfc(z√t)`
@@ -17,9 +17,11 @@ use scaled_erfc::scaled_erfc;
 /// of the three differences (other root − z).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CapillaryWave {
-    /// ω₀, the frequency without viscosity.
+    /// |ω₀|, the frequency or the rate of growth without viscosity.
     frequency: f64,
-    /// ε/ω₀; the other numbers have 1/ω₀ as the unit of time.
+    /// 1, or −1 where the wave grows: ω₀² in the unit |ω₀|².
+    sign: f64,
+    /// ε/|ω₀|; the other numbers have 1/|ω₀| as the unit of time.
     damping: f64,
     beta: f64,
     roots: [Complex<f64>; 4],
@@ -27,26 +29,36 @@ pub struct CapillaryWave {
 
 impl CapillaryWave {
     /// The wave of wavenumber k = 2π/length in layers of the given densities (below, above; one may be 0), of kinematic
-    /// viscosity ν and tension τ.
+    /// viscosity ν, tension τ and gravity g. None where neither tension nor gravity acts.
     ///
     /// In terms of a Laplace number La = ρτλ/η² of the wavelength λ, ν = √(τλ/(ρ La)).
     #[must_use]
-    pub fn new(wavenumber: f64, densities: [f64; 2], kinematic_viscosity: f64, tension: f64) -> Self {
+    pub fn new(
+        wavenumber: f64,
+        densities: [f64; 2],
+        kinematic_viscosity: f64,
+        (tension, gravity): (f64, f64),
+    ) -> Option<Self> {
         let density = densities[0] + densities[1];
-        let frequency = (tension * wavenumber.powi(3) / density).sqrt();
+        let by_gravity = (densities[0] - densities[1]) * gravity * wavenumber;
+        let square = (tension * wavenumber.powi(3) + by_gravity) / density;
+        let (frequency, sign) = (square.abs().sqrt(), square.signum());
+        if frequency == 0.0 {
+            return None;
+        }
         let damping = kinematic_viscosity * wavenumber.powi(2) / frequency;
         let beta = densities[0] * densities[1] / density.powi(2);
-        let constant = (1.0 - 4.0 * beta) * damping.powi(2) + 1.0;
+        let constant = (1.0 - 4.0 * beta) * damping.powi(2) + sign;
         let roots = quartic_roots([
             constant,
             4.0 * (1.0 - 3.0 * beta) * damping.powf(1.5),
             2.0 * (1.0 - 6.0 * beta) * damping,
             -4.0 * beta * damping.sqrt(),
         ]);
-        Self { frequency, damping, beta, roots }
+        Some(Self { frequency, sign, damping, beta, roots })
     }
 
-    /// ω₀ = √(τk³/(ρ₁ + ρ₂)), the angular frequency without viscosity.
+    /// |ω₀|, the angular frequency or the rate of growth without viscosity.
     #[must_use]
     pub fn inviscid_frequency(&self) -> f64 {
         self.frequency
@@ -60,11 +72,11 @@ impl CapillaryWave {
         let share = (1.0 - 4.0 * self.beta) * self.damping.powi(2);
         let diffusion = (-self.damping * t).exp();
         let first =
-            4.0 * share / (8.0 * share + 1.0) * diffusion * scaled_erfc(Complex::from((self.damping * t).sqrt())).re;
+            4.0 * share / (8.0 * share + self.sign) * diffusion * scaled_erfc(Complex::from((self.damping * t).sqrt())).re;
         let term = |i: usize| {
             let z = self.roots[i];
             let others = (0..4).filter(|j| *j != i).map(|j| self.roots[j] - z).product::<Complex<f64>>();
-            z / (others * (z * z - self.damping)) * exp_erfc(z, t, self.damping)
+            z * self.sign / (others * (z * z - self.damping)) * exp_erfc(z, t, self.damping)
         };
         first + (0..4).map(term).sum::<Complex<f64>>().re
     }
@@ -134,10 +146,17 @@ mod tests {
         ),
     ];
 
+    /// Below, above, ν, τ and g, and a/a₀ at |ω₀|t = 1, 3 and 6, with k = 2π; found in the same way.
+    const GROWING: [([f64; 2], f64, (f64, f64), [f64; 3]); 3] = [
+        ([1.0, 3.0], 0.01, (0.0, 1.0), [1.398_846_441_745_692_6, 5.384_029_958_071_491, 46.847_027_008_795_676]),
+        ([1.0, 3.0], 0.02, (0.02, 1.0), [1.314_242_544_637_559_4, 3.575_583_675_972_383, 17.469_922_183_512_454]),
+        ([0.1, 1.0], 0.005, (0.005, 2.0), [1.486_967_873_723_678, 7.821_851_313_592_719, 111.266_918_798_055_14]),
+    ];
+
     #[test]
     fn amplitudes_agree_with_a_numerical_laplace_inversion() {
         for (wavenumber, densities, viscosity, amplitudes) in REFERENCES {
-            let wave = CapillaryWave::new(wavenumber, densities, viscosity, 1.0);
+            let wave = CapillaryWave::new(wavenumber, densities, viscosity, (1.0, 0.0)).unwrap();
             for (time, reference) in TIMES.into_iter().zip(amplitudes) {
                 let amplitude = wave.amplitude_ratio(time / wave.inviscid_frequency());
                 // Rounding of the phase, 1e-16 ω₀t, and of the roots, 1e-16 (ε/ω₀)², where (ε/ω₀)² = 18 in the last row.
@@ -148,8 +167,8 @@ mod tests {
 
     #[test]
     fn limits_of_no_viscosity_and_of_much() {
-        let inviscid = CapillaryWave::new(1.0, [1.0, 0.3], 0.0, 2.0);
-        let strong = CapillaryWave::new(1.0, [1.0, 1.0], 100.0, 1.0);
+        let inviscid = CapillaryWave::new(1.0, [1.0, 0.3], 0.0, (2.0, 0.0)).unwrap();
+        let strong = CapillaryWave::new(1.0, [1.0, 1.0], 100.0, (1.0, 0.0)).unwrap();
         // Creeping flow: a' = −τk a/(2(η₁ + η₂)), up to inertia of relative size (ω₀/ε)², here 5e-5.
         let creeping = -1.0 / 400.0;
         for time in [0.0_f64, 1.0, 30.0] {
@@ -157,5 +176,20 @@ mod tests {
             assert!((inviscid.amplitude_ratio(time) - cosine).abs() < 1e-14);
             assert!((strong.amplitude_ratio(time) - (creeping * time).exp()).abs() < 5e-5);
         }
+    }
+
+    #[test]
+    fn heavier_fluid_above_lets_waves_grow_as_a_numerical_laplace_inversion_says() {
+        for (densities, viscosity, forces, amplitudes) in GROWING {
+            let wave = CapillaryWave::new(TAU, densities, viscosity, forces).unwrap();
+            for (time, reference) in [1.0, 3.0, 6.0].into_iter().zip(amplitudes) {
+                let amplitude = wave.amplitude_ratio(time / wave.inviscid_frequency());
+                assert!((amplitude / reference - 1.0).abs() < 1e-11, "{amplitude}, not {reference}");
+            }
+        }
+        let inviscid = CapillaryWave::new(TAU, [1.0, 3.0], 0.0, (0.0, 1.0)).unwrap();
+        assert!((inviscid.inviscid_frequency() - (0.5 * TAU).sqrt()).abs() < 1e-14);
+        assert!((inviscid.amplitude_ratio(1.0) - (0.5 * TAU).sqrt().cosh()).abs() < 1e-12);
+        assert_eq!(CapillaryWave::new(TAU, [1.0, 1.0], 0.1, (0.0, 1.0)), None);
     }
 }

@@ -61,7 +61,7 @@ pub(super) fn pressure_of_height<const D: usize>(
         }
         Some(_) => {
             let difference = (spec.fluids.inside.density - spec.fluids.outside.density).abs();
-            RISE_PRESSURE * difference * numbers.gravity * 2.0 * numbers.radius.unwrap_or(0.0)
+            std::env::var("RISE").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(RISE_PRESSURE) * difference * numbers.gravity * 2.0 * numbers.radius.unwrap_or(0.0)
         }
         None => 0.0,
     }

@@ -1,7 +1,7 @@
 //! Layers across the box, at rest or with a standing wave on both sides.
 
 use super::room::Room;
-use super::spec::{Droplet, ForceChoice};
+use super::spec::Droplet;
 use crate::geometry::Vector;
 use crate::geometry::surfaces::WavyLayer;
 use crate::scenes::shapes::Shape;
@@ -54,26 +54,52 @@ struct Validity {
 
 const VALIDITY: Validity = Validity { depth: TAU, steepness: 0.1 };
 
-/// The wave of a layer, with linear theory where it holds: equal kinematic viscosities, one tension, no force from outside, deep layers and
-/// flat waves.
+/// The wave of a layer, with linear theory where it holds: equal kinematic viscosities, one tension, no force from outside but gravity on a
+/// layer whose other side lies behind a wall, deep layers and flat waves.
 pub(super) fn standing_wave<const D: usize>(
     shape: &Shape,
     spec: &Droplet,
-    tension: f64,
-    lengths: &Vector<D>,
+    (tension, force): (f64, Option<&BodyForce<D>>),
+    room: &Room<D>,
 ) -> Option<StandingWave> {
+    let lengths = room.lengths();
     let layer = layer_of(shape, lengths[0]).filter(|layer| layer.amplitude > 0.0)?;
     let wavenumber = TAU / layer.wavelength;
     let (inside, outside) = (&spec.fluids.inside, &spec.fluids.outside);
     let kinematic = [inside, outside].map(|fluid| fluid.viscosity / fluid.density);
     let is_alike = (kinematic[0] - kinematic[1]).abs() <= 1e-9 * kinematic[0];
-    let is_free = spec.body_force.as_ref().is_none_or(|force| *force == ForceChoice::None);
-    let thinner = layer.thickness.min(lengths[1] - layer.thickness);
+    let ends = [layer.height - 0.5 * layer.thickness, layer.height + 0.5 * layer.thickness];
+    let single = single_side(ends, room);
+    let thinner = match single {
+        Some((height, _)) => (height - room.low[1]).min(room.high[1] - height),
+        None => layer.thickness.min(lengths[1] - layer.thickness),
+    };
+    let gravity = match (force, single) {
+        (None, _) => Some(0.0),
+        (Some(BodyForce::Constant(g) | BodyForce::WithoutMean(g)), Some(_)) if g.norm() == g[1].abs() => Some(-g[1]),
+        (Some(_), _) => None,
+    };
+    let densities = match single {
+        Some((_, true)) => [inside.density, outside.density],
+        _ => [outside.density, inside.density],
+    };
     let is_linear = wavenumber * thinner >= VALIDITY.depth && wavenumber * layer.amplitude <= VALIDITY.steepness;
     let is_constant = spec.surfactant.is_none() && spec.tension_slope.is_none();
-    let theory = (is_alike && is_free && is_linear && is_constant && tension > 0.0)
-        .then(|| CapillaryWave::new(wavenumber, [inside.density, outside.density], kinematic[0], tension));
+    let holds = is_alike && is_linear && is_constant && room.obstacles.is_empty();
+    let theory = gravity
+        .filter(|_| holds)
+        .and_then(|gravity| CapillaryWave::new(wavenumber, densities, kinematic[0], (tension, gravity)));
     Some(StandingWave { wavenumber, crest: layer.crest, amplitude: layer.amplitude, theory })
+}
+
+/// Where the only side of a layer lies whose other side is behind a wall, and whether the layer is below.
+fn single_side<const D: usize>([lower, upper]: [f64; 2], room: &Room<D>) -> Option<(f64, bool)> {
+    let is_within = |height: f64| height > room.low[1] && height < room.high[1];
+    match (room.is_bounded(1), is_within(lower), is_within(upper)) {
+        (true, false, true) => Some((upper, true)),
+        (true, true, false) => Some((lower, false)),
+        _ => None,
+    }
 }
 
 /// The steady flow of flat layers between two walls that hold them, driven by the walls and by a force along them.

@@ -8,9 +8,10 @@ use super::hydrostatic::{Hydrostatic, pressure_of_height};
 use super::layer::{check_layer, standing_wave, steady_flow};
 use super::numbers::{SceneNumbers, smallest_radius};
 use super::own_motion::{StartMotion, motion_at_start};
+use super::obstacles;
 use super::room::{Room, check_needs, check_size, surround};
 use super::spec::{
-    BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, Shifting, StopWhen, TensionWord,
+    BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, ObstacleSpec, Shifting, StopWhen, TensionWord,
 };
 use super::start_lattice::StartLattice;
 use super::varying_tension::{StartBox, largest_tension, tension_law};
@@ -147,7 +148,10 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let mut errors = Vec::new();
     let case = Case::new(spec.case, D, spec.spacing);
     let corners = spec.domain.get_or_insert_with(|| case.domain.clone()).clone();
-    let mut room = Room::<D>::new(&corners, &mut errors);
+    let given: &[ObstacleSpec] = spec.obstacles.as_ref().map_or(&[], |obstacles| &obstacles.0);
+    let (bodies, mut clouds) = obstacles::plan::<D>(given, &mut errors);
+    let mut room = Room::<D>::new((&corners, spec.spacing), bodies, &mut errors);
+    room.needs_angles = spec.surface_tension.unwrap_or(case.tension) > 0.0;
     let (low, lengths) = (room.low, room.lengths());
     let is_box = errors.is_empty();
     let shape = drop_shape(&mut spec, &case, (&room, &corners), &mut errors);
@@ -173,9 +177,12 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     config.is_at_rest = motion.is_none();
     config.start_velocity = velocity;
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
-    config.wave = shape.as_ref().and_then(|(shape, ..)| standing_wave(shape, &spec, tension, &lengths));
+    config.wave = shape.as_ref().and_then(|(shape, ..)| standing_wave(shape, &spec, (tension, config.body_force.as_ref()), &room));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     errors.extend(surround(&mut room, (&lattice, is_box), &config, &corners));
+    errors.extend(obstacles::check_known(&room));
+    let drop = shape.as_ref().and_then(|(shape, surface, _)| Some((shape, surface.as_ref()?.whole.as_ref())));
+    errors.extend(drop.and_then(|drop| obstacles::check_known_drop(&room, drop)));
     let named = shape.as_ref().map(|(shape, ..)| shape);
     enclose(&mut config, named, &spec, (&room, &numbers, flow.scope), &mut errors);
     numbers.check_sound_speeds(&spec, &mut errors);
@@ -185,6 +192,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     };
     let why = format!("{time_step:.4e}: the longest that {bound} allows at the speed {expected_speed:.4}");
     let chosen = config.is_adaptive.then_some(("time_step", why)).into_iter().collect();
+    clouds.extend(points);
     spec.dimension = Some(D);
     spec.time_step = if spec.steps.is_none() { given_step } else { spec.time_step };
     Ok(Box::new(DropletScene {
@@ -199,7 +207,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         time_step,
         steps,
         chosen,
-        clouds: points.into_iter().collect(),
+        clouds,
     }))
 }
 
@@ -460,7 +468,18 @@ impl<const D: usize> Scene for DropletScene<D> {
         let lengths = self.lengths();
         let domain = self.room.domain();
         let (mut positions, mut behind_walls) = self.lattice.positions(&self.room.low, &lengths, &self.room.layers);
-        let (level, measure) = self.levels_at(&context, &positions)?;
+        let container = obstacles::container_at_build(&self.room, &context.clouds)?;
+        let behind = container.as_ref();
+        let carved =
+            obstacles::carve(&self.room, behind, &mut positions, &mut behind_walls).map_err(|found| vec![found])?;
+        if !carved.is_empty() {
+            let (level, _) = self.levels_at(&context, (&carved, behind))?;
+            let fault = obstacles::check_drop((&self.room, behind), &self.shape, (&carved, &level));
+            if let Some(fault) = fault {
+                return Err(vec![fault]);
+            }
+        }
+        let (level, measure) = self.levels_at(&context, (&positions, behind))?;
         let cell = lengths.product() / self.count() as f64;
         let velocities = match &self.motion {
             Some(motion) => Some(self.start_velocities(motion, &positions, &level)?),
@@ -469,12 +488,13 @@ impl<const D: usize> Scene for DropletScene<D> {
         let level = match self.hydrostatic() {
             Some(hydrostatic) => {
                 hydrostatic.settle(&mut positions, &level, &mut behind_walls);
-                self.levels_at(&context, &positions)?.0
+                self.levels_at(&context, (&positions, behind))?.0
             }
             None => level,
         };
+        let config = SphConfig { container, ..self.config.clone() };
         let drop = Drop { positions, level, velocities, measure, behind_walls };
-        let system = SphSystem::new(self.config.clone(), domain, cell, drop, context.interrupt).map_err(|error| {
+        let system = SphSystem::new(config, domain, cell, drop, context.interrupt).map_err(|error| {
             vec![Violation::new("/domain", "range", error.to_string(), self.spec.domain.to_json(), error.least)]
         })?;
         let (plan, clock) = (context.plan, context.cpu_clock);

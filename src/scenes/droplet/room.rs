@@ -1,6 +1,7 @@
 //! The box of a scene: its corners, its walls, and the layers of points behind them.
 
-use super::spec::{AxisSpec, BoxSpec, Droplet, GeometryChoice, Shifting, WallSpec, WallWord};
+use super::obstacles::PlannedObstacle;
+use super::spec::{AxisSpec, BoxSpec, Droplet, GeometryChoice, WallSpec, WallWord};
 use super::start_lattice::StartLattice;
 use super::vectors::vector;
 use crate::geometry::domain::Axis;
@@ -13,7 +14,7 @@ use crate::spec::{Choice, Parameter, Violation};
 use serde_json::{Value, json};
 
 /// The space for the fluids, and what is around it.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(super) struct Room<const D: usize> {
     pub low: Vector<D>,
     pub high: Vector<D>,
@@ -22,19 +23,41 @@ pub(super) struct Room<const D: usize> {
     pub layers: [usize; D],
     /// Thickness of these layers.
     depth: Vector<D>,
+    /// Bodies in the box.
+    pub obstacles: Vec<PlannedObstacle<D>>,
+    /// Whether an interface that meets walls needs their contact angles.
+    pub needs_angles: bool,
+    /// The spacing, and the least thickness of layers of points behind walls.
+    pub spacing: f64,
+    pub least_layer: f64,
 }
 
 impl<const D: usize> Room<D> {
     /// The box of a spec.
-    pub fn new(spec: &BoxSpec, errors: &mut Vec<Violation>) -> Self {
+    pub fn new(
+        (spec, spacing): (&BoxSpec, f64),
+        obstacles: Vec<PlannedObstacle<D>>,
+        errors: &mut Vec<Violation>,
+    ) -> Self {
         let low = vector::<D>("/domain/low", &spec.low, errors);
         let high = vector::<D>("/domain/high", &spec.high, errors);
         if (high - low).iter().any(|length| *length <= 0.0) {
             let detail = "the upper corner must lie above the lower one along every axis";
             errors.push(Violation::new("/domain/high", "range", detail, spec.high.to_json(), Value::Null));
         }
-        let container = sides(spec, errors).map(|sides| Container::new(low, high, sides));
-        Self { low, high, container, layers: [0; D], depth: Vector::<D>::zeros() }
+        let sides = sides(spec, errors).or_else(|| (!obstacles.is_empty()).then_some([const { None }; D]));
+        let container = sides.map(|sides| Container::new(low, high, sides));
+        Self {
+            low,
+            high,
+            container,
+            layers: [0; D],
+            depth: Vector::<D>::zeros(),
+            obstacles,
+            needs_angles: true,
+            spacing,
+            least_layer: 0.0,
+        }
     }
 
     /// Lengths of the space for the fluids.
@@ -50,6 +73,7 @@ impl<const D: usize> Room<D> {
     /// Adds layers of the lattice behind the walls, at least of a thickness.
     pub fn add_layers(&mut self, lattice: &StartLattice<D>, thickness: f64) {
         let edges = lattice.edges(&self.lengths());
+        self.least_layer = thickness;
         for d in 0..D {
             if !self.is_bounded(d) {
                 continue;
@@ -98,25 +122,24 @@ impl<const D: usize> Room<D> {
 
     /// By how much a drop between two corners reaches through a wall, and through which, of those walls that have no contact angle.
     pub fn pierced(&self, spec: &BoxSpec, low: &Vector<D>, high: &Vector<D>) -> Option<(String, f64)> {
-        let has_angle = |wall: &WallSpec| {
-            wall.contact_angle.is_some() || wall.advancing_angle.is_some() || wall.receding_angle.is_some()
-        };
         let axes = spec.axes.iter().flat_map(|axes| axes.0.iter().enumerate());
         let walls = axes.filter_map(|(d, axis)| match axis {
-            AxisSpec::Walls { low, high } => Some((d, [("low", has_angle(low)), ("high", has_angle(high))])),
+            AxisSpec::Walls { low, high } => Some((d, [("low", low.has_angle()), ("high", high.has_angle())])),
             AxisSpec::Periodic => None,
         });
         let beyond = |d: usize, end: usize| if end == 0 { self.low[d] - low[d] } else { high[d] - self.high[d] };
         let all = walls.flat_map(|(d, ends)| {
             ends.into_iter().enumerate().map(move |(end, (name, has_angle))| (d, end, name, has_angle))
         });
+        let all = all.filter(|_| self.needs_angles);
         let pierced = all.filter(|(d, end, _, has_angle)| !has_angle && beyond(*d, *end) > 0.0);
         pierced.map(|(d, end, name, _)| (format!("/domain/axes/{d}/{name}"), beyond(d, end))).next()
     }
 
-    /// Whether a part between two corners lies behind walls.
+    /// Whether a part between two corners may lie behind walls.
     pub fn cuts(&self, low: &Vector<D>, high: &Vector<D>) -> bool {
-        (0..D).any(|d| self.is_bounded(d) && (low[d] < self.low[d] || high[d] > self.high[d]))
+        !self.obstacles.is_empty()
+            || (0..D).any(|d| self.is_bounded(d) && (low[d] < self.low[d] || high[d] > self.high[d]))
     }
 }
 
@@ -139,7 +162,7 @@ fn sides<const D: usize>(spec: &BoxSpec, errors: &mut Vec<Violation>) -> Option<
 }
 
 /// A wall across an axis.
-fn wall<const D: usize>(spec: &WallSpec, axis: usize, place: &str, errors: &mut Vec<Violation>) -> Wall<D> {
+pub(super) fn wall<const D: usize>(spec: &WallSpec, axis: usize, place: &str, errors: &mut Vec<Violation>) -> Wall<D> {
     let at = format!("{place}/velocity");
     let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |given| vector::<D>(&at, given, errors));
     if velocity[axis] != 0.0 {
@@ -228,7 +251,6 @@ pub(super) fn check_needs(spec: &Droplet, is_summation: bool, has_tension: bool,
     let density = spec.density_method.as_ref().map_or(Value::Null, Parameter::to_json);
     let needs = [
         (is_summation, "/density_method", density, json!("summation")),
-        (spec.shifting != Some(Shifting::Pst), "/shifting", json!("pst"), json!("none")),
         (
             !has_tension || spec.geometry != GeometryChoice::Colorfield,
             "/geometry",

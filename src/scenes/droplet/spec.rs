@@ -74,6 +74,16 @@ crate::group! {
 }
 
 crate::group! {
+    /// A body that stands in the fluids.
+    pub struct ObstacleSpec {
+        /// the body: a shape that is known exactly, or a mesh
+        shape: Shape;
+        /// its surface
+        wall: WallSpec = WallSpec::default();
+    }
+}
+
+crate::group! {
     /// A fluid.
     pub struct FluidSpec: Default {
         /// density ρ₀ at rest
@@ -234,6 +244,14 @@ crate::group! {
     }
 }
 
+impl WallSpec {
+    /// Whether an angle was given.
+    #[must_use]
+    pub fn has_angle(&self) -> bool {
+        self.contact_angle.is_some() || self.advancing_angle.is_some() || self.receding_angle.is_some()
+    }
+}
+
 impl BoxSpec {
     /// Whether there are walls along any axis.
     #[must_use]
@@ -383,6 +401,8 @@ crate::group! {
         shape: Option<Shape>;
         /// the box; by case, and periodic along every axis, when not given
         domain: Option<BoxSpec>;
+        /// bodies that stand in the fluids, thicker than neighbors reach; none when not given
+        obstacles: Option<Listed<ObstacleSpec>>, in Items(1, 16, ());
         /// distance h of neighboring particles: the volume of a particle is about h^D, whatever the lattice
         spacing: f64 = 0.031_25, in POSITIVE;
         /// velocity of both fluids at the start; 0 when not given

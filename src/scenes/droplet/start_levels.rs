@@ -13,6 +13,7 @@ use crate::scene::cloud;
 use crate::scenes::pcp_spec::{PcpContext, PcpSpec};
 use crate::scenes::shapes::ShapeSurface;
 use crate::schemes::weakly_compressible_sph::Geometry;
+use crate::schemes::weakly_compressible_sph::walls::Container;
 use crate::spec::Violation;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
@@ -26,20 +27,21 @@ impl<const D: usize> DropletScene<D> {
     pub(super) fn levels_at(
         &self,
         context: &BuildContext,
-        positions: &[Vector<D>],
+        (positions, container): (&[Vector<D>], Option<&Container<D>>),
     ) -> Result<(Vec<f64>, f64), Vec<Violation>> {
         let lengths = self.lengths();
         let found = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
             let area = lengths.product() / lengths[1];
             let period = (!self.room.is_bounded(1)).then_some(lengths[1]);
             let levels = |at: &[Vector<D>]| at.iter().map(|x| distance_from_layer(&layer, period, x)).collect();
-            let measure = if period.is_some() { layer.thickness * area } else { self.measure_of(&levels) };
+            let is_whole = period.is_some() && self.room.obstacles.is_empty();
+            let measure = if is_whole { layer.thickness * area } else { self.measure_of(&levels, container) };
             (levels(positions), measure)
         } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(context)? {
             let (low, high) = whole.bounding_box();
             let levels = |at: &[Vector<D>]| self.levels(whole.as_ref(), at);
             let is_cut = self.room.cuts(&low, &high);
-            let measure = if is_cut { self.measure_of(&levels) } else { whole.area_or_volume() };
+            let measure = if is_cut { self.measure_of(&levels, container) } else { whole.area_or_volume() };
             (levels(positions), measure)
         } else {
             (self.levels_of_points(context, positions).map_err(|found| vec![found])?, f64::NAN)
@@ -49,7 +51,11 @@ impl<const D: usize> DropletScene<D> {
 
     /// The area or volume inside of what walls cut, by its signed distances on a grid: cells away from the surface count completely or
     /// not at all, those next to it are halved, and the smallest count by the share below a plane across one axis.
-    fn measure_of(&self, levels: &dyn Fn(&[Vector<D>]) -> Vec<f64>) -> f64 {
+    fn measure_of(
+        &self,
+        levels: &dyn Fn(&[Vector<D>]) -> Vec<f64>,
+        container: Option<&Container<D>>,
+    ) -> f64 {
         let (low, lengths) = (self.room.low, self.lengths());
         let counts: [usize; D] = std::array::from_fn(|d| (lengths[d] / self.config.spacing).ceil().max(1.0) as usize);
         let mut edges = Vector::<D>::from_fn(|d, _| lengths[d] / counts[d] as f64);
@@ -61,7 +67,12 @@ impl<const D: usize> DropletScene<D> {
         let mut measure = 0.0;
         for halving in 0..=MEASURE_HALVINGS {
             let (volume, half_diagonal) = (edges.product(), 0.5 * edges.norm());
-            let found = levels(&centers);
+            let mut found = levels(&centers);
+            // What lies in bodies is outside.
+            let in_front = |x: &Vector<D>| container?.beside_obstacle(x).map(|beside| beside.distance);
+            for (level, x) in found.iter_mut().zip(&centers) {
+                *level = level.max(in_front(x).map_or(f64::NEG_INFINITY, |distance| -distance));
+            }
             let is_last = halving == MEASURE_HALVINGS;
             let share = |level: f64| match level.abs() < half_diagonal {
                 true => (0.5 - level / edges.max()).clamp(0.0, 1.0),

@@ -6,7 +6,7 @@ use super::smoothed_delta::{smoothed_delta, smoothed_step};
 use super::species::Species;
 use super::system::SphSystem;
 use super::walls::Container;
-use crate::closest_point::enclosed_moments::{Bounds, EnclosedMoments, enclosed_moments};
+use crate::closest_point::enclosed_moments::{Bounds, EnclosedMoments, Space, enclosed_moments};
 use crate::geometry::Vector;
 use crate::geometry::domain::Axis;
 use crate::neighbors::{CellList, NeighborSearch};
@@ -109,8 +109,16 @@ impl<const D: usize> SphSystem<D> {
         let Some(interface) = self.interface.level_set() else { return Ok(None) };
         let center = self.circular_center(&interface.surface.sample_points());
         let unwrap = |x: &Vector<D>| center + self.domain.displacement(&center, x);
-        let bounds = self.config.container.as_ref().map_or_else(Bounds::none, Container::bounds);
-        enclosed_moments(&interface.surface, unwrap, &bounds, &self.interrupt).map(Some)
+        let container = self.config.container.as_ref();
+        let from_bodies = |x: &Vector<D>| {
+            let beside = container.and_then(|container| container.beside_obstacle(x));
+            beside.map_or((f64::INFINITY, Vector::<D>::zeros()), |beside| (beside.distance, beside.normal))
+        };
+        let space = Space {
+            bounds: container.map_or_else(Bounds::none, Container::bounds),
+            bodies: container.filter(|container| container.has_obstacles()).map(|_| &from_bodies as _),
+        };
+        enclosed_moments(&interface.surface, unwrap, &space, &self.interrupt).map(Some)
     }
 
     /// A center from which nothing is cut: along periodic axes opposite to the widest gap between points.

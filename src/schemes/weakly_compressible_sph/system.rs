@@ -1,24 +1,24 @@
 //! The particles of the fluids, and one evaluation: from positions to rates of change.
 
-use super::config::{Geometry, PressureConfig, SphConfig, Volumes};
+use super::config::{PressureConfig, SphConfig, Volumes};
 use super::droplets::{Droplets, Searched};
 use super::equations::FlowEquations;
 use super::flow_state::{FlowState, Rates};
 use super::interactions::contact_line::ContactLines;
 use super::interactions::surface_tension::{BandForces, SurfaceTension};
 use super::interactions::{Moment, ParticleForce, TensionForce, density_summation, shifting};
-use super::interface::level_set::{Answering, LevelSetConfig};
-use super::interface::{ColorField, Interface, InterfaceError, LevelSet};
+use super::interface::level_set::Answering;
+use super::interface::{Interface, InterfaceError, LevelSet};
 use super::kernel_choice::ScaledKernel;
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
 use super::species::Species;
-use super::start::{balance, start_velocities, stray_allowance};
+use super::start::{balance, new_interface, new_walls, start_velocities, stray_allowance};
 use super::strays::Strays;
 use super::surfactant::Scales;
 use super::varying_tension::{Surroundings, VaryingTension};
 use super::volume_form::viscosity_share;
-use super::walls::Walls;
+use super::walls::{FlowAndWalls, Walls};
 use super::walls::level::Levels;
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::domain::Axis;
@@ -306,9 +306,14 @@ impl<const D: usize> SphSystem<D> {
             TensionForce::BalancedUncorrected | TensionForce::Csf => f64::INFINITY,
         };
         self.flow.derive_volumes();
-        let Self { pairs, particles, columns, interface, config, flow, domain, .. } = self;
+        let Self { pairs, particles, columns, interface, config, flow, walls, domain, .. } = self;
         let carried = interface.level_set().map(LevelSet::carried);
-        shifting::concentration(pairs, &flow.volume, config.spacing, |i, gradient| {
+        let all = FlowAndWalls { flow, walls: walls.as_ref() };
+        shifting::concentration(pairs, |i| all.volume(i), config.spacing, |i, gradient| {
+            // Points of walls stay where they are.
+            if i >= flow.count() {
+                return;
+            }
             let mut shift = shifting::displacement(gradient, config.smoothing_length, way);
             if let Some(carried) = carried {
                 let (phi, normal) = (particles.scalar(columns.phi)[i], particles.vector(columns.normal)[i]);
@@ -396,42 +401,6 @@ impl<const D: usize> SphSystem<D> {
             cutoff: interface.level_set().map_or(0.0, LevelSet::keep),
             container: config.container.as_ref(),
         })
-    }
-}
-
-/// The walls of a configuration, with points behind them.
-fn new_walls<const D: usize>(
-    config: &SphConfig<D>,
-    domain: &Domain<D>,
-    behind: &[Vector<D>],
-    cell: f64,
-) -> Option<Walls<D>> {
-    let radius = config.kernel.support() * config.smoothing_length;
-    let container = config.container.clone()?;
-    Some(Walls::new(container, behind, domain, (radius, config.skin()), cell))
-}
-
-fn new_interface<const D: usize>(
-    config: &SphConfig<D>,
-    domain: &Domain<D>,
-    particles: &mut Particles<D>,
-    columns: &SurfaceColumns,
-) -> Interface<D> {
-    if !config.has_tension() {
-        return Interface::Absent;
-    }
-    match &config.geometry {
-        Geometry::Pcp { method, half_band, level_update, curvature_filter } => {
-            let level_set = LevelSetConfig {
-                spacing: config.spacing,
-                half_band: *half_band,
-                update: *level_update,
-                curvature_filter: *curvature_filter,
-                repair_time: config.repair_time(),
-            };
-            Interface::LevelSet(Box::new(LevelSet::new(method.clone(), domain, level_set, particles, columns)))
-        }
-        Geometry::ColorField => Interface::ColorField(ColorField::new(particles.len())),
     }
 }
 

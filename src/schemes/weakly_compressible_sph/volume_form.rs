@@ -14,7 +14,7 @@
 use super::config::PressureForm;
 use super::flow_state::FlowState;
 use super::interactions::pressure::{HamiltonianPressure, VolumePressure};
-use super::interactions::viscosity::{SpeciesViscosity, UniformViscosity};
+use super::interactions::viscosity::{SpeciesViscosity, StressViscosity, UniformViscosity};
 use super::interactions::volume_pair::{STRESS, VISCOSITY, VOLUME};
 use super::interactions::{NoTerm, PairTerm};
 use super::kernel_choice::with_kernel;
@@ -60,7 +60,7 @@ pub(super) fn accelerate<const D: usize>(
         (PressureForm::Mean, true) => sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure), NoTerm),
         (PressureForm::Mean, false) => sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure), NoTerm),
         (PressureForm::Hamiltonian, true) => sum_forces::<K, D, 2>(pairs, UniformViscosity, HamiltonianPressure),
-        (PressureForm::Hamiltonian, false) => sum_forces::<K, D, 3>(pairs, SpeciesViscosity, HamiltonianPressure),
+        (PressureForm::Hamiltonian, false) => sum_forces::<K, D, 3>(pairs, StressViscosity, HamiltonianPressure),
     })?;
     // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
     let kernel = &pairs.kernel;

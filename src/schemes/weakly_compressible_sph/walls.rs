@@ -9,11 +9,15 @@
 //!   at the wall and are quadratic, as in Poiseuille flow, are continued exactly;
 //! - velocity at a wall that lets the fluid slip: the mirror image, c + b s² along the wall, and −(a s + b s²) across it;
 //! - viscosity: the mean Σ w η_f/Σ w.
+//!
+//! Where no particle is near the foot, as inside of a body that stands on a wall, the particles around the point itself count.
 
 pub mod container;
 pub(super) mod level;
+pub mod obstacle;
 
 pub use container::{Beside, ContactAngle, Container, Wall};
+pub use obstacle::Obstacle;
 
 use super::flow_state::FlowState;
 use super::interactions::BodyForce;
@@ -54,7 +58,9 @@ pub(super) struct Walls<const D: usize> {
     skin: f64,
     /// Particles next to walls.
     near: Vec<usize>,
-    /// Those around the feet, as places in `near`, behind each other, and where those of each point begin.
+    /// The place of each point around which particles count: its foot, or itself where none is near that.
+    origins: Vec<Vector<D>>,
+    /// Those around the origins, as places in `near`, behind each other, and where those of each point begin.
     neighbors: Vec<u32>,
     begins: Vec<usize>,
     /// What the particles next to walls have, in the order of `near`.
@@ -99,6 +105,7 @@ impl<const D: usize> Walls<D> {
         Self {
             near: Vec::new(),
             front: Vec::new(),
+            origins: Vec::new(),
             neighbors: Vec::new(),
             begins: Vec::new(),
             volume: vec![cell; points.len()],
@@ -127,17 +134,24 @@ impl<const D: usize> Walls<D> {
         cells.rebuild(self.near.iter().map(|i| positions[*i]), reach);
         let around = |point: &Point<D>| {
             let mut found = Vec::new();
+            let mut origin = point.foot;
             // A point that is too deep for any particle has none.
             if point.depth < reach {
-                cells.for_each_within(&point.foot, reach, |k, _, _| found.push(k as u32));
+                cells.for_each_within(&origin, reach, |k, _, _| found.push(k as u32));
+            }
+            if found.is_empty() {
+                origin = point.position;
+                cells.for_each_within(&origin, reach, |k, _, _| found.push(k as u32));
             }
             found.sort_unstable();
-            found
+            (origin, found)
         };
-        let lists: Vec<Vec<u32>> = self.points.par_iter().map(around).collect();
+        let lists: Vec<(Vector<D>, Vec<u32>)> = self.points.par_iter().map(around).collect();
+        self.origins.clear();
         self.neighbors.clear();
         self.begins.clear();
-        for list in &lists {
+        for (origin, list) in &lists {
+            self.origins.push(*origin);
             self.begins.push(self.neighbors.len());
             self.neighbors.extend_from_slice(list);
         }
@@ -152,7 +166,7 @@ impl<const D: usize> Walls<D> {
         force: Option<&BodyForce<D>>,
         time: f64,
     ) {
-        let Self { domain, container, points, radius, near, front, neighbors, begins, continued, .. } = self;
+        let Self { domain, container, points, radius, near, front, origins, neighbors, begins, continued, .. } = self;
         let around = Around { domain, radius: *radius, positions, near };
         front.clear();
         front.extend(near.iter().map(|i| {
@@ -169,7 +183,7 @@ impl<const D: usize> Walls<D> {
         let fluid = Fluid { around, container, front, background: flow.background };
         continued.par_iter_mut().zip(points.par_iter()).enumerate().with_min_len(64).for_each(
             |(k, (continued, point))| {
-                *continued = fluid.continued(point, &neighbors[begins[k]..begins[k + 1]]);
+                *continued = fluid.continued(point, &origins[k], &neighbors[begins[k]..begins[k + 1]]);
             },
         );
     }
@@ -237,7 +251,7 @@ struct InFront<const D: usize> {
     viscosity: f64,
 }
 
-/// The particles around feet.
+/// The particles around origins.
 #[derive(Clone, Copy)]
 struct Around<'a, const D: usize> {
     domain: &'a Domain<D>,
@@ -247,9 +261,9 @@ struct Around<'a, const D: usize> {
 }
 
 impl<const D: usize> Around<'_, D> {
-    /// The way from the foot of a point to a particle next to walls.
-    fn way(&self, point: &Point<D>, k: usize) -> Vector<D> {
-        self.domain.displacement(&point.foot, &self.positions[self.near[k]])
+    /// The way from a place to a particle next to walls.
+    fn way(&self, origin: &Vector<D>, k: usize) -> Vector<D> {
+        self.domain.displacement(origin, &self.positions[self.near[k]])
     }
 
     /// The length of a way by the radius, and the weight (1 − q)⁴ (1 + 4q) of a particle there.
@@ -269,7 +283,7 @@ struct Fluid<'a, const D: usize> {
     background: f64,
 }
 
-/// Weighted sums over the particles around a foot, distances in units of the radius.
+/// Weighted sums over the particles around an origin, distances in units of the radius.
 #[derive(Debug, Clone, Copy)]
 struct Sums<const D: usize> {
     /// Σ w s^k for k = 0 to 4.
@@ -281,10 +295,10 @@ struct Sums<const D: usize> {
 }
 
 impl<const D: usize> Fluid<'_, D> {
-    fn sums(&self, point: &Point<D>, wall: &Wall<D>, neighbors: &[u32]) -> Sums<D> {
+    fn sums(&self, to_point: &Vector<D>, origin: &Vector<D>, wall: &Wall<D>, neighbors: &[u32]) -> Sums<D> {
         let mut sums = Sums { moments: [0.0; 5], velocity: [Vector::<D>::zeros(); 3], pressure: 0.0, viscosity: 0.0 };
         for k in neighbors.iter().map(|k| *k as usize) {
-            let way = self.around.way(point, k);
+            let way = self.around.way(origin, k);
             let (_, weight) = self.around.weight(&way);
             if weight <= 0.0 {
                 continue;
@@ -299,21 +313,23 @@ impl<const D: usize> Fluid<'_, D> {
                 }
                 share *= particle.distance;
             }
-            let to_point = point.normal * point.depth - way;
-            sums.pressure += weight * (particle.pressure + particle.weight.dot(&to_point));
+            sums.pressure += weight * (particle.pressure + particle.weight.dot(&(to_point - way)));
             sums.viscosity += weight * particle.viscosity;
         }
         sums
     }
 
-    fn continued(&self, point: &Point<D>, neighbors: &[u32]) -> Continued<D> {
+    fn continued(&self, point: &Point<D>, origin: &Vector<D>, neighbors: &[u32]) -> Continued<D> {
         let wall = self.container.wall(point.wall);
-        let sums = self.sums(point, wall, neighbors);
+        let is_foot = *origin == point.foot;
+        let to_point = if is_foot { point.normal * point.depth } else { Vector::<D>::zeros() };
+        let sums = self.sums(&to_point, origin, wall, neighbors);
         let all = sums.moments[0];
         if all <= 0.0 {
             return Continued { velocity: wall.velocity, pressure: self.background, viscosity: 0.0 };
         }
-        let s = -point.depth / self.around.radius;
+        // Without particles at its foot a point is the mirror image of those around it.
+        let s = if is_foot { -point.depth / self.around.radius } else { -sums.moments[1] / all };
         let about_wall = if wall.holds_fluid {
             sums.vanishing(s)
         } else {

@@ -27,16 +27,16 @@ const TUNING: Tuning = Tuning { crowding: 0.2, rate: 0.05, longest: 0.02, free_f
 /// Scalar column: volumes in units of the cell.
 const VOLUME: usize = 0;
 
-/// Calls `found` with the gradient of the concentration at every particle,
+/// Calls `found` with the gradient of the concentration at every particle, and behind them at the points of walls,
 /// ∇C_i = Σ_j (1 + 0.2 (W_ij/W(h))⁴) ∇W V_j (B.15). `spacing` is h.
 pub fn concentration<const D: usize>(
     pairs: &mut PairWorkspace<D>,
-    volume: &[f64],
+    volume: impl Fn(usize) -> f64,
     spacing: f64,
     mut found: impl FnMut(usize, Vector<D>),
 ) -> Result<(), Interrupted> {
     let by_cell = 1.0 / pairs.cell;
-    pairs.gather(VOLUME, 0.0, |i| volume[i] * by_cell);
+    pairs.gather(VOLUME, 0.0, |i| volume(i) * by_cell);
     let at_spacing = pairs.kernel.value(spacing / pairs.kernel.smoothing_length);
     let (one, crowding, by_spacing) =
         (Lanes::splat(1.0), Lanes::splat(TUNING.crowding), Lanes::splat(1.0 / at_spacing));
@@ -91,7 +91,7 @@ mod tests {
         let mut volume = vec![0.0; this.positions.len()];
         sum_volumes(&mut pairs, 1.0, &mut volume, &mut []).unwrap();
         let mut gradients = vec![Vector::<2>::zeros(); volume.len()];
-        concentration(&mut pairs, &volume, this.config.spacing, |i, g| gradients[i] = g).unwrap();
+        concentration(&mut pairs, |i| volume[i], this.config.spacing, |i, g| gradients[i] = g).unwrap();
         for i in this.probes() {
             let mut expected = Vector::<2>::zeros();
             this.each(i, |j, dx, r| {

@@ -2,7 +2,7 @@
 
 use super::mass_pair::{self, MassPair};
 use super::{LimitContext, LimitsStep, PairTerm, StepLimit, volume_pair};
-use crate::linear_algebra::number::Lanes;
+use crate::linear_algebra::number::{Lanes, Number};
 use crate::schemes::weakly_compressible_sph::fluids::Fluid;
 use crate::schemes::weakly_compressible_sph::pair_sums::{Pair, harmonic_mean};
 use std::array::from_fn;
@@ -31,6 +31,28 @@ impl<const D: usize, const S: usize> PairTerm<Pair<'_, D, 2, S>, [Lanes; D]> for
         let viscosity = harmonic_mean(pair.scalar(volume_pair::VISCOSITY));
         let velocity = pair.difference(volume_pair::VELOCITY);
         from_fn(|d| sum[d] + velocity[d] * viscosity)
+    }
+}
+
+/// Viscosity in the volume form as the divergence of the whole stress η (∇u + ∇uᵀ), (D + 2) η_ij (u_ij·e) e with the direction e of
+/// the pair. Where viscosity jumps, ∇·(η∇u) alone leaves out the stress of an interface that is stretched or turned (Hu and Adams
+/// 2006 have the term; Violeau 2009 its factor). Forces along the pair keep the angular momentum, too.
+#[derive(Debug, Clone, Copy)]
+pub struct StressViscosity;
+
+impl<const D: usize, const S: usize> PairTerm<Pair<'_, D, 2, S>, [Lanes; D]> for StressViscosity {
+    #[inline(always)]
+    fn add_to(self, sum: [Lanes; D], pair: &Pair<'_, D, 2, S>) -> [Lanes; D] {
+        let viscosity = harmonic_mean(pair.scalar(volume_pair::VISCOSITY));
+        let velocity = pair.difference(volume_pair::VELOCITY);
+        let mut approach = velocity[0] * pair.dx[0];
+        for d in 1..D {
+            approach = Number::mul_add(velocity[d], pair.dx[d], approach);
+        }
+        // A particle has no direction to itself.
+        let square = pair.square + Lanes::splat(f64::MIN_POSITIVE);
+        let strength = viscosity * approach * Lanes::splat((D + 2) as f64) / square;
+        from_fn(|d| Number::mul_add(pair.dx[d], strength, sum[d]))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The walls of a scene: which there are, where they stand, and what they ask of the fluids.
 
+use super::obstacle::Obstacle;
 use crate::closest_point::enclosed_moments::Bounds;
 use crate::geometry::Vector;
 
@@ -60,20 +61,28 @@ pub struct Beside<const D: usize> {
     pub wall: usize,
 }
 
-/// A box with walls at some of its sides.
+/// A box with walls at some of its sides, and bodies that stand in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Container<const D: usize> {
     low: Vector<D>,
     high: Vector<D>,
     /// The walls at the lower and the upper end of each axis; None along a periodic one.
     sides: [Option<[Wall<D>; 2]>; D],
+    obstacles: Vec<Obstacle<D>>,
 }
 
 impl<const D: usize> Container<D> {
     /// The box between two corners.
     #[must_use]
     pub fn new(low: Vector<D>, high: Vector<D>, sides: [Option<[Wall<D>; 2]>; D]) -> Self {
-        Self { low, high, sides }
+        Self { low, high, sides, obstacles: Vec::new() }
+    }
+
+    /// The box with bodies in it.
+    #[must_use]
+    pub fn with_obstacles(mut self, obstacles: Vec<Obstacle<D>>) -> Self {
+        self.obstacles = obstacles;
+        self
     }
 
     /// The wall of a number.
@@ -82,6 +91,9 @@ impl<const D: usize> Container<D> {
     /// Where [`Self::beside`] gave no such number.
     #[must_use]
     pub fn wall(&self, number: usize) -> &Wall<D> {
+        if number >= 2 * D {
+            return &self.obstacles[number - 2 * D].wall;
+        }
         let Some(walls) = &self.sides[number / 2] else { unreachable!("walls stand at the ends of their own axis") };
         &walls[number % 2]
     }
@@ -103,7 +115,38 @@ impl<const D: usize> Container<D> {
 
     /// All walls.
     pub fn walls(&self) -> impl Iterator<Item = &Wall<D>> {
-        self.sides.iter().flatten().flatten()
+        self.sides.iter().flatten().flatten().chain(self.obstacles.iter().map(|obstacle| &obstacle.wall))
+    }
+
+    /// Whether bodies stand in the box.
+    #[must_use]
+    pub fn has_obstacles(&self) -> bool {
+        !self.obstacles.is_empty()
+    }
+
+    /// A place beside the nearest body; None where there is none. Along periodic axes its nearest image counts.
+    #[must_use]
+    pub fn beside_obstacle(&self, x: &Vector<D>) -> Option<Beside<D>> {
+        self.nearest_obstacle(x, f64::INFINITY)
+    }
+
+    fn nearest_obstacle(&self, x: &Vector<D>, within: f64) -> Option<Beside<D>> {
+        let (mut nearest, mut within) = (None, within);
+        for (k, obstacle) in self.obstacles.iter().enumerate() {
+            let middle = obstacle.middle();
+            let image = Vector::<D>::from_fn(|d, _| {
+                let length = self.high[d] - self.low[d];
+                if self.is_bounded(d) { x[d] } else { x[d] - length * ((x[d] - middle[d]) / length).round() }
+            });
+            if obstacle.least_distance(&image) < within {
+                let beside = obstacle.beside(&image, 2 * D + k);
+                if beside.distance < within {
+                    within = beside.distance;
+                    nearest = Some(beside);
+                }
+            }
+        }
+        nearest
     }
 
     /// A place between the walls: beside the nearest of them. None where there is no wall.
@@ -119,12 +162,16 @@ impl<const D: usize> Container<D> {
                 }
             }
         }
-        nearest
+        let within = nearest.as_ref().map_or(f64::INFINITY, |known| known.distance);
+        self.nearest_obstacle(x, within).or(nearest)
     }
 
-    /// The nearest place of the fluids' space.
+    /// The nearest place of the fluids' space, for a place behind a wall.
     #[must_use]
     pub fn foot(&self, x: &Vector<D>) -> Vector<D> {
+        if let Some(beside) = self.beside(x).filter(|beside| beside.wall >= 2 * D) {
+            return x + beside.normal * beside.distance;
+        }
         let Bounds { low, high } = self.bounds();
         Vector::<D>::from_fn(|d, _| x[d].clamp(low[d], high[d]))
     }

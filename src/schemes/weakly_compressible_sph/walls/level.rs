@@ -4,7 +4,7 @@
 //!
 //! ψ + κψ²/2 = c + n·x + κ|x|²/2,
 //!
-//! with x from the foot of a point. That is linear in c, n and κ, which are fitted to the level of the particles around the foot; with
+//! with x from the foot of a point, or from the point itself where no particle is near that. That is linear in c, n and κ, which are fitted to the level of the particles around the foot; with
 //! κ = 0 it is a plane. (A quadratic polynomial, four spacings away from its particles, has curvatures that are wrong by a third; with
 //! those a drop on a wall does not come to rest. With the curvature of the drop at rest a drop that spreads loses its area.)
 
@@ -37,13 +37,13 @@ pub struct Levels<'a, const D: usize> {
 impl<const D: usize> Walls<D> {
     /// Continues the level behind the walls.
     pub fn extend_level(&mut self, levels: Levels<'_, D>) {
-        let Self { points, near, neighbors, begins, extension, domain, radius, .. } = self;
+        let Self { points, near, origins, neighbors, begins, extension, domain, radius, .. } = self;
         let found: Vec<Option<(Vector<D>, f64, Vector<D>)>> = (0..points.len())
             .into_par_iter()
             .with_min_len(64)
             .map(|k| {
                 let around = Around { domain, radius: *radius, positions: levels.positions, near };
-                continued(&points[k], &neighbors[begins[k]..begins[k + 1]], around, levels)
+                continued((&points[k], &origins[k]), &neighbors[begins[k]..begins[k + 1]], around, levels)
             })
             .collect();
         extension.positions.clear();
@@ -59,7 +59,7 @@ impl<const D: usize> Walls<D> {
 
 /// The level at a point behind a wall and its direction; None far from any interface.
 fn continued<const D: usize>(
-    point: &Point<D>,
+    (point, origin): (&Point<D>, &Vector<D>),
     neighbors: &[u32],
     around: Around<'_, D>,
     levels: Levels<'_, D>,
@@ -69,8 +69,9 @@ fn continued<const D: usize>(
     if least > levels.reach {
         return None;
     }
-    let Circle { level, slope, curvature } = fit_circle(point, neighbors, around, level_of)?;
-    let way = point.normal * (point.depth / around.radius);
+    let Circle { level, slope, curvature } = fit_circle(origin, neighbors, around, level_of)?;
+    let to_point = if *origin == point.foot { point.normal * point.depth } else { Vector::<D>::zeros() };
+    let way = to_point / around.radius;
     let right = level + slope.dot(&way) + 0.5 * curvature * way.norm_squared();
     // The root next to 0, as it is without curvature.
     let found = 2.0 * right / (1.0 + (1.0 + 2.0 * curvature * right).max(0.0).sqrt()) * around.radius;
@@ -86,7 +87,7 @@ struct Circle<const D: usize> {
 }
 
 fn fit_circle<const D: usize>(
-    point: &Point<D>,
+    origin: &Vector<D>,
     neighbors: &[u32],
     around: Around<'_, D>,
     level_of: impl Fn(u32) -> f64,
@@ -95,7 +96,7 @@ fn fit_circle<const D: usize>(
     let mut right = SVector::<f64, COEFFICIENTS>::zeros();
     let (mut count, mut squares) = (0, 0.0);
     for k in neighbors {
-        let way = around.way(point, *k as usize);
+        let way = around.way(origin, *k as usize);
         let (_, weight) = around.weight(&way);
         let (way, psi) = (way / around.radius, level_of(*k) / around.radius);
         count += usize::from(weight > 0.0);
