@@ -1,19 +1,19 @@
 //! The particles of the fluids, and one evaluation: from positions to rates of change.
 
-use super::config::{Geometry, PressureConfig, SphConfig, Volumes};
+use super::config::{PressureConfig, SphConfig, Volumes};
 use super::droplets::{Droplets, Searched};
 use super::equations::FlowEquations;
 use super::flow_state::{FlowState, Rates};
 use super::interactions::contact_line::ContactLines;
 use super::interactions::surface_tension::{BandForces, SurfaceTension};
 use super::interactions::{Moment, ParticleForce, TensionForce, density_summation, shifting};
-use super::interface::level_set::{Answering, LevelSetConfig};
-use super::interface::{ColorField, Interface, InterfaceError, LevelSet};
+use super::interface::level_set::Answering;
+use super::interface::{Interface, InterfaceError, LevelSet};
 use super::kernel_choice::ScaledKernel;
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
 use super::species::Species;
-use super::start::{balance, start_velocities, stray_allowance};
+use super::start::{balance, new_interface, new_walls, start_velocities, stray_allowance};
 use super::strays::Strays;
 use super::surfactant::Scales;
 use super::varying_tension::{Surroundings, VaryingTension};
@@ -396,42 +396,6 @@ impl<const D: usize> SphSystem<D> {
             cutoff: interface.level_set().map_or(0.0, LevelSet::keep),
             container: config.container.as_ref(),
         })
-    }
-}
-
-/// The walls of a configuration, with points behind them.
-fn new_walls<const D: usize>(
-    config: &SphConfig<D>,
-    domain: &Domain<D>,
-    behind: &[Vector<D>],
-    cell: f64,
-) -> Option<Walls<D>> {
-    let radius = config.kernel.support() * config.smoothing_length;
-    let container = config.container.clone()?;
-    Some(Walls::new(container, behind, domain, (radius, config.skin()), cell))
-}
-
-fn new_interface<const D: usize>(
-    config: &SphConfig<D>,
-    domain: &Domain<D>,
-    particles: &mut Particles<D>,
-    columns: &SurfaceColumns,
-) -> Interface<D> {
-    if !config.has_tension() {
-        return Interface::Absent;
-    }
-    match &config.geometry {
-        Geometry::Pcp { method, half_band, level_update, curvature_filter } => {
-            let level_set = LevelSetConfig {
-                spacing: config.spacing,
-                half_band: *half_band,
-                update: *level_update,
-                curvature_filter: *curvature_filter,
-                repair_time: config.repair_time(),
-            };
-            Interface::LevelSet(Box::new(LevelSet::new(method.clone(), domain, level_set, particles, columns)))
-        }
-        Geometry::ColorField => Interface::ColorField(ColorField::new(particles.len())),
     }
 }
 
