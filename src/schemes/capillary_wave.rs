@@ -71,8 +71,9 @@ impl CapillaryWave {
         let t = self.frequency * time;
         let share = (1.0 - 4.0 * self.beta) * self.damping.powi(2);
         let diffusion = (-self.damping * t).exp();
-        let first =
-            4.0 * share / (8.0 * share + self.sign) * diffusion * scaled_erfc(Complex::from((self.damping * t).sqrt())).re;
+        let first = 4.0 * share / (8.0 * share + self.sign)
+            * diffusion
+            * scaled_erfc(Complex::from((self.damping * t).sqrt())).re;
         let term = |i: usize| {
             let z = self.roots[i];
             let others = (0..4).filter(|j| *j != i).map(|j| self.roots[j] - z).product::<Complex<f64>>();
@@ -146,9 +147,10 @@ mod tests {
         ),
     ];
 
+    type Growing = ([f64; 2], f64, (f64, f64), [f64; 3]);
     /// Below, above, ν, τ and g, and a/a₀ at |ω₀|t = 1, 3 and 6, with k = 2π; found in the same way.
-    const GROWING: [([f64; 2], f64, (f64, f64), [f64; 3]); 3] = [
-        ([1.0, 3.0], 0.01, (0.0, 1.0), [1.398_846_441_745_692_6, 5.384_029_958_071_491, 46.847_027_008_795_676]),
+    const GROWING: [Growing; 3] = [
+        ([1.0, 3.0], 0.01, (0.0, 1.0), [1.398_846_441_745_692_6, 5.384_029_958_071_491, 46.847_027_008_795_68]),
         ([1.0, 3.0], 0.02, (0.02, 1.0), [1.314_242_544_637_559_4, 3.575_583_675_972_383, 17.469_922_183_512_454]),
         ([0.1, 1.0], 0.005, (0.005, 2.0), [1.486_967_873_723_678, 7.821_851_313_592_719, 111.266_918_798_055_14]),
     ];

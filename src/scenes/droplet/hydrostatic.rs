@@ -45,7 +45,7 @@ impl<const D: usize> Hydrostatic<'_, D> {
 
 /// Pressures by Δρ g D that keep the pressures of fluids positive while a drop of a diameter D rises: with 1 the drop of Hysing et
 /// al. has a rise velocity 2 % too high, with 2 .5 %, with 4 5 % too low (measured; docs/results/wall-notes.md).
-const RISE_PRESSURE: f64 = 2.0;
+const RISE_PRESSURE: f64 = 0.5;
 
 /// The pressure that keeps the pressures of fluids between walls positive under gravity.
 pub(super) fn pressure_of_height<const D: usize>(
@@ -61,7 +61,7 @@ pub(super) fn pressure_of_height<const D: usize>(
         }
         Some(_) => {
             let difference = (spec.fluids.inside.density - spec.fluids.outside.density).abs();
-            std::env::var("RISE").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(RISE_PRESSURE) * difference * numbers.gravity * 2.0 * numbers.radius.unwrap_or(0.0)
+            RISE_PRESSURE * difference * numbers.gravity * 2.0 * numbers.radius.unwrap_or(0.0)
         }
         None => 0.0,
     }

@@ -7,11 +7,12 @@ use super::formulation::{Scope, level_and_curvature, pressures};
 use super::hydrostatic::{Hydrostatic, pressure_of_height};
 use super::layer::{check_layer, standing_wave, steady_flow};
 use super::numbers::{SceneNumbers, smallest_radius};
-use super::own_motion::{StartMotion, motion_at_start};
 use super::obstacles;
+use super::own_motion::{StartMotion, motion_at_start};
 use super::room::{Room, check_needs, check_size, surround};
 use super::spec::{
-    BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, ObstacleSpec, Shifting, StopWhen, TensionWord,
+    BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, ObstacleSpec, Shifting, StopWhen,
+    TensionWord,
 };
 use super::start_lattice::StartLattice;
 use super::varying_tension::{StartBox, largest_tension, tension_law};
@@ -177,7 +178,9 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     config.is_at_rest = motion.is_none();
     config.start_velocity = velocity;
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
-    config.wave = shape.as_ref().and_then(|(shape, ..)| standing_wave(shape, &spec, (tension, config.body_force.as_ref()), &room));
+    config.wave = shape
+        .as_ref()
+        .and_then(|(shape, ..)| standing_wave(shape, &spec, (tension, config.body_force.as_ref()), &room));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     errors.extend(surround(&mut room, (&lattice, is_box), &config, &corners));
     errors.extend(obstacles::check_known(&room));
@@ -236,6 +239,18 @@ fn part_count<const D: usize>(shape: Option<&Shape>, surface: Option<&ShapeSurfa
     surface.map(|surface| surface.parts.len()).or_else(|| shape.filter(is_one).map(|_| 1))
 }
 
+/// Displacement of a shift by ε² ∇C, the paper's.
+const SHIFTING: f64 = 0.05;
+/// The same between walls, where a drop rises for long: with more, flows lose speed (a third of it costs the rising drop of Hysing et al. 1 % of
+/// its way less; docs/results/wall-notes.md).
+const SHIFTING_BETWEEN_WALLS: f64 = 0.015;
+
+/// Whether walls or a force deform what starts between walls for long: all but flat layers, which are at rest or slide along themselves.
+fn is_stirred<const D: usize>(spec: &Droplet, force: Option<&BodyForce<D>>, room: &Room<D>) -> bool {
+    let is_flat = matches!(spec.shape, Some(Shape::Layer { amplitude: 0.0, .. }));
+    (!is_flat || !room.obstacles.is_empty()) && (force.is_some() || room.wall_speed() > 0.0)
+}
+
 /// Geometry, smoothing length, expected speed, and the box.
 type SchemeParts<'a, const D: usize> = (Option<Geometry>, f64, f64, &'a Room<D>);
 
@@ -251,6 +266,8 @@ fn sph_config<const D: usize>(
     let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
     let body_force = body_force(force, &spec.fluids, (room, spec.end_time), errors);
     let pressure = pressures(spec, flow.scope, errors);
+    let is_stirred = room.container.is_some() && flow.scope.is_summation && is_stirred(spec, body_force.as_ref(), room);
+    let default_shifting = if is_stirred { Shifting::Pst } else { flow.default_shifting };
     SphConfig {
         spacing: spec.spacing,
         smoothing_length,
@@ -267,7 +284,8 @@ fn sph_config<const D: usize>(
         geometry: geometry.unwrap_or(Geometry::ColorField),
         discretization: flow.discretization,
         density: flow.density,
-        is_shifted: *spec.shifting.get_or_insert(flow.default_shifting) == Shifting::Pst,
+        is_shifted: *spec.shifting.get_or_insert(default_shifting) == Shifting::Pst,
+        shifting_rate: if room.container.is_some() { SHIFTING_BETWEEN_WALLS } else { SHIFTING },
         body_force,
         integrator: match spec.integrator {
             IntegratorWord::KickDriftKick => Integrator::KickDriftKick,

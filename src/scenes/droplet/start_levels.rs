@@ -51,11 +51,7 @@ impl<const D: usize> DropletScene<D> {
 
     /// The area or volume inside of what walls cut, by its signed distances on a grid: cells away from the surface count completely or
     /// not at all, those next to it are halved, and the smallest count by the share below a plane across one axis.
-    fn measure_of(
-        &self,
-        levels: &dyn Fn(&[Vector<D>]) -> Vec<f64>,
-        container: Option<&Container<D>>,
-    ) -> f64 {
+    fn measure_of(&self, levels: &dyn Fn(&[Vector<D>]) -> Vec<f64>, container: Option<&Container<D>>) -> f64 {
         let (low, lengths) = (self.room.low, self.lengths());
         let counts: [usize; D] = std::array::from_fn(|d| (lengths[d] / self.config.spacing).ceil().max(1.0) as usize);
         let mut edges = Vector::<D>::from_fn(|d, _| lengths[d] / counts[d] as f64);

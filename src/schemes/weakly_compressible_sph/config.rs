@@ -130,6 +130,8 @@ pub struct SphConfig<const D: usize> {
     pub pressure: PressureConfig,
     /// Whether particles are shifted towards an even distribution (PCP eqs. B.15, B.16).
     pub is_shifted: bool,
+    /// Displacement of a shift by ε² ∇C; .05 in the paper.
+    pub shifting_rate: f64,
     /// The walls; None in a box that is periodic along every axis.
     pub container: Option<Container<D>>,
     /// Whether the fluids are flat layers at the start.
@@ -187,6 +189,17 @@ impl<const D: usize> SphConfig<D> {
     pub fn repair_time(&self) -> f64 {
         let density = 0.5 * (self.fluids.inside.density + self.fluids.outside.density);
         0.5 * (density * self.spacing.powi(3) / (2.0 * std::f64::consts::PI * self.tension)).sqrt()
+    }
+
+    /// Whether viscosity is the divergence of the whole stress η (∇u + ∇uᵀ), not of η∇u, which is the same with one viscosity and in flat
+    /// layers that slide along themselves. The paper's form has η∇u.
+    #[must_use]
+    pub fn has_whole_stress(&self) -> bool {
+        self.discretization == Discretization::Kernels
+            && !self.is_density_integrated()
+            && self.pressure.form == PressureForm::Hamiltonian
+            && !self.fluids.have_one_viscosity()
+            && !self.starts_in_layers
     }
 
     /// Whether there is an interface to compute.

@@ -1,9 +1,10 @@
 //! The equations of the flow: which form the interactions between particles take. It is chosen once a run.
 
-use super::config::{DensityMethod, Discretization, PressureForm, SphConfig};
+use super::config::{DensityMethod, Discretization, SphConfig};
 use super::dcpse::DcpseFlow;
 use super::flow_state::{FlowState, Rates};
 use super::pair_workspace::PairWorkspace;
+use super::volume_form::Forms;
 use super::walls::Walls;
 use super::{mass_form, volume_form};
 use crate::geometry::{Domain, Vector};
@@ -12,7 +13,7 @@ use crate::parallel::{Interrupt, Interrupted};
 /// The form of the equations.
 pub(super) enum FlowEquations<const D: usize> {
     /// Densities by summation, forces in the volume form.
-    VolumeForm { pressure: PressureForm },
+    VolumeForm { forms: Forms },
     /// Densities by continuity with a diffusion ξ̂, forces in the mass form.
     MassForm { diffusion: f64 },
     /// Derivatives by fits, densities by continuity with a diffusion ξ̂ ε.
@@ -31,7 +32,9 @@ impl<const D: usize> FlowEquations<D> {
                 spread: diffusion.unwrap_or(0.0) * config.smoothing_length,
             },
             (Discretization::Kernels, Some(diffusion)) => Self::MassForm { diffusion },
-            (Discretization::Kernels, None) => Self::VolumeForm { pressure: config.pressure.form },
+            (Discretization::Kernels, None) => Self::VolumeForm {
+                forms: Forms { pressure: config.pressure.form, has_whole_stress: config.has_whole_stress() },
+            },
         }
     }
 
@@ -62,9 +65,7 @@ impl<const D: usize> FlowEquations<D> {
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         match self {
-            Self::VolumeForm { pressure } => {
-                volume_form::accelerate(flow, walls, *pressure, pairs, &mut rates.acceleration)
-            }
+            Self::VolumeForm { forms } => volume_form::accelerate(flow, walls, *forms, pairs, &mut rates.acceleration),
             Self::MassForm { diffusion } => mass_form::find_rates(flow, *diffusion, pairs, rates),
             Self::Fits { fits, spread } => fits.find_rates(positions, flow, *spread, rates, interrupt),
         }
@@ -73,9 +74,10 @@ impl<const D: usize> FlowEquations<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::{DensityMethod, Discretization, FlowEquations, PressureForm, SphConfig};
+    use super::{DensityMethod, Discretization, FlowEquations, Forms, SphConfig};
     use crate::operators::Support;
     use crate::schemes::weakly_compressible_sph::KernelChoice;
+    use crate::schemes::weakly_compressible_sph::PressureForm;
     use crate::schemes::weakly_compressible_sph::test_setting::setting;
 
     #[test]
@@ -83,7 +85,17 @@ mod tests {
         let config = setting::<2>(KernelChoice::WendlandC2, 1.0).config;
         let this = setting::<2>(KernelChoice::WendlandC2, 1.0);
         let equations = |config: &SphConfig<2>| FlowEquations::new(config, &this.domain, 4);
-        assert!(matches!(equations(&config), FlowEquations::VolumeForm { pressure: PressureForm::Mean }));
+        let forms = |config: &SphConfig<2>| match equations(config) {
+            FlowEquations::VolumeForm { forms } => forms,
+            _ => panic!("no volume form"),
+        };
+        assert_eq!(forms(&config), Forms { pressure: PressureForm::Mean, has_whole_stress: false });
+        let mut unequal = config.clone();
+        unequal.pressure.form = PressureForm::Hamiltonian;
+        unequal.fluids.inside.viscosity *= 2.0;
+        assert!(forms(&unequal).has_whole_stress);
+        unequal.starts_in_layers = true;
+        assert!(!forms(&unequal).has_whole_stress);
         let mass = SphConfig { density: DensityMethod::Continuity { diffusion: 0.1 }, ..config };
         assert!(matches!(equations(&mass), FlowEquations::MassForm { diffusion: 0.1 }));
         let discretization = Discretization::Dcpse(Support { degree: 3, radius: 0.35 });

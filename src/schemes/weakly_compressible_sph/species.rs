@@ -98,6 +98,12 @@ impl Fluids {
         self.agree_in(|fluid| fluid.viscosity)
     }
 
+    /// The smaller dynamic viscosity.
+    #[must_use]
+    pub fn least_viscosity(&self) -> f64 {
+        self.inside.viscosity.min(self.outside.viscosity)
+    }
+
     /// The least speed of sound.
     #[must_use]
     pub fn least_sound_speed(&self) -> f64 {

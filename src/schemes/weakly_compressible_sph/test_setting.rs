@@ -41,6 +41,7 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
         density: DensityMethod::Summation,
         pressure: PressureConfig::PAPER,
         is_shifted: false,
+        shifting_rate: 0.05,
         body_force: None,
         is_at_rest: true,
         integrator: Integrator::KickDriftKick,

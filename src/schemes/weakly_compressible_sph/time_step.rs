@@ -41,10 +41,15 @@ fn stability_numbers<const D: usize>(config: &SphConfig<D>) -> StabilityNumbers 
 /// The longest stable step at a largest speed: the shortest of the limits of all interactions.
 #[must_use]
 pub fn longest_step<const D: usize>(config: &SphConfig<D>, speed: f64) -> StepLimit {
-    let context = LimitContext { smoothing_length: config.smoothing_length, speed, numbers: stability_numbers(config) };
+    let fluids = Species::ALL.map(|species| config.fluids[species]);
+    let context = LimitContext {
+        smoothing_length: config.smoothing_length,
+        speed,
+        least_viscosity: if config.has_whole_stress() { config.fluids.least_viscosity() } else { f64::INFINITY },
+        numbers: stability_numbers(config),
+    };
     let tension = config.surface_tension();
     let on_fluids: [&dyn LimitsStep; 3] = [&SoundWaves, &ViscousDiffusion, &tension];
-    let fluids = Species::ALL.map(|species| config.fluids[species]);
     let of_fluids =
         fluids.iter().flat_map(|fluid| on_fluids.map(|interaction| interaction.step_limit(fluid, &context)));
     let of_force = config.body_force.as_ref().map(|force| force.step_limit(&fluids[0], &context));

@@ -5,6 +5,7 @@
 //! | term | item |
 //! | --- | --- |
 //! | viscosity η_ij u_ij | [`UniformViscosity`] or [`SpeciesViscosity`] |
+//! | viscosity as the divergence of the whole stress | [`StressViscosity`] |
 //! | pressure P_ij = (V_i² + V_j²) P̄_ij (the paper's) | [`VolumePressure`] |
 //! | pressure P_ij = (P_i V_i² + P_j V_j²)/a (Hamiltonian) | [`HamiltonianPressure`] |
 //!
@@ -26,13 +27,21 @@ use crate::linear_algebra::number::{Lanes, Number};
 use crate::parallel::Interrupted;
 use crate::smoothing_kernels::RadialKernel;
 
+/// Which of the forms the forces take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Forms {
+    pub pressure: PressureForm,
+    /// Whether two viscosities act by the whole stress.
+    pub has_whole_stress: bool,
+}
+
 /// Sets accelerations to those of the pair forces.
 ///
 /// Points of walls take part as particles do; their forces are set, too.
 pub(super) fn accelerate<const D: usize>(
     flow: &FlowState<D>,
     mut walls: Option<&mut Walls<D>>,
-    form: PressureForm,
+    Forms { pressure: form, has_whole_stress }: Forms,
     pairs: &mut PairWorkspace<D>,
     acceleration: &mut [Vector<D>],
 ) -> Result<(), Interrupted> {
@@ -56,11 +65,15 @@ pub(super) fn accelerate<const D: usize>(
         pairs.gather(VISCOSITY, 1.0, |i| all.viscosity(i));
         pairs.gather_vectors(flow.viscosity_factor * inverse, |i| all.velocity(i));
     }
+    let stress = StressViscosity { least: flow.fluids.least_viscosity() };
     with_kernel!(pairs.kernel.choice, K => match (form, is_uniform) {
         (PressureForm::Mean, true) => sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure), NoTerm),
         (PressureForm::Mean, false) => sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure), NoTerm),
         (PressureForm::Hamiltonian, true) => sum_forces::<K, D, 2>(pairs, UniformViscosity, HamiltonianPressure),
-        (PressureForm::Hamiltonian, false) => sum_forces::<K, D, 3>(pairs, StressViscosity, HamiltonianPressure),
+        (PressureForm::Hamiltonian, false) if has_whole_stress => {
+            sum_forces::<K, D, 3>(pairs, stress, HamiltonianPressure)
+        }
+        (PressureForm::Hamiltonian, false) => sum_forces::<K, D, 3>(pairs, SpeciesViscosity, HamiltonianPressure),
     })?;
     // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
     let kernel = &pairs.kernel;
@@ -121,11 +134,15 @@ fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::{PressureForm, accelerate};
+    use super::{Forms, PressureForm, accelerate};
     use crate::geometry::Vector;
     use crate::schemes::weakly_compressible_sph::KernelChoice;
     use crate::schemes::weakly_compressible_sph::interactions::density_summation::sum_volumes;
-    use crate::schemes::weakly_compressible_sph::test_setting::{KERNELS, near, setting};
+    use crate::schemes::weakly_compressible_sph::test_setting::{KERNELS, Setting, near, setting};
+
+    fn plain(pressure: PressureForm) -> Forms {
+        Forms { pressure, has_whole_stress: false }
+    }
 
     fn check<const D: usize>(kernel: KernelChoice, ratio: f64) {
         let this = setting::<D>(kernel, ratio);
@@ -134,7 +151,7 @@ mod tests {
         flow.derive_densities();
         flow.derive_pressures();
         let mut acceleration = vec![Vector::<D>::zeros(); flow.count()];
-        accelerate(&flow, None, PressureForm::Mean, &mut pairs, &mut acceleration).unwrap();
+        accelerate(&flow, None, plain(PressureForm::Mean), &mut pairs, &mut acceleration).unwrap();
         let (volume, density, pressure, velocity) = (&flow.volume, &flow.density, &flow.pressure, &flow.predicted);
         let forces: Vec<Vector<D>> = acceleration.iter().enumerate().map(|(i, a)| a * flow.mass(i)).collect();
         for i in this.probes() {
@@ -164,13 +181,43 @@ mod tests {
         assert!(all.norm() < 1e-14 * norms, "{} of {norms}", all.norm());
     }
 
+    /// With the whole stress a second, larger viscosity acts on no rotation, and forces stay opposite.
+    #[test]
+    fn the_whole_stress_of_two_viscosities_lets_both_fluids_turn() {
+        let mut this = setting::<2>(KernelChoice::WendlandC2, 1.0);
+        let forms = Forms { pressure: PressureForm::Hamiltonian, has_whole_stress: true };
+        let forces = |this: &Setting<2>, viscosity: f64| {
+            let (mut pairs, mut flow) = (this.gathered(), this.flow());
+            (flow.fluids.inside.viscosity, flow.fluids.outside.viscosity) = (viscosity, 0.5);
+            sum_volumes(&mut pairs, 1.0, &mut flow.volume, &mut []).unwrap();
+            flow.derive_densities();
+            let mut acceleration = vec![Vector::<2>::zeros(); flow.count()];
+            accelerate(&flow, None, forms, &mut pairs, &mut acceleration).unwrap();
+            acceleration.iter().enumerate().map(|(i, a)| a * flow.mass(i)).collect::<Vec<_>>()
+        };
+        let stirred = forces(&this, 3.0);
+        let scale = stirred.iter().map(Vector::<2>::norm).fold(0.0, f64::max);
+        assert!(stirred.iter().sum::<Vector<2>>().norm() < 1e-11 * scale);
+        let middle = Vector::<2>::new(0.6, 0.6);
+        for (x, velocity) in this.positions.iter().zip(&mut this.velocity) {
+            let way = x - middle;
+            *velocity = Vector::<2>::new(-way[1], way[0]);
+        }
+        let (turning, with_one) = (forces(&this, 3.0), forces(&this, 0.5));
+        // Across the sides of the box velocities jump.
+        let inner = (0..turning.len()).filter(|i| (this.positions[*i] - middle).amax() < 0.8);
+        for i in inner {
+            assert!((turning[i] - with_one[i]).norm() < 1e-11 * scale, "{i}: {} {}", turning[i], with_one[i]);
+        }
+    }
+
     /// The Hamiltonian force of a particle against the change of the energy Σ m e(ρ) when it moves, by central differences.
     fn check_hamiltonian<const D: usize>(ratio: f64) {
         let mut this = setting::<D>(KernelChoice::WendlandC2, ratio);
         for velocity in &mut this.velocity {
             *velocity = Vector::<D>::zeros();
         }
-        let energy = |this: &crate::schemes::weakly_compressible_sph::test_setting::Setting<D>| {
+        let energy = |this: &Setting<D>| {
             let (mut pairs, mut flow) = (this.gathered(), this.flow());
             flow.calibration = 1.01;
             sum_volumes(&mut pairs, flow.calibration, &mut flow.volume, &mut []).unwrap();
@@ -183,7 +230,7 @@ mod tests {
         flow.derive_densities();
         flow.derive_pressures();
         let mut acceleration = vec![Vector::<D>::zeros(); flow.count()];
-        accelerate(&flow, None, PressureForm::Hamiltonian, &mut pairs, &mut acceleration).unwrap();
+        accelerate(&flow, None, plain(PressureForm::Hamiltonian), &mut pairs, &mut acceleration).unwrap();
         let i = 17;
         let (at, step) = (this.positions[i], 1e-5);
         let mut gradient = Vector::<D>::zeros();

@@ -180,7 +180,8 @@ impl<const D: usize> Walls<D> {
                 viscosity: flow.fluid(*i).viscosity,
             }
         }));
-        let fluid = Fluid { around, container, front, background: flow.background };
+        let least_viscosity = flow.fluids.least_viscosity();
+        let fluid = Fluid { around, container, front, background: flow.background, least_viscosity };
         continued.par_iter_mut().zip(points.par_iter()).enumerate().with_min_len(64).for_each(
             |(k, (continued, point))| {
                 *continued = fluid.continued(point, &origins[k], &neighbors[begins[k]..begins[k + 1]]);
@@ -279,8 +280,9 @@ struct Fluid<'a, const D: usize> {
     around: Around<'a, D>,
     container: &'a Container<D>,
     front: &'a [InFront<D>],
-    /// The pressure where there are no particles.
+    /// The pressure and the viscosity where there are no particles.
     background: f64,
+    least_viscosity: f64,
 }
 
 /// Weighted sums over the particles around an origin, distances in units of the radius.
@@ -326,7 +328,8 @@ impl<const D: usize> Fluid<'_, D> {
         let sums = self.sums(&to_point, origin, wall, neighbors);
         let all = sums.moments[0];
         if all <= 0.0 {
-            return Continued { velocity: wall.velocity, pressure: self.background, viscosity: 0.0 };
+            let (pressure, viscosity) = (self.background, self.least_viscosity);
+            return Continued { velocity: wall.velocity, pressure, viscosity };
         }
         // Without particles at its foot a point is the mirror image of those around it.
         let s = if is_foot { -point.depth / self.around.radius } else { -sums.moments[1] / all };

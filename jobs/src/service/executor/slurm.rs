@@ -1,10 +1,10 @@
-//! Jobs on a Slurm cluster, by its command line: `sbatch`, `squeue` and `scancel`.
+//! Jobs on a Slurm cluster, by its command line: `sbatch`, `squeue`, `scancel` and `scontrol`.
 //!
 //! The database of the service is the queue; the cluster gets a window of it. One job of the cluster is one attempt, and its name
 //! is the key: it is looked up before anything is repeated. What an attempt has done stands in its files; what its process
 //! does, the cluster knows. The two are not mixed: an answer of the cluster never says what was computed.
 //!
-//! Threads: `submission` runs `sbatch`, `errands` runs `scancel`, `poller` runs one `squeue` for all, `files` looks at signs of life.
+//! Threads: `submission` runs `sbatch`, `errands` runs `scancel` and `scontrol`, `poller` runs one `squeue` for all, `files` looks at signs of life.
 //! No call of the supervisor waits for any of them.
 
 mod bundling;
@@ -126,6 +126,11 @@ impl Settings {
         let failed = |error| SettingsError::Program { path: path.to_owned(), error };
         let (sha256, _) = digest::of_file(path).map_err(failed)?;
         Ok(Self::new(path.to_owned(), sha256))
+    }
+
+    /// Nodes that the site's own options leave out.
+    fn excluded(&self) -> Option<&str> {
+        self.options.iter().rev().find_map(|option| option.strip_prefix("--exclude="))
     }
 
     /// A command of the cluster.
@@ -292,7 +297,7 @@ impl SlurmExecutor {
             shared: shared.to_owned(),
             table: Mutex::new(Table::new()),
             files: Files::default(),
-            errands: Errands::start(settings.command("scancel"))?,
+            errands: Errands::start(&settings)?,
             losses: Mutex::default(),
             tickets: Mutex::default(),
             left_over: Mutex::default(),

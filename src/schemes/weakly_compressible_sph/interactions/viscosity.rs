@@ -34,25 +34,30 @@ impl<const D: usize, const S: usize> PairTerm<Pair<'_, D, 2, S>, [Lanes; D]> for
     }
 }
 
-/// Viscosity in the volume form as the divergence of the whole stress η (∇u + ∇uᵀ), (D + 2) η_ij (u_ij·e) e with the direction e of
-/// the pair. Where viscosity jumps, ∇·(η∇u) alone leaves out the stress of an interface that is stretched or turned (Hu and Adams
-/// 2006 have the term; Violeau 2009 its factor). Forces along the pair keep the angular momentum, too.
+/// Viscosity in the volume form as the divergence of the whole stress η (∇u + ∇uᵀ), η₀ u_ij + (D + 2)(η_ij − η₀)(u_ij·e) e with the
+/// direction e of the pair and the smaller viscosity η₀.
+///
+/// Where viscosity jumps, ∇·(η∇u) alone leaves out the stress of an interface that is stretched or turned: the waves on two layers, one ten
+/// times as viscous, then come to a wrong answer (docs/results/wall-notes.md). Forces along the pair have all of it (Violeau 2009); with one
+/// viscosity both are the same, and u_ij is the more exact of them where particles are sheared into rows.
 #[derive(Debug, Clone, Copy)]
-pub struct StressViscosity;
+pub struct StressViscosity {
+    /// η₀.
+    pub least: f64,
+}
 
 impl<const D: usize, const S: usize> PairTerm<Pair<'_, D, 2, S>, [Lanes; D]> for StressViscosity {
     #[inline(always)]
     fn add_to(self, sum: [Lanes; D], pair: &Pair<'_, D, 2, S>) -> [Lanes; D] {
-        let viscosity = harmonic_mean(pair.scalar(volume_pair::VISCOSITY));
+        let least = Lanes::splat(self.least);
+        let excess = harmonic_mean(pair.scalar(volume_pair::VISCOSITY)) - least;
         let velocity = pair.difference(volume_pair::VELOCITY);
-        let mut approach = velocity[0] * pair.dx[0];
-        for d in 1..D {
-            approach = Number::mul_add(velocity[d], pair.dx[d], approach);
-        }
+        let parts = velocity.iter().zip(pair.dx).skip(1);
+        let approach = parts.fold(velocity[0] * pair.dx[0], |sum, (u, x)| Number::mul_add(*u, *x, sum));
         // A particle has no direction to itself.
         let square = pair.square + Lanes::splat(f64::MIN_POSITIVE);
-        let strength = viscosity * approach * Lanes::splat((D + 2) as f64) / square;
-        from_fn(|d| Number::mul_add(pair.dx[d], strength, sum[d]))
+        let along = excess * approach * Lanes::splat((D + 2) as f64) / square;
+        from_fn(|d| Number::mul_add(pair.dx[d], along, Number::mul_add(velocity[d], least, sum[d])))
     }
 }
 
@@ -97,7 +102,9 @@ pub struct ViscousDiffusion;
 impl LimitsStep for ViscousDiffusion {
     fn step_limit(&self, fluid: &Fluid, context: &LimitContext) -> StepLimit {
         let epsilon = context.smoothing_length;
-        let length = context.numbers.viscous * fluid.density * epsilon * epsilon / fluid.viscosity;
+        // Forces along pairs are three times as stiff against compression.
+        let stiff = fluid.viscosity + 2.0 * (fluid.viscosity - context.least_viscosity).max(0.0);
+        let length = context.numbers.viscous * fluid.density * epsilon * epsilon / stiff;
         StepLimit { length, cause: "viscosity" }
     }
 }

@@ -1,14 +1,14 @@
-//! Calls of `scancel`, on a thread of their own.
+//! Calls of `scancel` and `scontrol`, on a thread of their own.
 
+use super::Settings;
 use super::command;
 use std::collections::HashSet;
 use std::io;
-use std::path::PathBuf;
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Time that `scancel` has to answer.
+/// Time that a command has to answer.
 const TIME_LIMIT: Duration = Duration::from_secs(20);
 
 /// What to tell the cluster about a job.
@@ -28,6 +28,13 @@ pub(super) enum Errand {
         /// Its number, where it is known.
         id: Option<String>,
     },
+    /// It may run on any node but these: those without which it waits are worse than those that it left out.
+    Admit {
+        /// Its name.
+        name: String,
+        /// Nodes that the site leaves out.
+        excluded: String,
+    },
 }
 
 impl Errand {
@@ -38,6 +45,9 @@ impl Errand {
             }
             Self::End { name, id: Some(id) } => vec![format!("--name={name}"), id.clone()],
             Self::End { name, id: None } => vec!["--me".to_owned(), format!("--name={name}")],
+            Self::Admit { name, excluded } => {
+                vec!["update".to_owned(), format!("JobName={name}"), format!("ExcNodeList={excluded}")]
+            }
         }
     }
 }
@@ -51,16 +61,18 @@ pub(super) struct Errands {
 
 impl Errands {
     /// Starts the thread; it ends when this is dropped.
-    pub(super) fn start(scancel: PathBuf) -> io::Result<Self> {
+    pub(super) fn start(settings: &Settings) -> io::Result<Self> {
         let (sender, receiver) = channel::<Errand>();
         let waiting: Arc<Mutex<HashSet<Errand>>> = Arc::default();
         let left = Arc::clone(&waiting);
-        std::thread::Builder::new().name("slurm-cancel".to_owned()).spawn(move || {
+        let [scancel, scontrol] = ["scancel", "scontrol"].map(|name| settings.command(name));
+        std::thread::Builder::new().name("slurm-errands".to_owned()).spawn(move || {
             for errand in receiver {
                 left.lock().unwrap_or_else(PoisonError::into_inner).remove(&errand);
-                if let Err(error) = command::run(&scancel, errand.arguments(), TIME_LIMIT, None) {
+                let program = if let Errand::Admit { .. } = errand { &scontrol } else { &scancel };
+                if let Err(error) = command::run(program, errand.arguments(), TIME_LIMIT, None) {
                     // It is sent again while the job is there.
-                    tracing::debug!(?errand, %error, "scancel gave no answer");
+                    tracing::debug!(?errand, %error, "the cluster gave no answer");
                 }
             }
         })?;

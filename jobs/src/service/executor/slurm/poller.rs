@@ -61,6 +61,7 @@ fn look(cluster: &Cluster) -> Duration {
     let (_, unsure) = cluster.counts();
     metrics::gauge!("meniscus_slurm_unsure").set(unsure as f64);
     end_orphans(cluster);
+    admit_to_any_node(cluster);
     spent
 }
 
@@ -86,6 +87,18 @@ fn end_orphans(cluster: &Cluster) {
         if job_of(&row.name).is_some_and(|job| jobs.contains(job)) {
             tracing::info!(name = row.name, id = row.id, "an earlier attempt is still in the cluster and is ended");
             cluster.errands.send(Errand::End { name: row.name.clone(), id: Some(row.id.clone()) });
+        }
+    }
+}
+
+/// Lets jobs that wait for nodes which are not to be had run on those that they left out: a doubtful node is better than none.
+fn admit_to_any_node(cluster: &Cluster) {
+    let watched: HashSet<String> = cluster.tickets().values().map(|ticket| ticket.job().name).collect();
+    let by_site = cluster.settings.excluded().unwrap_or_default();
+    for row in cluster.table().all().filter(|row| row.waits_for_nodes() && watched.contains(&row.name)) {
+        if row.excluded != by_site {
+            tracing::warn!(name = row.name, left_out = row.excluded, reason = row.reason, "a job may run on any node");
+            cluster.errands.send(Errand::Admit { name: row.name.clone(), excluded: by_site.to_owned() });
         }
     }
 }

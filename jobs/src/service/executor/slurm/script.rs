@@ -159,6 +159,9 @@ pub fn wrong_option(option: &str) -> Option<String> {
     if !option.starts_with('-') {
         return Some(format!("{option} is not an option of sbatch: options begin with -"));
     }
+    if option.starts_with("-x") || option == "--exclude" {
+        return Some("nodes that are left out are written as --exclude=NODES".to_owned());
+    }
     let name = option.split('=').next().unwrap_or(option);
     OURS.contains(&name).then(|| format!("{name} belongs to the service and cannot be an option of the site"))
 }
@@ -247,5 +250,7 @@ mod tests {
         assert_eq!(wrong_option("--partition=main"), None);
         assert!(wrong_option("--array=0-9").unwrap().contains("--array"));
         assert!(wrong_option("rm").is_some());
+        assert_eq!(wrong_option("--exclude=node3"), None);
+        assert!(wrong_option("-xnode3").unwrap().contains("--exclude="));
     }
 }

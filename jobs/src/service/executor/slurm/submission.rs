@@ -83,9 +83,13 @@ fn answer(said: Result<String, NoAnswer>) -> Answer {
 
 /// Runs `sbatch` once. It repeats by itself what the cluster does not take, for minutes: the first refusal is the answer.
 fn ask(settings: &Settings, arguments: &[String], excluded: &[String]) -> Answer {
-    let exclude = (!excluded.is_empty()).then(|| format!("--exclude={}", excluded.join(",")));
+    let by_site = settings.excluded().filter(|nodes| !nodes.is_empty()).map(str::to_owned);
+    let nodes: Vec<String> = by_site.into_iter().chain(excluded.iter().cloned()).collect();
+    // The last of several counts.
+    let exclude = (!nodes.is_empty()).then(|| format!("--exclude={}", nodes.join(",")));
     let asked = Instant::now();
-    let all = exclude.iter().chain(arguments);
+    let (options, script) = arguments.split_at(arguments.len().saturating_sub(1));
+    let all = options.iter().chain(&exclude).chain(script);
     let said = command::run(settings.command("sbatch"), all, TIME_LIMIT, Some(IT_REPEATS));
     pass("slurm/submitted");
     metrics::histogram!("meniscus_slurm_sbatch_seconds").record(asked.elapsed().as_secs_f64());

@@ -3,8 +3,11 @@
 use std::collections::{BTreeMap, HashMap};
 use std::time::Instant;
 
-/// What `squeue` is asked for: id, name, state, reason, nodes.
-pub const FORMAT: &str = "%i|%j|%T|%r|%N";
+/// What `squeue` is asked for: id, name, state, reason, nodes, nodes that are left out.
+pub const FORMAT: &str = "%i|%j|%T|%r|%N|%x";
+
+/// Beginnings of the reasons for which a job waits where no node that it may run on works.
+const NO_NODES: [&str; 4] = ["ReqNodeNotAvail", "Nodes required for job are DOWN", "BadConstraints", "PartitionConfig"];
 
 /// A line of `squeue`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,6 +22,8 @@ pub struct Row {
     pub reason: String,
     /// Where it runs.
     pub nodes: String,
+    /// Nodes that it must not run on.
+    pub excluded: String,
 }
 
 /// What the cluster's words for states say.
@@ -83,6 +88,13 @@ impl JobState {
 }
 
 impl Row {
+    /// Whether it waits for nodes that are not to be had, and not for its turn.
+    #[must_use]
+    pub fn waits_for_nodes(&self) -> bool {
+        let has = |word: &&str| self.reason.starts_with(*word);
+        self.state == JobState::Waiting && NO_NODES.iter().any(has)
+    }
+
     /// A row of a line; None where the line is none, such as a warning of the cluster.
     #[must_use]
     pub fn parse(line: &str) -> Option<Self> {
@@ -92,12 +104,14 @@ impl Row {
         let is_id = !id.is_empty() && id.starts_with(|c: char| c.is_ascii_digit());
         let is_word =
             !state.is_empty() && state.bytes().all(|b| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'_');
+        let excluded = parts.next().unwrap_or_default();
         (is_id && is_word && parts.next().is_none()).then(|| Self {
             id: id.to_owned(),
             name: name.to_owned(),
             state: JobState::from_word(state),
             reason: reason.to_owned(),
             nodes: nodes.to_owned(),
+            excluded: excluded.to_owned(),
         })
     }
 }
@@ -179,6 +193,15 @@ mod tests {
         let mut table = Table::new();
         table.take(answer, "mns-", Instant::now());
         table
+    }
+
+    #[test]
+    fn jobs_that_wait_for_their_turn_do_not_wait_for_nodes() {
+        let waits = |line: &str| Row::parse(line).unwrap().waits_for_nodes();
+        assert!(waits("2|mns-a-1|PENDING|ReqNodeNotAvail, UnavailableNodes:node1||node2"));
+        assert!(!waits("2|mns-a-1|PENDING|Resources||node2"));
+        assert!(!waits("2|mns-a-1|RUNNING|None|node1|node2"));
+        assert_eq!(Row::parse("2|mns-a-1|PENDING|Priority||node2").unwrap().excluded, "node2");
     }
 
     #[test]

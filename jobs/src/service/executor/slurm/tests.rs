@@ -274,3 +274,23 @@ fn a_node_that_loses_two_attempts_in_a_minute_is_left_out() {
     executor.cluster.note_loss("node4");
     assert_eq!(executor.cluster.excluded(), ["node3"]);
 }
+
+#[test]
+fn a_job_that_left_nodes_out_may_use_them_where_no_other_is_to_be_had() {
+    let fake = Fake::new("echo \"$@\" > $here/submitted; echo 7", "true");
+    fake.set("scontrol", "echo \"$@\" >> $here/updated");
+    let executor = fake.executor();
+    executor.cluster.note_loss("node3");
+    executor.cluster.note_loss("node3");
+    let _worker = executor.start(&fake.attempt(), &NEEDS, Box::new(|| {})).unwrap();
+    let submitted = until("it was submitted", || std::fs::read_to_string(fake.path("submitted")).ok());
+    assert!(submitted.contains("--exclude=node3 "), "{submitted}");
+    let row = |reason: &str| format!("echo '7|mns-job_1-1|PENDING|{reason}||node3'");
+    // It waits for its turn only.
+    fake.set("squeue", &row("Resources"));
+    std::thread::sleep(Duration::from_millis(400));
+    assert_eq!(fake.lines("updated"), 0);
+    fake.set("squeue", &row("ReqNodeNotAvail, UnavailableNodes:node1"));
+    let updated = until("it may run on any node", || std::fs::read_to_string(fake.path("updated")).ok());
+    assert!(updated.starts_with("update JobName=mns-job_1-1 ExcNodeList="), "{updated}");
+}
