@@ -71,6 +71,13 @@ pub fn bodies() -> Vec<Value> {
         "domain": {"low": [-1, -1, -0.6], "high": [1, 1, 0.6], "axes": ["periodic", "periodic", {"low": {"contact_angle": 60}, "high": {}}]},
         "shape": {"type": "sphere", "center": [0, 0, -0.6], "radius": 0.6}, "body_force": {"type": "constant", "acceleration": [0, 0, -9]}
     }));
+    // A drop on a body across the sides of the box, heavier and more viscous than what is around.
+    bodies.push(droplet(json!({
+        "case": "custom", "domain": {"low": [-1, -1], "high": [1, 1]}, "shape": {"type": "circle", "center": [0.6, 0], "radius": 0.4},
+        "obstacles": [{"shape": {"type": "circle", "center": [1.1, 0], "radius": 0.35}, "wall": {"contact_angle": 80}}],
+        "spacing": 0.07, "fluids": {"inside": {"density": 2, "viscosity": 2}},
+        "body_force": {"type": "constant", "acceleration": [10, -50], "balance": "mean"}
+    })));
     bodies.push(json!({
         "kind": "droplet", "case": "custom", "spacing": 0.05, "steps": 80, "end_time": 0.2, "surface_tension": 0,
         "domain": {"low": [0, 0], "high": [1, 1], "axes": ["periodic", {"low": {}, "high": {}}]},

@@ -116,6 +116,7 @@ impl<const D: usize> SphSystem<D> {
         };
         let space = Space {
             bounds: container.map_or_else(Bounds::none, Container::bounds),
+            may_fill: self.droplets.has_contact(),
             bodies: container.filter(|container| container.has_obstacles()).map(|_| &from_bodies as _),
         };
         enclosed_moments(&interface.surface, unwrap, &space, &self.interrupt).map(Some)

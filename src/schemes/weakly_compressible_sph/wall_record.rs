@@ -6,6 +6,7 @@ use super::quantities::{CONTACT_ANGLE, CONTACT_HIGH, CONTACT_LOW, RISE_HEIGHT, R
 use super::smoothed_delta::smoothed_step;
 use super::species::Species;
 use super::system::SphSystem;
+use super::walls::Container;
 use crate::closest_point::enclosed_moments::Bounds;
 use crate::geometry::Vector;
 use crate::neighbors::{CellList, NeighborSearch};
@@ -99,6 +100,10 @@ impl WallRecord {
     fn width_error<const D: usize>(&self, system: &SphSystem<D>, angle: f64) -> f64 {
         let [.., low, high] = self.values;
         let [kappa] = system.droplets.ball_curvatures[..] else { return f64::NAN };
+        // On a body the drop is no cap of a flat wall.
+        if system.config.container.as_ref().is_some_and(Container::has_obstacles) {
+            return f64::NAN;
+        }
         let width = 2.0 * angle.to_radians().sin() / kappa;
         ((high - low) / width - 1.0).abs()
     }
