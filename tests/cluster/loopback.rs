@@ -193,6 +193,15 @@ impl Cluster {
         both && self.ask("srun", &["-Q", "-N2", "--immediate=5", "true"]).is_some()
     }
 
+    /// What an administrator does about nodes that Slurm has drained by itself, as after a crash of the controller that lost numbers of jobs
+    /// ("Duplicate jobid").
+    pub fn resume_drained_nodes(&self) {
+        let drained = self.ask("sinfo", &["-h", "-N", "-p", "main", "-t", "drain", "-o", "%N"]).unwrap_or_default();
+        for node in drained.lines() {
+            self.ask("scontrol", &["update", &format!("nodename={node}"), "state=resume"]);
+        }
+    }
+
     /// Rows of `squeue` as this format gives them.
     pub fn queue(&self, format: &str) -> Vec<String> {
         let said = eventually("squeue answers", Duration::from_secs(20), || self.ask("squeue", &["-h", "-o", format]));

@@ -37,6 +37,7 @@ fn every_job_ends_as_undisturbed_under_random_kills() {
         let (away, which) = (Duration::from_secs_f64(8.0 * next()), (4.0 * next()) as usize);
         kills[which.min(2)] += 1;
         disturb(&mut cluster, &mut service, which, away);
+        cluster.resume_drained_nodes();
     }
     let mut attempts = 0;
     for id in &ids {
@@ -72,7 +73,8 @@ fn end_of(cluster: &Cluster, service: &Service, id: &str) -> serde_json::Value {
             let slurm: Vec<&str> = metrics.lines().filter(|line| line.starts_with("meniscus_slurm")).collect();
             panic!("{job} does not end; queue {:?}, nodes {nodes:?}, {slurm:#?}", cluster.queue("%j %T %r %N"));
         }
-        std::thread::sleep(Duration::from_millis(200));
+        cluster.resume_drained_nodes();
+        std::thread::sleep(Duration::from_millis(500));
     }
 }
 
