@@ -122,8 +122,8 @@ pub type FromBodies<'a, const D: usize> = &'a (dyn Fn(&Vector<D>) -> (f64, Vecto
 pub struct Space<'a, const D: usize> {
     /// A box around it.
     pub bounds: Bounds<D>,
-    /// Whether the inside may reach farther towards the sides of the box than its surface, as a pool does.
-    pub may_fill: bool,
+    /// A box around the inside, where it may reach farther than its surface, as a pool does.
+    pub inside: Option<Bounds<D>>,
     /// Bodies within, where nothing counts.
     pub bodies: Option<FromBodies<'a, D>>,
 }
@@ -132,7 +132,7 @@ impl<const D: usize> Space<'_, D> {
     /// Everything.
     #[must_use]
     pub fn whole() -> Self {
-        Self { bounds: Bounds::none(), may_fill: false, bodies: None }
+        Self { bounds: Bounds::none(), inside: None, bodies: None }
     }
 
     /// The share of a cell that is not within bodies; None where they cut it and it is to be halved.
@@ -173,10 +173,9 @@ pub fn enclosed_moments<const D: usize>(
         high = high.sup(&x);
     }
     let extent = (low, high);
-    if space.may_fill {
-        let to_sides = |d: usize, side: f64, own: f64| if bounds.low[d].is_finite() { side } else { own };
-        low = Vector::<D>::from_fn(|d, _| to_sides(d, bounds.low[d], low[d]));
-        high = Vector::<D>::from_fn(|d, _| to_sides(d, bounds.high[d], high[d]));
+    if let Some(inside) = &space.inside {
+        low = low.inf(&inside.low);
+        high = high.sup(&inside.high);
     }
     // A coarse cell that the surface does not cut costs a single query.
     let coarsening = ((high - low).max() / (COARSE_CELLS * spacing)).log2().ceil().max(0.0);

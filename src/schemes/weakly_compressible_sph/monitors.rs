@@ -116,10 +116,25 @@ impl<const D: usize> SphSystem<D> {
         };
         let space = Space {
             bounds: container.map_or_else(Bounds::none, Container::bounds),
-            may_fill: self.droplets.has_contact(),
+            inside: container
+                .filter(|_| self.droplets.has_contact())
+                .map(|container| self.box_between_walls(container)),
             bodies: container.filter(|container| container.has_obstacles()).map(|_| &from_bodies as _),
         };
         enclosed_moments(&interface.surface, unwrap, &space, &self.interrupt).map(Some)
+    }
+
+    /// A box around the particles inside, along axes with walls; empty along the others.
+    fn box_between_walls(&self, container: &Container<D>) -> Bounds<D> {
+        let (mut low, mut high) = (Vector::<D>::repeat(f64::INFINITY), Vector::<D>::repeat(f64::NEG_INFINITY));
+        let inside = self.flow.species.iter().zip(self.particles.positions());
+        for (_, x) in inside.filter(|(species, _)| **species == Species::Inside) {
+            for d in (0..D).filter(|d| container.is_bounded(*d)) {
+                low[d] = low[d].min(x[d]);
+                high[d] = high[d].max(x[d]);
+            }
+        }
+        Bounds { low, high }
     }
 
     /// A center from which nothing is cut: along periodic axes opposite to the widest gap between points.
