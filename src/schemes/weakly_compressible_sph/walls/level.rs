@@ -20,9 +20,9 @@ const PARTICLES: usize = 2;
 /// The largest curvature, by the inverse radius of the weights.
 const LARGEST_CURVATURE: f64 = 1.0;
 
-/// The largest root mean square, by the radius, that a fit may leave: half way between two interfaces the level has a ridge, and no
-/// circle follows it. Contact lines that move are no circles either: with a tenth of it a drop that spreads loses 4 % of its area.
-const LARGEST_REST: f64 = 0.05;
+/// The largest root mean square, by the radius, that a fit may leave: half way between two interfaces the level has a ridge, and far
+/// from any it is old; no circle follows either. (With ten times as much a drop that nears a body leaves a second interface in it.)
+const LARGEST_REST: f64 = 5e-3;
 
 /// What is known of particles for the continuation.
 #[derive(Clone, Copy)]
