@@ -20,8 +20,8 @@ const PARTICLES: usize = 2;
 /// The largest curvature, by the inverse radius of the weights.
 const LARGEST_CURVATURE: f64 = 1.0;
 
-/// The largest root mean square, by the radius, that a fit may leave: half way between two interfaces the level has a ridge, and far
-/// from any it is old; no circle follows either. (With ten times as much a drop that nears a body leaves a second interface in it.)
+/// The largest root mean square, by the radius, that a fit may leave: half way between two interfaces the level has a ridge, and no
+/// circle follows it.
 const LARGEST_REST: f64 = 5e-3;
 
 /// What is known of particles for the continuation.
@@ -69,7 +69,7 @@ fn continued<const D: usize>(
     if least > levels.reach {
         return None;
     }
-    let Circle { level, slope, curvature } = fit_circle(origin, neighbors, around, level_of)?;
+    let Circle { level, slope, curvature } = fit_circle(origin, neighbors, around, (level_of, levels.reach))?;
     let to_point = if *origin == point.foot { point.normal * point.depth } else { Vector::<D>::zeros() };
     let way = to_point / around.radius;
     let right = level + slope.dot(&way) + 0.5 * curvature * way.norm_squared();
@@ -90,12 +90,13 @@ fn fit_circle<const D: usize>(
     origin: &Vector<D>,
     neighbors: &[u32],
     around: Around<'_, D>,
-    level_of: impl Fn(u32) -> f64,
+    (level_of, reach): (impl Fn(u32) -> f64, f64),
 ) -> Option<Circle<D>> {
     let mut matrix = SMatrix::<f64, COEFFICIENTS, COEFFICIENTS>::zeros();
     let mut right = SVector::<f64, COEFFICIENTS>::zeros();
     let (mut count, mut squares) = (0, 0.0);
-    for k in neighbors {
+    // Levels beyond are old.
+    for k in neighbors.iter().filter(|k| level_of(**k).abs() <= reach) {
         let way = around.way(origin, *k as usize);
         let (_, weight) = around.weight(&way);
         let (way, psi) = (way / around.radius, level_of(*k) / around.radius);
