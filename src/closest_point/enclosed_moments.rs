@@ -165,14 +165,8 @@ pub fn enclosed_moments<const D: usize>(
         return Ok(EnclosedMoments::zero());
     }
     let spacing = surface.spacing();
-    let mut low = Vector::<D>::repeat(f64::INFINITY);
-    let mut high = Vector::<D>::repeat(f64::NEG_INFINITY);
-    for x in surface.sample_points() {
-        let x = unwrap(&x);
-        low = low.inf(&x);
-        high = high.sup(&x);
-    }
-    let extent = (low, high);
+    let extent = extent_of(surface, unwrap);
+    let (mut low, mut high) = extent;
     if let Some(inside) = &space.inside {
         low = low.inf(&inside.low);
         high = high.sup(&inside.high);
@@ -218,6 +212,21 @@ pub fn enclosed_moments<const D: usize>(
     }
     (moments.low, moments.high) = extent;
     Ok(moments)
+}
+
+/// The corners of a box around the samples.
+fn extent_of<const D: usize>(
+    surface: &LevelSurface<D>,
+    unwrap: impl Fn(&Vector<D>) -> Vector<D>,
+) -> (Vector<D>, Vector<D>) {
+    let mut low = Vector::<D>::repeat(f64::INFINITY);
+    let mut high = Vector::<D>::repeat(f64::NEG_INFINITY);
+    for x in surface.sample_points() {
+        let x = unwrap(&x);
+        low = low.inf(&x);
+        high = high.sup(&x);
+    }
+    (low, high)
 }
 
 /// Adds the inside part of a cell with these edges. The part of a cut cell is added at the center of the cell.

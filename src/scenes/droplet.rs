@@ -1,10 +1,12 @@
 //! `droplet`: two fluids with surface tension (PCP, sections 4.3 and 4.4, appendix B).
 
+mod carving;
 mod cases;
 mod costs;
 mod dimensionless;
 mod flow;
 mod formulation;
+mod given_wall;
 mod hydrostatic;
 mod layer;
 mod numbers;
@@ -16,6 +18,8 @@ mod room;
 pub mod spec;
 mod start_lattice;
 mod start_levels;
+mod steps;
+mod stirring;
 mod varying_tension;
 mod vectors;
 

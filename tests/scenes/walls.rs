@@ -92,7 +92,7 @@ fn obstacles_that_do_not_fit_are_refused_at_their_place() {
         &json!({"obstacles": [{"shape": disk(0.8, 0.25), "wall": {"contact_angle": 90}}], "spacing": 0.04}),
     );
     assert_eq!(refusals(&sits), []);
-    let plate = json!({"type": "box", "center": [0.5, 0.9], "size": [0.6, 0.05]});
+    let plate = json!({"type": "box", "center": [0.5, 0.9], "size": [0.4, 0.05]});
     let thin = body(&walls, &json!({"obstacles": [{"shape": plate}]}));
     let Err(found) = build_with(&thin, PLAN, &Clouds::default()) else { panic!("a thin plate") };
     assert!(found[0].pointer == "/obstacles/0/shape" && found[0].detail.contains("thicker"), "{found:?}");

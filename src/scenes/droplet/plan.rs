@@ -1,5 +1,6 @@
 //! From the spec of a `droplet` scene to two fluids in a box.
 
+use super::carving;
 use super::cases::Case;
 use super::dimensionless;
 use super::flow::{FlowPlan, body_force};
@@ -11,10 +12,11 @@ use super::obstacles;
 use super::own_motion::{StartMotion, motion_at_start};
 use super::room::{Room, check_needs, check_size, surround};
 use super::spec::{
-    BoxSpec, Droplet, GeometryChoice, IntegratorWord, LatticeWord, NumbersSpec, ObstacleSpec, Shifting, StopWhen,
-    TensionWord,
+    BoxSpec, Droplet, GeometryChoice, IntegratorWord, NumbersSpec, ObstacleSpec, Shifting, StopWhen, TensionWord,
 };
-use super::start_lattice::StartLattice;
+use super::start_lattice::{StartLattice, start_lattice};
+use super::steps::time_step;
+use super::stirring::{SHIFTING, SHIFTING_BETWEEN_WALLS, is_stirred};
 use super::varying_tension::{StartBox, largest_tension, tension_law};
 use crate::geometry::Vector;
 use crate::scene::cloud::{CloudReference, CloudSizes};
@@ -24,7 +26,6 @@ use crate::scenes::pcp_spec::{Neighborhood, PcpContext};
 use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::scenes::work_estimate;
 use crate::schemes::weakly_compressible_sph;
-use crate::schemes::weakly_compressible_sph::time_step::{StepLimit, longest_step};
 use crate::schemes::weakly_compressible_sph::{
     BodyForce, DensityMethod, Discretization, Drop, Geometry, Integrator, LevelUpdate, SphConfig, SphSystem,
     TensionForce, WeaklyCompressibleSph, measurement_interval,
@@ -43,6 +44,8 @@ pub(super) struct DropletScene<const D: usize> {
     pub(super) surface: Option<ShapeSurface<D>>,
     pub(super) room: Room<D>,
     lattice: StartLattice<D>,
+    /// Share of the box that bodies leave free.
+    free_share: f64,
     numbers: SceneNumbers,
     pub(super) config: SphConfig<D>,
     time_step: f64,
@@ -53,8 +56,6 @@ pub(super) struct DropletScene<const D: usize> {
 
 /// Neighbors per coefficient, where the level is overwritten at every evaluation.
 pub(super) const RATIO: f64 = 2.0;
-/// Number of particles of a run at most.
-const MOST_PARTICLES: f64 = 1e9;
 /// Units of a measurement for each particle near the interface, for the enclosed shape; the sums over all particles are 1.
 const QUADRATURE: f64 = 10.0;
 
@@ -99,23 +100,6 @@ fn geometry(
     Ok(Geometry::Pcp { method: planned, half_band, level_update, curvature_filter })
 }
 
-/// The particles of the start.
-fn start_lattice<const D: usize>(
-    spec: &Droplet,
-    word: LatticeWord,
-    lengths: &Vector<D>,
-    is_box: bool,
-    errors: &mut Vec<Violation>,
-) -> StartLattice<D> {
-    let lattice = StartLattice::new(word, lengths, spec.spacing, MOST_PARTICLES);
-    if is_box && !(1.0..=MOST_PARTICLES).contains(&lattice.count()) {
-        let least = (lengths.product() / MOST_PARTICLES).powf(1.0 / D as f64);
-        let allowed = format!("a number ≥ {least:.3e} and below every side");
-        errors.push(Violation::new("/spacing", "range", "too many particles, or none", spec.spacing, allowed));
-    }
-    lattice
-}
-
 /// The shape of a drop, its surface where that is known before the run, and the points that it names.
 type DropShape<const D: usize> = (Shape, Option<ShapeSurface<D>>, Option<CloudReference>);
 
@@ -144,25 +128,45 @@ fn drop_shape<const D: usize>(
     Some((shape, surface, points))
 }
 
+/// The smoothing length ε. It is measured by the volume of a particle; version 0.1 and the paper take the spacing as it was given.
+fn smoothing_length<const D: usize>(
+    spec: &Droplet,
+    flow: &FlowPlan,
+    (lattice, is_box): (&StartLattice<D>, bool),
+    lengths: &Vector<D>,
+) -> f64 {
+    let is_by_volume = spec.tension_force == TensionWord::Balanced && is_box && lattice.count() >= 1.0;
+    let volume = lengths.product() / lattice.count();
+    flow.smoothing_h * if is_by_volume { volume.powf(1.0 / D as f64) } else { spec.spacing }
+}
+
+/// The box of a scene with its bodies, and the meshes that they name.
+fn room<const D: usize>(
+    spec: &Droplet,
+    case: &Case,
+    corners: &BoxSpec,
+    errors: &mut Vec<Violation>,
+) -> (Room<D>, Vec<CloudReference>) {
+    let given: &[ObstacleSpec] = spec.obstacles.as_ref().map_or(&[], |obstacles| &obstacles.0);
+    let (bodies, clouds) = obstacles::plan::<D>(given, errors);
+    let mut room = Room::<D>::new((corners, spec.spacing), bodies, errors);
+    room.needs_angles = spec.surface_tension.unwrap_or(case.tension) > 0.0;
+    (room, clouds)
+}
+
 /// 1. Box. 2. Shape. 3. Flow, geometry and forces. 4. Time step. 5. What they mean together.
 fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let mut errors = Vec::new();
     let case = Case::new(spec.case, D, spec.spacing);
     let corners = spec.domain.get_or_insert_with(|| case.domain.clone()).clone();
-    let given: &[ObstacleSpec] = spec.obstacles.as_ref().map_or(&[], |obstacles| &obstacles.0);
-    let (bodies, mut clouds) = obstacles::plan::<D>(given, &mut errors);
-    let mut room = Room::<D>::new((&corners, spec.spacing), bodies, &mut errors);
-    room.needs_angles = spec.surface_tension.unwrap_or(case.tension) > 0.0;
+    let (mut room, mut clouds) = room::<D>(&spec, &case, &corners, &mut errors);
     let (low, lengths) = (room.low, room.lengths());
     let is_box = errors.is_empty();
     let shape = drop_shape(&mut spec, &case, (&room, &corners), &mut errors);
     let flow = FlowPlan::new(&mut spec, &case, D, &mut errors);
     let lattice = start_lattice(&spec, flow.lattice, &lengths, is_box, &mut errors);
     let given_step = spec.time_step.or(if spec.steps.is_none() { case.time_step } else { None });
-    // ε is measured by the volume of a particle; version 0.1 and the paper take the spacing as it was given.
-    let is_by_volume = spec.tension_force == TensionWord::Balanced && is_box && lattice.count() >= 1.0;
-    let volume = lengths.product() / lattice.count();
-    let smoothing_length = flow.smoothing_h * if is_by_volume { volume.powf(1.0 / D as f64) } else { spec.spacing };
+    let smoothing_length = smoothing_length(&spec, &flow, (&lattice, is_box), &lengths);
     let geometry = geometry(&mut spec, &case, flow.scope, (flow.smoothing_h, smoothing_length), &mut errors);
     let geometry = geometry.map_err(|error| errors.push(error)).ok();
     let tension = *spec.surface_tension.get_or_insert(case.tension);
@@ -178,15 +182,12 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     config.is_at_rest = motion.is_none();
     config.start_velocity = velocity;
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
-    config.wave = shape
-        .as_ref()
-        .and_then(|(shape, ..)| standing_wave(shape, &spec, (tension, config.body_force.as_ref()), &room));
+    let named = shape.as_ref().map(|(shape, ..)| shape);
+    config.wave = named.and_then(|shape| standing_wave(shape, &spec, (tension, config.body_force.as_ref()), &room));
     let (time_step, steps, bound) = time_step(&spec, &config, given_step, &mut errors);
     errors.extend(surround(&mut room, (&lattice, is_box), &config, &corners));
-    errors.extend(obstacles::check_known(&room));
     let drop = shape.as_ref().and_then(|(shape, surface, _)| Some((shape, surface.as_ref()?.whole.as_ref())));
-    errors.extend(drop.and_then(|drop| obstacles::check_known_drop(&room, drop)));
-    let named = shape.as_ref().map(|(shape, ..)| shape);
+    carving::check(&room, drop, &mut errors);
     enclose(&mut config, named, &spec, (&room, &numbers, flow.scope), &mut errors);
     numbers.check_sound_speeds(&spec, &mut errors);
     dimensionless::complete(&mut spec, &numbers, &mut errors);
@@ -203,6 +204,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
         shape,
         motion,
         surface,
+        free_share: carving::free_share(&room),
         room,
         lattice,
         numbers,
@@ -237,18 +239,6 @@ fn part_count<const D: usize>(shape: Option<&Shape>, surface: Option<&ShapeSurfa
     // A layer, and what points from outside tell, is one part.
     let is_one = |shape: &&Shape| shape.is_from_outside() || matches!(shape, Shape::Layer { .. });
     surface.map(|surface| surface.parts.len()).or_else(|| shape.filter(is_one).map(|_| 1))
-}
-
-/// Displacement of a shift by ε² ∇C, the paper's.
-const SHIFTING: f64 = 0.05;
-/// The same between walls, where a drop rises for long: with more, flows lose speed (a third of it costs the rising drop of Hysing et al. 1 % of
-/// its way less; docs/results/wall-notes.md).
-const SHIFTING_BETWEEN_WALLS: f64 = 0.015;
-
-/// Whether walls or a force deform what starts between walls for long: all but flat layers, which are at rest or slide along themselves.
-fn is_stirred<const D: usize>(spec: &Droplet, force: Option<&BodyForce<D>>, room: &Room<D>) -> bool {
-    let is_flat = matches!(spec.shape, Some(Shape::Layer { amplitude: 0.0, .. }));
-    (!is_flat || !room.obstacles.is_empty()) && (force.is_some() || room.wall_speed() > 0.0)
 }
 
 /// Geometry, smoothing length, expected speed, and the box.
@@ -304,33 +294,6 @@ fn sph_config<const D: usize>(
     }
 }
 
-/// The time step, the number of steps, and what binds the step.
-fn time_step<const D: usize>(
-    spec: &Droplet,
-    config: &SphConfig<D>,
-    given_step: Option<f64>,
-    errors: &mut Vec<Violation>,
-) -> (f64, u64, &'static str) {
-    if let (Some(step), Some(_)) = (spec.time_step, spec.steps) {
-        let detail = "steps are given instead of a time step; give one of them";
-        errors.push(Violation::new("/time_step", "conflict", detail, step, Value::Null));
-    }
-    let StepLimit { length: limit, cause: bound } = longest_step(config, config.expected_speed);
-    let time_step = match (given_step, spec.steps) {
-        (Some(step), _) => step,
-        (None, Some(steps)) => spec.end_time / steps as f64,
-        // The last step lands on the end.
-        (None, None) => spec.end_time / (spec.end_time / limit).ceil(),
-    };
-    let steps = (spec.end_time / time_step - 1e-9).ceil();
-    if !(time_step.is_normal() && (1.0..=1e9).contains(&steps)) {
-        let detail = "the run would have too many steps or none";
-        let allowed = format!("a number from {:e} to {:e}", spec.end_time * 1e-9, spec.end_time);
-        errors.push(Violation::new("/time_step", "range", detail, time_step, allowed));
-    }
-    (time_step, steps as u64, bound)
-}
-
 impl<const D: usize> DropletScene<D> {
     /// What puts fluids between walls to rest under gravity.
     fn hydrostatic(&self) -> Option<Hydrostatic<'_, D>> {
@@ -345,7 +308,7 @@ impl<const D: usize> DropletScene<D> {
     }
 
     pub(super) fn count(&self) -> u64 {
-        self.lattice.count() as u64
+        (self.lattice.count() * self.free_share).round() as u64
     }
 }
 
@@ -486,19 +449,19 @@ impl<const D: usize> Scene for DropletScene<D> {
         let lengths = self.lengths();
         let domain = self.room.domain();
         let (mut positions, mut behind_walls) = self.lattice.positions(&self.room.low, &lengths, &self.room.layers);
-        let container = obstacles::container_at_build(&self.room, &context.clouds)?;
+        let container = carving::container_at_build(&self.room, &context.clouds)?;
         let behind = container.as_ref();
         let carved =
-            obstacles::carve(&self.room, behind, &mut positions, &mut behind_walls).map_err(|found| vec![found])?;
+            carving::carve(&self.room, behind, &mut positions, &mut behind_walls).map_err(|found| vec![found])?;
         if !carved.is_empty() {
             let (level, _) = self.levels_at(&context, (&carved, behind))?;
-            let fault = obstacles::check_drop((&self.room, behind), &self.shape, (&carved, &level));
+            let fault = carving::check_drop((&self.room, behind), &self.shape, (&carved, &level));
             if let Some(fault) = fault {
                 return Err(vec![fault]);
             }
         }
         let (level, measure) = self.levels_at(&context, (&positions, behind))?;
-        let cell = lengths.product() / self.count() as f64;
+        let cell = lengths.product() / self.lattice.count();
         let velocities = match &self.motion {
             Some(motion) => Some(self.start_velocities(motion, &positions, &level)?),
             None => None,

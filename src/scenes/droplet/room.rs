@@ -1,7 +1,8 @@
 //! The box of a scene: its corners, its walls, and the layers of points behind them.
 
+use super::given_wall::wall;
 use super::obstacles::PlannedObstacle;
-use super::spec::{AxisSpec, BoxSpec, Droplet, GeometryChoice, WallSpec, WallWord};
+use super::spec::{AxisSpec, BoxSpec, Droplet, GeometryChoice};
 use super::start_lattice::StartLattice;
 use super::vectors::vector;
 use crate::geometry::domain::Axis;
@@ -9,7 +10,7 @@ use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::Pencils;
 use crate::scenes::shapes::Shape;
 use crate::schemes::weakly_compressible_sph::SphConfig;
-use crate::schemes::weakly_compressible_sph::walls::{ContactAngle, Container, Wall};
+use crate::schemes::weakly_compressible_sph::walls::{Container, Wall};
 use crate::spec::{Choice, Parameter, Violation};
 use serde_json::{Value, json};
 
@@ -159,47 +160,6 @@ fn sides<const D: usize>(spec: &BoxSpec, errors: &mut Vec<Violation>) -> Option<
         }
     }
     sides.iter().any(Option::is_some).then_some(sides)
-}
-
-/// A wall across an axis.
-pub(super) fn wall<const D: usize>(spec: &WallSpec, axis: usize, place: &str, errors: &mut Vec<Violation>) -> Wall<D> {
-    let at = format!("{place}/velocity");
-    let velocity = spec.velocity.as_ref().map_or_else(Vector::<D>::zeros, |given| vector::<D>(&at, given, errors));
-    if velocity[axis] != 0.0 {
-        let mut along = velocity;
-        along[axis] = 0.0;
-        let (got, allowed) = (json!(velocity.as_slice()), json!(along.as_slice()));
-        errors.push(Violation::new(at, "range", "a wall moves along itself", got, allowed));
-    }
-    Wall { velocity, holds_fluid: spec.slip == WallWord::NoSlip, contact: contact(spec, place, errors) }
-}
-
-fn contact(spec: &WallSpec, place: &str, errors: &mut Vec<Violation>) -> ContactAngle {
-    /// Without an angle given, neither fluid wets a wall more.
-    const NEUTRAL: f64 = 90.0;
-    let (receding, advancing) = match (spec.contact_angle, spec.receding_angle, spec.advancing_angle) {
-        (angle, None, None) => (angle.unwrap_or(NEUTRAL), angle.unwrap_or(NEUTRAL)),
-        (None, Some(receding), Some(advancing)) if receding <= advancing => (receding, advancing),
-        (None, Some(receding), Some(advancing)) => {
-            let detail = "a contact line recedes below the receding angle and advances above the advancing one, which is the larger";
-            let at = format!("{place}/receding_angle");
-            errors.push(Violation::new(at, "range", detail, receding, format!("a number ≤ {advancing}")));
-            (advancing, advancing)
-        }
-        (Some(angle), ..) => {
-            let detail = "a wall has one contact angle, or a receding and an advancing one";
-            errors.push(Violation::new(format!("{place}/contact_angle"), "conflict", detail, angle, Value::Null));
-            (angle, angle)
-        }
-        (None, receding, advancing) => {
-            let missing = if receding.is_none() { "receding_angle" } else { "advancing_angle" };
-            let detail = "a contact line with hysteresis has a receding and an advancing angle";
-            let angle = receding.or(advancing).unwrap_or(NEUTRAL);
-            errors.push(Violation::new(format!("{place}/{missing}"), "required", detail, Value::Null, angle));
-            (angle, angle)
-        }
-    };
-    ContactAngle { receding: receding.to_radians(), advancing: advancing.to_radians() }
 }
 
 /// An error where the drop does not fit into the box.

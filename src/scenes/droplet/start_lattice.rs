@@ -3,9 +3,10 @@
 //! Under a background pressure a lattice is stable only for some ratios of smoothing length and spacing (linear theory of
 //! lattice waves, docs/results/droplet-notes.md). Where it is not, it melts, and its energy becomes motion.
 
-use super::spec::LatticeWord;
+use super::spec::{Droplet, LatticeWord};
 use crate::geometry::Vector;
 use crate::geometry::block::indices;
+use crate::spec::Violation;
 
 /// A lattice that fills a box.
 #[derive(Debug, Clone)]
@@ -82,6 +83,26 @@ impl<const D: usize> StartLattice<D> {
         }
         (inside, around)
     }
+}
+
+/// Number of particles of a run at most.
+const MOST_PARTICLES: f64 = 1e9;
+
+/// The particles of the start.
+pub(super) fn start_lattice<const D: usize>(
+    spec: &Droplet,
+    word: LatticeWord,
+    lengths: &Vector<D>,
+    is_box: bool,
+    errors: &mut Vec<Violation>,
+) -> StartLattice<D> {
+    let lattice = StartLattice::new(word, lengths, spec.spacing, MOST_PARTICLES);
+    if is_box && !(1.0..=MOST_PARTICLES).contains(&lattice.count()) {
+        let least = (lengths.product() / MOST_PARTICLES).powf(1.0 / D as f64);
+        let allowed = format!("a number ≥ {least:.3e} and below every side");
+        errors.push(Violation::new("/spacing", "range", "too many particles, or none", spec.spacing, allowed));
+    }
+    lattice
 }
 
 #[cfg(test)]

@@ -18,8 +18,8 @@ use super::strays::Strays;
 use super::surfactant::Scales;
 use super::varying_tension::{Surroundings, VaryingTension};
 use super::volume_form::viscosity_share;
+use super::walls::Walls;
 use super::walls::level::Levels;
-use super::walls::{FlowAndWalls, Walls};
 use crate::closest_point::SurfaceColumns;
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
@@ -306,31 +306,27 @@ impl<const D: usize> SphSystem<D> {
             TensionForce::BalancedUncorrected | TensionForce::Csf => f64::INFINITY,
         };
         self.flow.derive_volumes();
-        let Self { pairs, particles, columns, interface, config, flow, walls, domain, .. } = self;
+        let Self { pairs, particles, columns, interface, config, flow, domain, .. } = self;
         let carried = interface.level_set().map(LevelSet::carried);
-        let all = FlowAndWalls { flow, walls: walls.as_ref() };
-        shifting::concentration(
-            pairs,
-            |i| all.volume(i),
-            config.spacing,
-            |i, gradient| {
-                // Points of walls stay where they are.
-                if i >= flow.count() {
-                    return;
+        // Points of walls have the volumes of the start: those of the last evaluation are in no checkpoint.
+        let volume = |i: usize| flow.volume.get(i).copied().unwrap_or(flow.cell);
+        shifting::concentration(pairs, volume, config.spacing, |i, gradient| {
+            // Points of walls stay where they are.
+            if i >= flow.count() {
+                return;
+            }
+            let mut shift = shifting::displacement(gradient * config.shifting_rate, config.smoothing_length, way);
+            if let Some(carried) = carried {
+                let (phi, normal) = (particles.scalar(columns.phi)[i], particles.vector(columns.normal)[i]);
+                shift -= normal * (normal.dot(&shift) * shifting::share_left_out(phi / config.spacing));
+                if carried != columns.phi {
+                    // The interface stays where it is: a particle takes the level of its new place.
+                    particles.scalar_mut(carried)[i] += normal.dot(&shift);
                 }
-                let mut shift = shifting::displacement(gradient * config.shifting_rate, config.smoothing_length, way);
-                if let Some(carried) = carried {
-                    let (phi, normal) = (particles.scalar(columns.phi)[i], particles.vector(columns.normal)[i]);
-                    shift -= normal * (normal.dot(&shift) * shifting::share_left_out(phi / config.spacing));
-                    if carried != columns.phi {
-                        // The interface stays where it is: a particle takes the level of its new place.
-                        particles.scalar_mut(carried)[i] += normal.dot(&shift);
-                    }
-                }
-                let x = &mut particles.positions_mut()[i];
-                *x = domain.wrap(*x + shift);
-            },
-        )?;
+            }
+            let x = &mut particles.positions_mut()[i];
+            *x = domain.wrap(*x + shift);
+        })?;
         pairs.gather_positions(particles.positions());
         Ok(())
     }

@@ -15,9 +15,11 @@
 pub mod container;
 pub(super) mod level;
 pub mod obstacle;
+pub mod wall;
 
-pub use container::{Beside, ContactAngle, Container, Wall};
+pub use container::Container;
 pub use obstacle::Obstacle;
+pub use wall::{Beside, ContactAngle, Wall};
 
 use super::flow_state::FlowState;
 use super::interactions::BodyForce;
@@ -379,8 +381,8 @@ impl<const D: usize> Sums<D> {
 
 #[cfg(test)]
 mod tests {
-    use super::container::{ContactAngle, Container, Wall};
     use super::level::Levels;
+    use super::{ContactAngle, Container, Wall};
     use super::{FlowState, Walls};
     use crate::geometry::domain::Axis;
     use crate::geometry::{Domain, Vector};

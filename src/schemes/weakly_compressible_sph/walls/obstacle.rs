@@ -1,6 +1,6 @@
 //! A body that stands in the fluids.
 
-use super::container::{Beside, Wall};
+use super::wall::{Beside, Wall};
 use crate::geometry::{Surface, Vector};
 use std::fmt::{Debug, Formatter};
 use std::sync::Arc;
