@@ -218,7 +218,7 @@ mod tests {
     fn lines_that_are_no_rows_and_jobs_of_others_are_left_out() {
         let answer = "slurm_load_jobs error: Unable to contact\n\
                       12|mns-a-1|RUNNING|None|node1\n13|my own job|RUNNING|None|node1\n\
-                      x|mns-b-1|RUNNING|None|\n14|mns-b-1|\n15|mns-c-1|PENDING|(Resources|held)|\n16|mns-c-1|PENDING|Priority|\n";
+                      x|mns-b-1|RUNNING|None|\n14|mns-b-1|\n15|mns-c-1|PENDING|(Resources|held)||node3\n16|mns-c-1|PENDING|Priority|\n";
         let table = table(answer);
         assert_eq!(table.all().count(), 2);
         assert_eq!(table.counts(), (1, 1));
