@@ -1,6 +1,7 @@
 //! Droplets among walls: what is refused and why, and that walls hold what they should.
 
 use crate::support::{PLAN, build, build_with, column, error, run, scene};
+use meniscus::scene::cloud::Cloud;
 use meniscus::scene::{Clouds, parse};
 use meniscus::scenes::SCENES;
 use meniscus::simulation::{OutputPlan, Selection, Simulation};
@@ -93,9 +94,44 @@ fn obstacles_that_do_not_fit_are_refused_at_their_place() {
     );
     assert_eq!(refusals(&sits), []);
     let plate = json!({"type": "box", "center": [0.5, 0.9], "size": [0.4, 0.05]});
-    let thin = body(&walls, &json!({"obstacles": [{"shape": plate}]}));
-    let Err(found) = build_with(&thin, PLAN, &Clouds::default()) else { panic!("a thin plate") };
-    assert!(found[0].pointer == "/obstacles/0/shape" && found[0].detail.contains("thicker"), "{found:?}");
+    let found = refusals(&body(&walls, &json!({"obstacles": [{"shape": plate}]})));
+    assert!(found.len() == 1 && found[0].0 == "/obstacles/0/shape" && found[0].1.contains("thicker"), "{found:?}");
+}
+
+/// Bodies by a formula, and by a mesh from outside in space, keep particles out as a disk does.
+#[test]
+fn bodies_by_formulas_and_meshes_keep_particles_out() {
+    let gravity = json!({"type": "constant", "acceleration": [0, -2], "balance": "mean"});
+    let by_formula = json!({
+        "obstacles": [{"shape": {
+            "type": "formula", "level": "(x - 0.5)^2 + (y - 0.05)^2 - 0.09", "low": [0, -0.5], "high": [1, 0.6]
+        }}],
+        "shape": {"type": "circle", "center": [0.5, 0.7], "radius": 0.2}, "body_force": gravity, "end_time": 0.2,
+        "fluids": {"inside": {"density": 2, "sound_speed": 40}, "outside": {"sound_speed": 40}}
+    });
+    let fields = finished(&body(&json!([{}, {}]), &by_formula)).fields(Selection::All);
+    assert!(fields.points.iter().all(|x| (x[0] - 0.5).hypot(x[1] - 0.05) > 0.29));
+    let corners = |k: u32| [0, 1, 2].map(|d| 0.6 * f64::from(k >> d & 1) + 0.2);
+    let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    let cube = Cloud { positions: (0..8).map(corners).collect(), triangles, ..Cloud::default() };
+    let by_mesh = json!({
+        "kind": "droplet", "case": "custom", "dimension": 3, "spacing": 0.1, "steps": 3, "end_time": 0.003, "surface_tension": 0,
+        "domain": {"low": [0, 0, 0], "high": [1.6, 1.6, 1.6]}, "obstacles": [{"shape": {"type": "mesh", "upload": "upl_1"}}],
+        "shape": {"type": "sphere", "center": [1.2, 1.2, 1.2], "radius": 0.3}
+    });
+    let clouds = Clouds::from([("/obstacles/0/shape", cube)]);
+    let mut simulation = build_with(&by_mesh, PLAN, &clouds).unwrap();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+    }
+    let fields = simulation.fields(Selection::All);
+    // The cube takes its share of the box, and nobody is in it.
+    let share = fields.points.len() as f64 * 0.1_f64.powi(3) / 1.6_f64.powi(3);
+    assert!((share - (1.0 - (0.6_f64 / 1.6).powi(3))).abs() < 0.02, "{share}");
+    assert!(fields.points.iter().all(|x| x.iter().any(|part| (part - 0.5).abs() > 0.29)));
+    // Without the mesh nothing is built.
+    assert!(build_with(&by_mesh, PLAN, &Clouds::default()).is_err());
 }
 
 /// d² = R² + r² − 2Rr cos θ for the centers of a drop and of a disk that it meets at an angle θ.
@@ -103,15 +139,19 @@ fn obstacles_that_do_not_fit_are_refused_at_their_place() {
 fn a_drop_on_a_disk_keeps_its_angle_and_one_that_falls_goes_around_it() {
     let (drop, disk, angle) = (0.4_f64, 0.5_f64, 60.0_f64.to_radians());
     let apart = (drop * drop + disk * disk - 2.0 * drop * disk * angle.cos()).sqrt();
-    let sits = json!({
-        "domain": {"low": [-1.5, -1.2], "high": [1.5, 1.8]}, "spacing": 0.05, "end_time": 0.1,
-        "shape": {"type": "circle", "center": [0, apart], "radius": drop},
-        "obstacles": [{"shape": {"type": "circle", "radius": disk}, "wall": {"contact_angle": 60}}]
-    });
-    let simulation = finished(&body(&Value::Null, &sits));
-    let report = simulation.report();
-    assert!(error(&report, "contact_angle", "max", None) < 1.0);
-    assert!(error(&report, "area", "relative", None) < 3e-3);
+    let sits = |x: f64| {
+        json!({
+            "domain": {"low": [-1.5, -1.2], "high": [1.5, 1.8]}, "spacing": 0.05, "end_time": 0.1,
+            "shape": {"type": "circle", "center": [x, apart], "radius": drop},
+            "obstacles": [{"shape": {"type": "circle", "center": [x, 0], "radius": disk}, "wall": {"contact_angle": 60}}]
+        })
+    };
+    let simulation = finished(&body(&Value::Null, &sits(0.0)));
+    // Across the sides of the box it is the same.
+    for report in [simulation.report(), run(&body(&Value::Null, &sits(1.5)))] {
+        assert!(error(&report, "contact_angle", "max", None) < 1.0);
+        assert!(error(&report, "area", "relative", None) < 3e-3);
+    }
     // The lens that the disk leaves of the drop.
     let share = |r: f64, other: f64| {
         let half = ((apart * apart + r * r - other * other) / (2.0 * apart * r)).acos();
@@ -164,6 +204,12 @@ fn a_heavy_layer_on_a_light_one_falls_as_linear_theory_says() {
     });
     let report = run(&body(&Value::Null, &falls));
     assert!(error(&report, "wave_amplitude", "max", None) < 0.03);
+    let is_held_back =
+        |body: &Value| scene(body).warnings().iter().any(|finding| finding.code == "held_back_by_weight");
+    assert!(!is_held_back(&body(&Value::Null, &falls)));
+    let mut whole = falls;
+    whole["body_force"]["balance"] = json!("none");
+    assert!(is_held_back(&body(&Value::Null, &whole)));
 }
 
 #[test]
@@ -177,6 +223,10 @@ fn a_drop_on_a_wall_keeps_its_angle_and_a_flow_between_walls_its_profile() {
     assert!(error(&report, "contact_width", "relative", None) < 1e-3);
     let depth = report.health.checks.iter().find(|check| check.name == "wall_depth").unwrap();
     assert_eq!(depth.holds, Some(true));
+    // Between two angles a line may rest anywhere: no angle is an error.
+    let hysteresis = json!(["periodic", {"low": {"receding_angle": 50, "advancing_angle": 80}}]);
+    let report = run(&body(&hysteresis, &on_wall));
+    assert!(report.errors.iter().all(|error| error.quantity != "contact_angle"));
     let between = json!({
         "surface_tension": 0, "end_time": 4, "shape": {"type": "layer", "height": 0, "thickness": 1}, "spacing": 0.1,
         "fluids": {"inside": {"sound_speed": 10, "viscosity": 0.2}, "outside": {"sound_speed": 10, "viscosity": 0.2}}

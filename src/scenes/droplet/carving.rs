@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 /// The container of a room with its bodies, as they are known when a simulation is built.
 ///
 /// # Errors
-/// Meshes that are no closed surfaces, and bodies that the box has no room for.
+/// Meshes that are no closed surfaces, and bodies that do not suit the box.
 pub(super) fn container_at_build<const D: usize>(
     room: &Room<D>,
     clouds: &Clouds,
@@ -23,39 +23,44 @@ pub(super) fn container_at_build<const D: usize>(
     let (mut obstacles, mut errors) = (Vec::new(), Vec::new());
     for obstacle in &room.obstacles {
         let surface = match &obstacle.surface {
-            Some(surface) => surface.whole.clone(),
-            None => match mesh::surface::<D>(clouds, obstacle.place) {
-                Ok(surface) => surface,
-                Err(found) => {
-                    errors.extend(found);
-                    continue;
-                }
-            },
+            Some(surface) => Ok(surface.whole.clone()),
+            None => mesh::surface::<D>(clouds, obstacle.place),
         };
-        errors.extend(check_place(room, obstacle, surface.bounding_box()));
-        obstacles.push(Obstacle::new(surface, obstacle.wall.clone()));
+        match surface {
+            Ok(surface) => {
+                errors.extend(check_body(room, obstacle, surface.as_ref()));
+                obstacles.push(Obstacle::new(surface, obstacle.wall.clone()));
+            }
+            Err(found) => errors.extend(found),
+        }
     }
     if errors.is_empty() { Ok(Some(container.clone().with_obstacles(obstacles))) } else { Err(errors) }
 }
 
-/// Errors where the bodies that are known before a run do not stand in the box, and where a drop that is reaches into them.
+/// Errors where the bodies that are known before a run do not suit the box, and where a drop that is reaches into them.
 pub(super) fn check<const D: usize>(
     room: &Room<D>,
     drop: Option<(&Shape, &dyn Surface<D>)>,
     errors: &mut Vec<Violation>,
 ) {
-    errors.extend(room.obstacles.iter().filter_map(|obstacle| {
-        let surface = obstacle.surface.as_ref()?;
-        check_place(room, obstacle, surface.whole.bounding_box())
-    }));
-    errors.extend(drop.and_then(|drop| check_known_drop(room, drop)));
+    if room.obstacles.iter().any(|obstacle| obstacle.surface.is_none()) {
+        let known = room.obstacles.iter().filter_map(|obstacle| Some((obstacle, obstacle.surface.as_ref()?)));
+        errors.extend(known.filter_map(|(obstacle, surface)| check_body(room, obstacle, surface.whole.as_ref())));
+        return;
+    }
+    match container_at_build(room, &Clouds::default()) {
+        Ok(container) => errors.extend(drop.and_then(|drop| check_known_drop((room, container.as_ref()), drop))),
+        Err(found) => errors.extend(found),
+    }
 }
 
 /// The share of the box that bodies leave to the fluids, as far as they are known before a run.
 pub(super) fn free_share<const D: usize>(room: &Room<D>) -> f64 {
-    let known = || room.obstacles.iter().filter_map(|obstacle| obstacle.surface.as_ref());
-    let obstacles = known().map(|surface| Obstacle::new(surface.whole.clone(), room.obstacles[0].wall.clone()));
-    let obstacles: Vec<Obstacle<D>> = obstacles.collect();
+    let known = |obstacle: &PlannedObstacle<D>| {
+        let surface = obstacle.surface.as_ref()?.whole.clone();
+        Some(Obstacle::new(surface, obstacle.wall.clone()))
+    };
+    let obstacles: Vec<Obstacle<D>> = room.obstacles.iter().filter_map(known).collect();
     let Some(container) = room.container.clone().filter(|_| !obstacles.is_empty()) else { return 1.0 };
     let container = container.with_obstacles(obstacles);
     let places = grid((room.low, room.high));
@@ -63,21 +68,31 @@ pub(super) fn free_share<const D: usize>(room: &Room<D>) -> f64 {
     places.iter().filter(is_free).count() as f64 / places.len() as f64
 }
 
-/// Places between two corners.
-fn grid<const D: usize>((low, high): (Vector<D>, Vector<D>)) -> Vec<Vector<D>> {
-    let place = |k: usize| {
-        let cell = indices(k, &[LOOKS; D]);
-        Vector::<D>::from_fn(|d, _| low[d] + (high[d] - low[d]) * (cell[d] as f64 + 0.5) / LOOKS as f64)
-    };
-    (0..LOOKS.pow(D as u32)).map(place).collect()
+/// Places along an axis at which bodies are looked for, in the plane and in space.
+const LOOKS: [usize; 2] = [64, 24];
+
+const fn looks(dimension: usize) -> usize {
+    LOOKS[(dimension != 2) as usize]
 }
 
-/// An error where a body lies outside of the box, or across a periodic side so that its image is too near.
-fn check_place<const D: usize>(
+/// Places between two corners.
+fn grid<const D: usize>((low, high): (Vector<D>, Vector<D>)) -> Vec<Vector<D>> {
+    let looks = looks(D);
+    let place = |k: usize| {
+        let cell = indices(k, &[looks; D]);
+        Vector::<D>::from_fn(|d, _| low[d] + (high[d] - low[d]) * (cell[d] as f64 + 0.5) / looks as f64)
+    };
+    (0..looks.pow(D as u32)).map(place).collect()
+}
+
+/// An error where a body lies outside of the box, across a periodic side so that its image is too near, or is so thin that particles on both
+/// sides feel each other.
+fn check_body<const D: usize>(
     room: &Room<D>,
     obstacle: &PlannedObstacle<D>,
-    (low, high): (Vector<D>, Vector<D>),
+    surface: &dyn Surface<D>,
 ) -> Option<Violation> {
+    let (low, high) = surface.bounding_box();
     let refused = |detail: String| {
         let allowed = json!([room.low.as_slice(), room.high.as_slice()]);
         Some(Violation::new(obstacle.place, "conflict", detail, obstacle.shape.to_json(), allowed))
@@ -97,28 +112,37 @@ fn check_place<const D: usize>(
             ));
         }
     }
+    let deepest = grid((low, high)).iter().map(|x| -surface.signed_distance(x)).fold(0.0, f64::max);
+    // The middle lies half of a cell from a place at most.
+    let thickness = 2.0 * deepest + ((high - low) / looks(D) as f64).min();
+    if thickness < room.least_layer {
+        return refused(format!(
+            "the obstacle is about {thickness:.4} thick; particles on its two sides feel each other up to {:.4}: make it thicker, or the \
+             spacing finer",
+            room.least_layer
+        ));
+    }
     None
 }
 
-/// Places along an axis at which bodies are looked for.
-const LOOKS: usize = 64;
-
-/// An error where a drop that is known before a run reaches into bodies that are, and have no contact angle.
-fn check_known_drop<const D: usize>(room: &Room<D>, (shape, drop): (&Shape, &dyn Surface<D>)) -> Option<Violation> {
-    if room.obstacles.is_empty() || room.obstacles.iter().any(|obstacle| obstacle.surface.is_none()) {
+/// An error where a drop that is known before a run reaches into bodies without a contact angle.
+fn check_known_drop<const D: usize>(
+    (room, container): (&Room<D>, Option<&Container<D>>),
+    (shape, drop): (&Shape, &dyn Surface<D>),
+) -> Option<Violation> {
+    if room.obstacles.is_empty() {
         return None;
     }
-    let container = container_at_build(room, &Clouds::default()).ok()?;
     let positions = grid(drop.bounding_box());
     let level: Vec<f64> = positions.iter().map(|x| drop.signed_distance(x)).collect();
-    check_drop((room, container.as_ref()), shape, (&positions, &level))
+    check_drop((room, container), shape, (&positions, &level))
 }
 
 /// Moves places of the lattice that lie in bodies to those behind walls; deeper ones than `room.least_layer` are dropped. Returns all
 /// that lay in bodies.
 ///
 /// # Errors
-/// A body that is so thin that particles on both sides feel each other, and one that leaves no fluid.
+/// Bodies that leave no fluid.
 pub(super) fn carve<const D: usize>(
     room: &Room<D>,
     container: Option<&Container<D>>,
@@ -127,33 +151,14 @@ pub(super) fn carve<const D: usize>(
 ) -> Result<Vec<Vector<D>>, Violation> {
     let mut carved = Vec::new();
     let Some(container) = container.filter(|container| container.has_obstacles()) else { return Ok(carved) };
-    let mut deepest = vec![0.0_f64; room.obstacles.len()];
-    let mut fluid = Vec::with_capacity(positions.len());
-    for x in positions.iter() {
-        match container.beside_obstacle(x) {
-            Some(beside) if beside.distance <= 0.0 => {
-                let deepest = &mut deepest[beside.wall - 2 * D];
-                *deepest = deepest.max(-beside.distance);
-                carved.push(*x);
-                if -beside.distance <= room.least_layer {
-                    behind_walls.push(*x);
-                }
-            }
-            _ => fluid.push(*x),
+    positions.retain(|x| match container.beside_obstacle(x) {
+        Some(beside) if beside.distance <= 0.0 => {
+            carved.push(*x);
+            behind_walls.extend((-beside.distance <= room.least_layer).then_some(*x));
+            false
         }
-    }
-    *positions = fluid;
-    for (obstacle, deepest) in room.obstacles.iter().zip(deepest) {
-        let thickness = 2.0 * deepest + room.spacing;
-        if thickness < room.least_layer {
-            let detail = format!(
-                "the obstacle is about {thickness:.4} thick; particles on its two sides feel each other up to {:.4}: make it thicker, \
-                 or the spacing finer",
-                room.least_layer
-            );
-            return Err(Violation::new(obstacle.place, "range", detail, obstacle.shape.to_json(), room.least_layer));
-        }
-    }
+        _ => true,
+    });
     if positions.is_empty() {
         let detail = "the obstacles leave no room for the fluids";
         return Err(Violation::new("/obstacles", "conflict", detail, Value::Null, Value::Null));

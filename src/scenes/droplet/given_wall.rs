@@ -17,7 +17,13 @@ pub(super) fn wall<const D: usize>(spec: &WallSpec, axis: usize, place: &str, er
         let (got, allowed) = (json!(velocity.as_slice()), json!(along.as_slice()));
         errors.push(Violation::new(at, "range", "a wall moves along itself", got, allowed));
     }
-    Wall { velocity, holds_fluid: spec.slip == WallWord::NoSlip, contact: contact(spec, place, errors) }
+    Wall { velocity, ..wall_at_rest(spec, place, errors) }
+}
+
+/// A wall that does not move, whatever its velocity.
+pub(super) fn wall_at_rest<const D: usize>(spec: &WallSpec, place: &str, errors: &mut Vec<Violation>) -> Wall<D> {
+    let contact = contact(spec, place, errors);
+    Wall { velocity: Vector::<D>::zeros(), holds_fluid: spec.slip == WallWord::NoSlip, contact }
 }
 
 fn contact(spec: &WallSpec, place: &str, errors: &mut Vec<Violation>) -> ContactAngle {

@@ -43,8 +43,8 @@ impl<const D: usize> Hydrostatic<'_, D> {
     }
 }
 
-/// Pressures by Δρ g D that keep the pressures of fluids positive while a drop of a diameter D rises: with 1 the drop of Hysing et
-/// al. has a rise velocity 2 % too high, with 2 .5 %, with 4 5 % too low (measured; docs/results/wall-notes.md).
+/// Pressure by Δρ g D that keeps the pressures of fluids positive while a drop of a diameter D rises. The drop of Hysing et al. comes to the
+/// same height with .1 to 2; with less than .5 it becomes too flat (measured; docs/results/wall-notes.md).
 const RISE_PRESSURE: f64 = 0.5;
 
 /// The pressure that keeps the pressures of fluids between walls positive under gravity.

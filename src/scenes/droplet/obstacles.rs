@@ -1,18 +1,15 @@
 //! Bodies that stand in the box of a scene, as parameters.
 
-use super::given_wall::wall;
-use super::spec::{ObstacleSpec, WallSpec};
+use super::given_wall::wall_at_rest;
+use super::spec::{MOST_OBSTACLES, ObstacleSpec};
 use crate::scene::cloud::{CloudReference, CloudRole};
 use crate::scenes::shapes::{Shape, ShapeSurface};
 use crate::schemes::weakly_compressible_sph::walls::Wall;
 use crate::spec::{Parameter, Violation};
 use serde_json::json;
 
-/// Bodies of a scene at most: those from outside are named by their places.
-pub(super) const MOST: usize = 16;
-
-/// The places of shapes.
-static PLACES: [&str; MOST] = [
+/// The places of shapes, by which meshes from outside are asked for.
+static PLACES: [&str; MOST_OBSTACLES] = [
     "/obstacles/0/shape",
     "/obstacles/1/shape",
     "/obstacles/2/shape",
@@ -73,7 +70,7 @@ pub(super) fn plan<const D: usize>(
             let got = given.velocity.to_json();
             errors.push(Violation::new(format!("{at}/wall/velocity"), "range", detail, got, json!(vec![0.0; D])));
         }
-        let wall = wall(&WallSpec { velocity: None, ..given.clone() }, 0, &format!("{at}/wall"), errors);
+        let wall = wall_at_rest(given, &format!("{at}/wall"), errors);
         let has_angle = given.has_angle();
         planned.push(PlannedObstacle { place, shape: shape.clone(), surface, wall, has_angle });
     }

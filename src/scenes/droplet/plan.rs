@@ -11,12 +11,10 @@ use super::numbers::{SceneNumbers, smallest_radius};
 use super::obstacles;
 use super::own_motion::{StartMotion, motion_at_start};
 use super::room::{Room, check_needs, check_size, surround};
-use super::spec::{
-    BoxSpec, Droplet, GeometryChoice, IntegratorWord, NumbersSpec, ObstacleSpec, Shifting, StopWhen, TensionWord,
-};
+use super::spec::{BoxSpec, Droplet, GeometryChoice, IntegratorWord, NumbersSpec, Shifting, StopWhen, TensionWord};
 use super::start_lattice::{StartLattice, start_lattice};
 use super::steps::time_step;
-use super::stirring::{SHIFTING, SHIFTING_BETWEEN_WALLS, is_stirred};
+use super::stirring::{self, SHIFTING, SHIFTING_BETWEEN_WALLS, is_stirred};
 use super::varying_tension::{StartBox, largest_tension, tension_law};
 use crate::geometry::Vector;
 use crate::scene::cloud::{CloudReference, CloudSizes};
@@ -147,9 +145,9 @@ fn room<const D: usize>(
     corners: &BoxSpec,
     errors: &mut Vec<Violation>,
 ) -> (Room<D>, Vec<CloudReference>) {
-    let given: &[ObstacleSpec] = spec.obstacles.as_ref().map_or(&[], |obstacles| &obstacles.0);
+    let given = spec.obstacles.as_ref().map_or(&[][..], |obstacles| &obstacles.0);
     let (bodies, clouds) = obstacles::plan::<D>(given, errors);
-    let mut room = Room::<D>::new((corners, spec.spacing), bodies, errors);
+    let mut room = Room::<D>::new(corners, bodies, errors);
     room.needs_angles = spec.surface_tension.unwrap_or(case.tension) > 0.0;
     (room, clouds)
 }
@@ -368,7 +366,9 @@ impl<const D: usize> Scene for DropletScene<D> {
     }
 
     fn warnings(&self) -> Vec<Finding> {
-        self.numbers.soft_fluids(&self.spec)
+        let mut warnings = self.numbers.soft_fluids(&self.spec);
+        warnings.extend(stirring::held_back(&self.config, &self.room));
+        warnings
     }
 
     fn numbers(&self) -> Vec<(&'static str, f64)> {
@@ -451,16 +451,18 @@ impl<const D: usize> Scene for DropletScene<D> {
         let (mut positions, mut behind_walls) = self.lattice.positions(&self.room.low, &lengths, &self.room.layers);
         let container = carving::container_at_build(&self.room, &context.clouds)?;
         let behind = container.as_ref();
+        let drop = self.start_drop(&context)?;
         let carved =
             carving::carve(&self.room, behind, &mut positions, &mut behind_walls).map_err(|found| vec![found])?;
         if !carved.is_empty() {
-            let (level, _) = self.levels_at(&context, (&carved, behind))?;
+            let level = self.levels_at(&drop, &context, &carved)?;
             let fault = carving::check_drop((&self.room, behind), &self.shape, (&carved, &level));
             if let Some(fault) = fault {
                 return Err(vec![fault]);
             }
         }
-        let (level, measure) = self.levels_at(&context, (&positions, behind))?;
+        let level = self.levels_at(&drop, &context, &positions)?;
+        let measure = self.start_measure(&drop, behind);
         let cell = lengths.product() / self.lattice.count();
         let velocities = match &self.motion {
             Some(motion) => Some(self.start_velocities(motion, &positions, &level)?),
@@ -469,7 +471,7 @@ impl<const D: usize> Scene for DropletScene<D> {
         let level = match self.hydrostatic() {
             Some(hydrostatic) => {
                 hydrostatic.settle(&mut positions, &level, &mut behind_walls);
-                self.levels_at(&context, (&positions, behind))?.0
+                self.levels_at(&drop, &context, &positions)?
             }
             None => level,
         };

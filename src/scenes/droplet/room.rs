@@ -28,18 +28,13 @@ pub(super) struct Room<const D: usize> {
     pub obstacles: Vec<PlannedObstacle<D>>,
     /// Whether an interface that meets walls needs their contact angles.
     pub needs_angles: bool,
-    /// The spacing, and the least thickness of layers of points behind walls.
-    pub spacing: f64,
+    /// The least thickness of layers of points behind walls.
     pub least_layer: f64,
 }
 
 impl<const D: usize> Room<D> {
     /// The box of a spec.
-    pub fn new(
-        (spec, spacing): (&BoxSpec, f64),
-        obstacles: Vec<PlannedObstacle<D>>,
-        errors: &mut Vec<Violation>,
-    ) -> Self {
+    pub fn new(spec: &BoxSpec, obstacles: Vec<PlannedObstacle<D>>, errors: &mut Vec<Violation>) -> Self {
         let low = vector::<D>("/domain/low", &spec.low, errors);
         let high = vector::<D>("/domain/high", &spec.high, errors);
         if (high - low).iter().any(|length| *length <= 0.0) {
@@ -56,7 +51,6 @@ impl<const D: usize> Room<D> {
             depth: Vector::<D>::zeros(),
             obstacles,
             needs_angles: true,
-            spacing,
             least_layer: 0.0,
         }
     }

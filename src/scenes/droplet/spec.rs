@@ -73,6 +73,9 @@ crate::group! {
     }
 }
 
+/// Bodies of a scene at most.
+pub const MOST_OBSTACLES: usize = 16;
+
 crate::group! {
     /// A body that stands in the fluids.
     pub struct ObstacleSpec {
@@ -402,7 +405,7 @@ crate::group! {
         /// the box; by case, and periodic along every axis, when not given
         domain: Option<BoxSpec>;
         /// bodies that stand in the fluids, thicker than neighbors reach; none when not given
-        obstacles: Option<Listed<ObstacleSpec>>, in Items(1, 16, ());
+        obstacles: Option<Listed<ObstacleSpec>>, in Items(1, MOST_OBSTACLES, ());
         /// distance h of neighboring particles: the volume of a particle is about h^D, whatever the lattice
         spacing: f64 = 0.031_25, in POSITIVE;
         /// velocity of both fluids at the start; 0 when not given
@@ -451,7 +454,7 @@ crate::group! {
         redistancing: Option<RedistancingChoice>;
         /// radius in h of the surface filter of the curvature, 0 for none, for geometry pcp; by tension_force when not given
         curvature_filter_h: Option<f64>, in NOT_NEGATIVE.and_at_most(20.0);
-        /// particle shifting; by case when not given
+        /// particle shifting; when not given, pst where a force or a moving wall deforms fluids between walls, else by case
         shifting: Option<Shifting>;
         /// a force from outside; by case when not given
         body_force: Option<ForceChoice>;

@@ -6,6 +6,7 @@ use super::plan::{DropletScene, RATIO};
 use super::room::check_size;
 use crate::closest_point::{LevelSurface, Redistancing};
 use crate::geometry::block::indices;
+use crate::geometry::surfaces::WavyLayer;
 use crate::geometry::{Surface, Vector};
 use crate::parallel::Interrupt;
 use crate::scene::BuildContext;
@@ -22,31 +23,59 @@ use std::sync::Arc;
 /// Number of times that a cell next to a surface is halved: an edge of h/16 leaves an error of 1e-4 of a drop of ten spacings.
 const MEASURE_HALVINGS: usize = 4;
 
+/// What tells the level of the drop at the start.
+pub(super) enum StartDrop<const D: usize> {
+    Layer(WavyLayer),
+    Surface(ShapeSurface<D>),
+    /// Points from outside.
+    Points,
+}
+
 impl<const D: usize> DropletScene<D> {
-    /// Signed distances of places from the drop at the start, and its area or volume; NaN where that is not known.
+    /// The drop at the start.
+    pub(super) fn start_drop(&self, context: &BuildContext) -> Result<StartDrop<D>, Vec<Violation>> {
+        if let Some(layer) = layer_of(&self.shape, self.lengths()[0]) {
+            return Ok(StartDrop::Layer(layer));
+        }
+        Ok(self.surface_at_build(context)?.map_or(StartDrop::Points, StartDrop::Surface))
+    }
+
+    /// Signed distances of places from the drop at the start.
     pub(super) fn levels_at(
         &self,
+        drop: &StartDrop<D>,
         context: &BuildContext,
-        (positions, container): (&[Vector<D>], Option<&Container<D>>),
-    ) -> Result<(Vec<f64>, f64), Vec<Violation>> {
-        let lengths = self.lengths();
-        let found = if let Some(layer) = layer_of(&self.shape, lengths[0]) {
-            let area = lengths.product() / lengths[1];
-            let period = (!self.room.is_bounded(1)).then_some(lengths[1]);
-            let levels = |at: &[Vector<D>]| at.iter().map(|x| distance_from_layer(&layer, period, x)).collect();
-            let is_whole = period.is_some() && self.room.obstacles.is_empty();
-            let measure = if is_whole { layer.thickness * area } else { self.measure_of(&levels, container) };
-            (levels(positions), measure)
-        } else if let Some(ShapeSurface { whole, .. }) = self.surface_at_build(context)? {
-            let (low, high) = whole.bounding_box();
-            let levels = |at: &[Vector<D>]| self.levels(whole.as_ref(), at);
-            let is_cut = self.room.cuts(&low, &high);
-            let measure = if is_cut { self.measure_of(&levels, container) } else { whole.area_or_volume() };
-            (levels(positions), measure)
-        } else {
-            (self.levels_of_points(context, positions).map_err(|found| vec![found])?, f64::NAN)
-        };
-        Ok(found)
+        positions: &[Vector<D>],
+    ) -> Result<Vec<f64>, Vec<Violation>> {
+        match drop {
+            StartDrop::Points => self.levels_of_points(context, positions).map_err(|found| vec![found]),
+            StartDrop::Layer(layer) => Ok(self.levels_of_layer(layer, positions)),
+            StartDrop::Surface(surface) => Ok(self.levels(surface.whole.as_ref(), positions)),
+        }
+    }
+
+    fn levels_of_layer(&self, layer: &WavyLayer, positions: &[Vector<D>]) -> Vec<f64> {
+        let period = (!self.room.is_bounded(1)).then_some(self.lengths()[1]);
+        positions.iter().map(|x| distance_from_layer(layer, period, x)).collect()
+    }
+
+    /// The area or volume of the drop at the start, without what lies behind walls; NaN where it is not known.
+    pub(super) fn start_measure(&self, drop: &StartDrop<D>, container: Option<&Container<D>>) -> f64 {
+        match drop {
+            StartDrop::Points => f64::NAN,
+            StartDrop::Layer(layer) if self.room.is_bounded(1) || !self.room.obstacles.is_empty() => {
+                self.measure_of(&|at| self.levels_of_layer(layer, at), container)
+            }
+            StartDrop::Layer(layer) => layer.thickness * self.lengths().product() / self.lengths()[1],
+            StartDrop::Surface(ShapeSurface { whole, .. }) => {
+                let (low, high) = whole.bounding_box();
+                if self.room.cuts(&low, &high) {
+                    self.measure_of(&|at| self.levels(whole.as_ref(), at), container)
+                } else {
+                    whole.area_or_volume()
+                }
+            }
+        }
     }
 
     /// The area or volume inside of what walls cut, by its signed distances on a grid: cells away from the surface count completely or

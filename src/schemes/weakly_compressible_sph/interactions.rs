@@ -111,7 +111,7 @@ pub struct LimitContext {
     pub smoothing_length: f64,
     /// The largest speed of a particle.
     pub speed: f64,
-    /// The viscosity beyond which pairs act along themselves.
+    /// The viscosity of which the excess acts along pairs; infinite where none does.
     pub least_viscosity: f64,
     /// Factors of the limits.
     pub numbers: StabilityNumbers,

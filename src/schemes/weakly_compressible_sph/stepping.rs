@@ -152,7 +152,7 @@ mod tests {
     use crate::parallel::Interrupt;
     use crate::schemes::weakly_compressible_sph::test_setting::setting;
     use crate::schemes::weakly_compressible_sph::{
-        BodyForce, DensityMethod, Drop, Integrator, KernelChoice, SphConfig, SphSystem,
+        BodyForce, DensityMethod, Integrator, KernelChoice, SphConfig, SphSystem,
     };
     use crate::simulation::{CpuClock, Phases};
 
@@ -166,13 +166,7 @@ mod tests {
                 let body_force = Some(BodyForce::Constant(gravity));
                 let config = SphConfig { tension: 0.0, integrator, density, body_force, ..this.config.clone() };
                 let mut stepper = Stepper::new(&config, this.positions.len());
-                let drop = Drop {
-                    positions: this.positions.clone(),
-                    level: this.level.clone(),
-                    velocities: None,
-                    measure: 1.0,
-                    behind_walls: Vec::new(),
-                };
+                let drop = this.drop(1.0);
                 let mut system =
                     SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
                 let mut phases = Phases::new(CpuClock::still());

@@ -417,8 +417,7 @@ mod tests {
     use crate::simulation::{CpuClock, Phases};
 
     fn evaluated(this: &Setting<2>, config: SphConfig<2>, level: Vec<f64>) -> SphSystem<2> {
-        let drop =
-            Drop { positions: this.positions.clone(), level, velocities: None, measure: 2.0, behind_walls: Vec::new() };
+        let drop = Drop { level, ..this.drop(2.0) };
         let mut system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
         system.flow.predicted.clone_from(&this.velocity);
         system.evaluate(Instant::default(), &mut Phases::new(CpuClock::still())).unwrap();

@@ -5,7 +5,7 @@ use super::interactions::TensionForce;
 use super::kernel_choice::{KernelChoice, ScaledKernel};
 use super::neighbor_lists::NeighborLists;
 use super::pair_workspace::PairWorkspace;
-use super::{DensityMethod, Discretization, Fluid, Fluids, Geometry, Integrator, PressureConfig, SphConfig};
+use super::{DensityMethod, Discretization, Drop, Fluid, Fluids, Geometry, Integrator, PressureConfig, SphConfig};
 use crate::geometry::domain::Axis;
 use crate::geometry::random::CounterRandom;
 use crate::geometry::{Domain, Vector};
@@ -73,6 +73,12 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
 }
 
 impl<const D: usize> Setting<D> {
+    /// The particles as a drop of a measure.
+    pub fn drop(&self, measure: f64) -> Drop<D> {
+        let (positions, level) = (self.positions.clone(), self.level.clone());
+        Drop { positions, level, velocities: None, measure, behind_walls: Vec::new() }
+    }
+
     pub fn lists(&self) -> NeighborLists<D> {
         let (cutoff, skin) = (self.config.cutoff(), self.config.skin());
         NeighborLists::new(&self.domain, (cutoff, skin), self.positions.len(), std::iter::empty()).unwrap()

@@ -40,6 +40,13 @@ struct Point<const D: usize> {
     wall: usize,
 }
 
+impl<const D: usize> Point<D> {
+    /// The way to the point from the place around which particles count for it: its foot, or itself.
+    fn way_from(&self, origin: &Vector<D>) -> Vector<D> {
+        if *origin == self.foot { self.normal * self.depth } else { Vector::<D>::zeros() }
+    }
+}
+
 /// What a point has of the fluid in front of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Continued<const D: usize> {
@@ -325,16 +332,14 @@ impl<const D: usize> Fluid<'_, D> {
 
     fn continued(&self, point: &Point<D>, origin: &Vector<D>, neighbors: &[u32]) -> Continued<D> {
         let wall = self.container.wall(point.wall);
-        let is_foot = *origin == point.foot;
-        let to_point = if is_foot { point.normal * point.depth } else { Vector::<D>::zeros() };
-        let sums = self.sums(&to_point, origin, wall, neighbors);
+        let sums = self.sums(&point.way_from(origin), origin, wall, neighbors);
         let all = sums.moments[0];
         if all <= 0.0 {
             let (pressure, viscosity) = (self.background, self.least_viscosity);
             return Continued { velocity: wall.velocity, pressure, viscosity };
         }
         // Without particles at its foot a point is the mirror image of those around it.
-        let s = if is_foot { -point.depth / self.around.radius } else { -sums.moments[1] / all };
+        let s = if *origin == point.foot { -point.depth / self.around.radius } else { -sums.moments[1] / all };
         let about_wall = if wall.holds_fluid {
             sums.vanishing(s)
         } else {

@@ -79,8 +79,9 @@ impl<const D: usize> ContactLines<D> {
                 return None;
             }
             let normal = particles.vector(columns.normal)[i];
-            let (across, foot) = (normal.dot(&beside.normal), particles.vector(columns.closest_point)[i]);
-            let height = beside.distance - (foot - x).dot(&beside.normal);
+            let across = normal.dot(&beside.normal);
+            // The closest point is x − φ n; as a column it may lie in another period.
+            let height = beside.distance + particles.scalar(columns.phi)[i] * across;
             let curvature = moment.droplets.ball_curvature(i) / (D - 1) as f64;
             let cosine = (-across - height * curvature).clamp(-1.0, 1.0);
             let target = self.container.wall(beside.wall).contact.target(cosine);

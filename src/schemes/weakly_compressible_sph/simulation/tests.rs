@@ -5,18 +5,12 @@ use crate::parallel::Interrupt;
 use crate::schemes::weakly_compressible_sph::pacing::PACING;
 use crate::schemes::weakly_compressible_sph::test_setting::{Setting, setting};
 use crate::schemes::weakly_compressible_sph::time_step::longest_step;
-use crate::schemes::weakly_compressible_sph::{Drop, KernelChoice, SphConfig, SphSystem};
+use crate::schemes::weakly_compressible_sph::{KernelChoice, SphConfig, SphSystem};
 use crate::simulation::{CpuClock, OutputPlan, Simulation, StepError};
 use std::collections::BTreeMap;
 
 fn run(this: &Setting<2>, config: SphConfig<2>, time_step: f64) -> WeaklyCompressibleSph<2> {
-    let drop = Drop {
-        positions: this.positions.clone(),
-        level: this.level.clone(),
-        velocities: None,
-        measure: 1.0,
-        behind_walls: Vec::new(),
-    };
+    let drop = this.drop(1.0);
     let system = SphSystem::new(config, this.domain.clone(), this.cell, drop, Interrupt::default()).unwrap();
     let plan = OutputPlan { every_time: None, series_every_steps: 1000 };
     WeaklyCompressibleSph::new(system, time_step, 1000.0 * time_step, plan, CpuClock::still(), BTreeMap::new())

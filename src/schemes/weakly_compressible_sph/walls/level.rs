@@ -70,8 +70,7 @@ fn continued<const D: usize>(
         return None;
     }
     let Circle { level, slope, curvature } = fit_circle(origin, neighbors, around, (level_of, levels.reach))?;
-    let to_point = if *origin == point.foot { point.normal * point.depth } else { Vector::<D>::zeros() };
-    let way = to_point / around.radius;
+    let way = point.way_from(origin) / around.radius;
     let right = level + slope.dot(&way) + 0.5 * curvature * way.norm_squared();
     // The root next to 0, as it is without curvature.
     let found = 2.0 * right / (1.0 + (1.0 + 2.0 * curvature * right).max(0.0).sqrt()) * around.radius;

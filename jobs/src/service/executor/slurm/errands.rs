@@ -28,11 +28,11 @@ pub(super) enum Errand {
         /// Its number, where it is known.
         id: Option<String>,
     },
-    /// It may run on any node but these: those without which it waits are worse than those that it left out.
+    /// It may run on any node but those that the site leaves out.
     Admit {
         /// Its name.
         name: String,
-        /// Nodes that the site leaves out.
+        /// These.
         excluded: String,
     },
 }

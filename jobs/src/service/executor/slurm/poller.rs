@@ -17,10 +17,11 @@ const PATIENCE: u32 = 5;
 /// Starts the thread; it ends with the cluster.
 pub(super) fn start(cluster: Weak<Cluster>) -> io::Result<()> {
     std::thread::Builder::new().name("slurm-poll".to_owned()).spawn(move || {
-        let mut nodes = BTreeSet::new();
+        let (mut nodes, mut asked) = (BTreeSet::new(), HashSet::new());
         while let Some(cluster) = cluster.upgrade() {
             let spent = look(&cluster);
             tell_of_nodes(&cluster, &mut nodes);
+            admit_to_any_node(&cluster, &mut asked);
             let poll = cluster.settings.poll;
             let least = (spent * PATIENCE).max(LEAST_INTERVAL.min(poll));
             wait(&cluster, least, least.max(poll));
@@ -61,7 +62,6 @@ fn look(cluster: &Cluster) -> Duration {
     let (_, unsure) = cluster.counts();
     metrics::gauge!("meniscus_slurm_unsure").set(unsure as f64);
     end_orphans(cluster);
-    admit_to_any_node(cluster);
     spent
 }
 
@@ -92,14 +92,22 @@ fn end_orphans(cluster: &Cluster) {
 }
 
 /// Lets jobs that wait for nodes which are not to be had run on those that they left out: a doubtful node is better than none.
-fn admit_to_any_node(cluster: &Cluster) {
+///
+/// The cluster writes several nodes of the site as one word: by `asked`, what a job left out when it was admitted, it is not admitted again.
+fn admit_to_any_node(cluster: &Cluster, asked: &mut HashSet<(String, String)>) {
     let watched: HashSet<String> = cluster.tickets().values().map(|ticket| ticket.job().name).collect();
+    asked.retain(|(name, _)| watched.contains(name));
     let by_site = cluster.settings.excluded().unwrap_or_default();
     for row in cluster.table().all().filter(|row| row.waits_for_nodes() && watched.contains(&row.name)) {
-        if row.excluded != by_site {
-            tracing::warn!(name = row.name, left_out = row.excluded, reason = row.reason, "a job may run on any node");
-            cluster.errands.send(Errand::Admit { name: row.name.clone(), excluded: by_site.to_owned() });
+        let is_new = asked.insert((row.name.clone(), row.excluded.clone()));
+        // Without nodes of the site an answer that did not come is told by those that are still left out.
+        if row.excluded == by_site || (!is_new && !by_site.is_empty()) {
+            continue;
         }
+        if is_new {
+            tracing::warn!(name = row.name, left_out = row.excluded, reason = row.reason, "a job may run on any node");
+        }
+        cluster.errands.send(Errand::Admit { name: row.name.clone(), excluded: by_site.to_owned() });
     }
 }
 
