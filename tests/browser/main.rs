@@ -128,6 +128,11 @@ fn what_the_service_refuses_is_shown_at_its_field() {
 }
 
 #[test]
+fn walls_and_bodies_are_lists_in_the_form() {
+    run("lists");
+}
+
+#[test]
 fn a_study_has_its_points_and_a_failed_job_its_reason() {
     run("study");
 }

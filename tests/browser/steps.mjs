@@ -144,6 +144,48 @@ const steps = {
         await until("all is well", async () => (await page.getByRole("alert").count()) === 0);
     },
 
+    async lists() {
+        await page.goto(`${url}/#/new`);
+        await page.getByRole("button", { name: /^droplet/ }).click();
+        const scene = {
+            kind: "droplet", case: "custom", spacing: 0.05, end_time: 0.02, shape: { type: "circle", center: [0.5, 1.1], radius: 0.2 },
+            domain: { low: [0, 0], high: [1, 1.5], axes: ["periodic", { low: {}, high: { velocity: [1, 0] } }] },
+        };
+        const body = page.getByRole("textbox", { name: "body", exact: true });
+        const sent = async () => JSON.parse(await body.inputValue()).scene;
+        await body.fill(JSON.stringify({ scene }));
+        // A choice may be written as its word, or without it.
+        await until("the first axis is periodic", async () => (await page.getByLabel("axes 1", { exact: true }).inputValue()) === "periodic");
+        check((await page.getByLabel("axes 2", { exact: true }).inputValue()) === "walls", "walls are not told from their fields");
+        check((await page.locator("#fieldscene-domain-axes-1-high-velocity").inputValue()) === "[1,0]", "the wall's velocity is not shown");
+        await page.getByLabel("axes 1", { exact: true }).selectOption("walls");
+        check((await sent()).domain.axes[0].type === "walls", "the first axis has no walls");
+        expected = /422/;
+        await page.locator("form > fieldset > button", { hasText: "more" }).first().click();
+        await page.getByLabel("add to obstacles").click();
+        await until("the service asks for a shape", async () => (await page.getByRole("alert").allInnerTexts()).some((said) => said.includes("shape")));
+        // A body made of two: the parts of a shape are shapes.
+        const shape = "fieldscene-obstacles-0-shape";
+        await page.locator(`#${shape}`).selectOption("intersection");
+        for (const [k, center] of ["[0.45, 0.4]", "[0.55, 0.4]"].entries()) {
+            await page.getByLabel("add to of").click();
+            await page.locator(`#${shape}-of-${k}`).selectOption("circle");
+            await page.locator(`#${shape}-of-${k}-center`).fill(center);
+            await page.locator(`#${shape}-of-${k}-radius`).fill("0.3");
+            await page.locator(`#${shape}-of-${k}-radius`).blur();
+        }
+        await until("all is well", async () => (await page.getByRole("alert").count()) === 0);
+        const { obstacles } = await sent();
+        check(obstacles.length === 1 && obstacles[0].shape.of[1].center[0] === 0.55, JSON.stringify(obstacles));
+        await page.getByRole("button", { name: "start", exact: true }).click();
+        await page.waitForURL(/jobs\//, WAIT);
+        const job = await ended(page.url().split("/").at(-1));
+        check(job.state === "succeeded", JSON.stringify(job));
+        await page.goto(`${url}/#/new?like=${job.id}`);
+        await page.getByLabel("take out obstacles 1").click();
+        check(!("obstacles" in (await sent())), "the obstacle is still there");
+    },
+
     async study() {
         await page.goto(`${url}/#/new`);
         await page.getByRole("button", { name: /^redistance/ }).click();

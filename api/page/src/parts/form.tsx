@@ -29,6 +29,10 @@ export interface ParameterProps {
     set: (pointer: string[], value: unknown) => void;
     errorsAt: (pointer: string) => Item[];
     isOpen?: boolean;
+    /** An item of a list, which is there as long as nobody takes it out. */
+    isItem?: boolean;
+    /** The choice that this parameter lies in: a shape may consist of shapes. */
+    around?: Map<string, Schema>;
 }
 
 /** The schema without "or null": leaving a field empty means the same. */
@@ -49,6 +53,29 @@ function kindsOf(schema: Schema): Map<string, Schema> {
     return kinds;
 }
 
+/** The kinds of a schema that names only their words, as the parts of a shape do, from the choice around it. */
+function kindsAround(schema: Schema, around: Map<string, Schema> | undefined): Map<string, Schema> {
+    const names = schema.properties?.type?.enum ?? [];
+    return new Map([...(around ?? [])].filter(([word]) => names.includes(word)));
+}
+
+/** The kind of a value: its `type`, the word that it is, or the first kind that its fields suit. */
+function kindOf(value: unknown, kinds: Map<string, Schema>): string {
+    if (typeof value === "string") return value;
+    const of = value as Record<string, unknown> | null | undefined;
+    if (!of) return "";
+    if (typeof of.type === "string") return of.type;
+    const fits = ({ properties, required }: Schema) => Object.keys(of).every((key) => properties?.[key]) && (required ?? []).every((key) => key in of);
+    return [...kinds].find(([, kind]) => fits(kind))?.[0] ?? "";
+}
+
+/** Whether the items of a list have fields of their own; a list of numbers, words or formulas is written as one text. */
+function hasRecords(schema: Schema): boolean {
+    if (!schema.items) return false;
+    const item = unwrap(schema.items);
+    return item.properties !== undefined || kindsOf(item).size > 0;
+}
+
 function words(schema: Schema): string[] | null {
     if (schema.enum?.every((word) => typeof word === "string")) return schema.enum as string[];
     const options = schema.anyOf ?? schema.oneOf ?? [];
@@ -66,35 +93,61 @@ const show = (value: unknown): string => (value === undefined || value === null 
 
 export function Parameter(props: ParameterProps) {
     const schema = unwrap(props.schema);
-    const kinds = kindsOf(schema);
-    if (kinds.size > 0) return <Kinds {...props} schema={schema} kinds={kinds} />;
+    const own = kindsOf(schema);
+    const kinds = own.size > 0 ? own : kindsAround(schema, props.around);
+    if (kinds.size > 0) return <Kinds {...props} schema={schema} kinds={kinds} around={own.size > 0 ? own : props.around} />;
+    if (hasRecords(schema)) return <List {...props} schema={schema} />;
     if (schema.properties) return <Group {...props} schema={schema} />;
     return <Leaf {...props} schema={schema} />;
 }
 
-function Group({ name, schema, value, pointer, set, errorsAt, isOpen }: ParameterProps) {
+/** A list of records or choices, one below the other. */
+function List({ name, schema, value, pointer, set, errorsAt, around }: ParameterProps) {
+    const items = Array.isArray(value) ? (value as unknown[]) : [];
+    const item = unwrap(schema.items ?? {});
+    const [first] = [...kindsOf(item).keys(), ...kindsAround(item, around).keys()];
+    const leave = (kept: unknown[]) => set(pointer, kept.length > 0 ? kept : undefined);
+    return (
+        <fieldset class="group">
+            <legend title={schema.description}>{name}</legend>
+            {schema.description && <p class="doc">{schema.description}</p>}
+            <Errors items={errorsAt(`/${pointer.join("/")}`)} />
+            {items.map((one, k) => (
+                <div class="item" key={k}>
+                    <Parameter name={`${name} ${k + 1}`} schema={item} value={one} pointer={[...pointer, String(k)]} set={set} errorsAt={errorsAt} around={around} isItem />
+                    <button type="button" class="link" aria-label={`take out ${name} ${k + 1}`} onClick={() => leave(items.filter((_, other) => other !== k))}>take out</button>
+                </div>
+            ))}
+            <button type="button" class="link" aria-label={`add to ${name}`} onClick={() => leave([...items, first ? { type: first } : {}])}>add</button>
+        </fieldset>
+    );
+}
+
+function Group({ name, schema, value, pointer, set, errorsAt, isOpen, around }: ParameterProps) {
     const of = (value ?? {}) as Record<string, unknown>;
     const entries = Object.entries(schema.properties ?? {}).filter(([, inner]) => inner.const === undefined);
     // What is given comes first, then plain fields, then groups.
-    const rank = ([key, inner]: [string, Schema]) => (key in of ? 0 : unwrap(inner).properties || kindsOf(unwrap(inner)).size > 0 ? 2 : 1);
+    const isGroup = (inner: Schema) => inner.properties !== undefined || kindsOf(inner).size > 0 || hasRecords(inner);
+    const rank = ([key, inner]: [string, Schema]) => (key in of ? 0 : isGroup(unwrap(inner)) ? 2 : 1);
     const sorted = [...entries].sort((a, b) => rank(a) - rank(b));
     const given = sorted.filter((entry) => rank(entry) === 0);
     const rest = sorted.filter((entry) => rank(entry) !== 0);
-    const fields = (list: [string, Schema][]) => list.map(([key, inner]) => <Parameter key={key} name={key} schema={inner} value={of[key]} pointer={[...pointer, key]} set={set} errorsAt={errorsAt} />);
+    const fields = (list: [string, Schema][]) => list.map(([key, inner]) => <Parameter key={key} name={key} schema={inner} value={of[key]} pointer={[...pointer, key]} set={set} errorsAt={errorsAt} around={around} />);
     const [isMore, setMore] = useState(given.length === 0);
     return (
         <fieldset class="group">
             <legend title={schema.description}>{name}</legend>
             {!isOpen && schema.description && <p class="doc">{schema.description}</p>}
+            {!isOpen && pointer.length > 0 && <Errors items={errorsAt(`/${pointer.join("/")}`)} />}
             {fields(given)}
             {rest.length > 0 && (isMore ? fields(rest) : <button type="button" class="link" onClick={() => setMore(true)}>{rest.length} more</button>)}
         </fieldset>
     );
 }
 
-function Kinds({ name, schema, value, pointer, set, errorsAt, kinds }: ParameterProps & { kinds: Map<string, Schema> }) {
-    const of = value as Record<string, unknown> | undefined;
-    const word = typeof of?.type === "string" ? of.type : "";
+function Kinds({ name, schema, value, pointer, set, errorsAt, kinds, around, isItem }: ParameterProps & { kinds: Map<string, Schema> }) {
+    const word = kindOf(value, kinds);
+    const of = typeof value === "string" ? { type: value } : value;
     const chosen = kinds.get(word);
     const id = `field${pointer.join("-")}`;
     return (
@@ -102,13 +155,13 @@ function Kinds({ name, schema, value, pointer, set, errorsAt, kinds }: Parameter
             <div class="field">
                 <label for={id}>{name}</label>
                 <select id={id} value={word} onChange={(event) => set(pointer, event.currentTarget.value ? { type: event.currentTarget.value } : undefined)}>
-                    <option value="">{show(schema.default) ? `default: ${show(schema.default).slice(0, 60)}` : "default"}</option>
+                    {!(isItem && word) && <option value="">{show(schema.default) ? `default: ${show(schema.default).slice(0, 60)}` : "default"}</option>}
                     {[...kinds.keys()].map((option) => <option key={option} value={option}>{option}</option>)}
                 </select>
                 <p class="doc">{chosen?.description ?? schema.description}</p>
                 <Errors items={errorsAt(`/${pointer.join("/")}`)} />
             </div>
-            {chosen && Object.keys(chosen.properties ?? {}).length > 1 && <Group name={word} schema={{ ...chosen, description: undefined }} value={of} pointer={pointer} set={set} errorsAt={errorsAt} />}
+            {chosen && Object.keys(chosen.properties ?? {}).length > 1 && <Group name={word} schema={{ ...chosen, description: undefined }} value={of} pointer={pointer} set={set} errorsAt={errorsAt} around={around} isOpen />}
         </div>
     );
 }

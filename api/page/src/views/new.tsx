@@ -228,7 +228,8 @@ function withValue(of: unknown, pointer: string[], value: unknown): unknown {
     const [key, ...rest] = pointer;
     if (key === undefined) return value;
     if (Array.isArray(of)) return of.map((item: unknown, index) => (String(index) === key ? withValue(item, rest, value) : item));
-    const copy: Record<string, unknown> = { ...(of as Record<string, unknown> | undefined) };
+    // A choice may be written as its word alone.
+    const copy: Record<string, unknown> = typeof of === "string" ? { type: of } : { ...(of as Record<string, unknown> | undefined) };
     const inner = withValue(copy[key], rest, value);
     if (inner === undefined) delete copy[key];
     else copy[key] = inner;
