@@ -133,6 +133,16 @@ fn walls_and_bodies_are_lists_in_the_form() {
 }
 
 #[test]
+fn slips_of_the_hand_lose_nothing_and_do_nothing_else() {
+    run("slips");
+}
+
+#[test]
+fn a_study_that_refines_is_made_by_the_form_and_shows_what_it_found() {
+    run("refine");
+}
+
+#[test]
 fn a_study_has_its_points_and_a_failed_job_its_reason() {
     run("study");
 }

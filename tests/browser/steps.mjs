@@ -161,7 +161,7 @@ const steps = {
         await page.getByLabel("axes 1", { exact: true }).selectOption("walls");
         check((await sent()).domain.axes[0].type === "walls", "the first axis has no walls");
         expected = /422/;
-        await page.locator("form > fieldset > button", { hasText: "more" }).first().click();
+        await page.locator("form fieldset.all > fieldset > button", { hasText: "more" }).first().click();
         await page.getByLabel("add to obstacles").click();
         await until("the service asks for a shape", async () => (await page.getByRole("alert").allInnerTexts()).some((said) => said.includes("shape")));
         // A body made of two: the parts of a shape are shapes.
@@ -184,6 +184,85 @@ const steps = {
         await page.goto(`${url}/#/new?like=${job.id}`);
         await page.getByLabel("take out obstacles 1").click();
         check(!("obstacles" in (await sent())), "the obstacle is still there");
+    },
+
+    /** What a hand does on the way: nothing is lost, and nothing else is done than what is seen. */
+    async slips() {
+        expected = /40[04]|422/;
+        await page.goto(`${url}/#/new`);
+        await page.getByRole("button", { name: /^redistance/ }).click();
+        const body = page.getByRole("textbox", { name: "body", exact: true });
+        const start = page.getByRole("button", { name: "start", exact: true });
+        await body.fill('{"name": "good", "scene": {"kind": "redistance", "spacing": 0.1}}');
+        await until("the form follows", async () => (await page.getByLabel("spacing", { exact: true }).first().inputValue()) === "0.1");
+        // A body that cannot be read starts nothing, and the form does not write over it.
+        await body.fill('{"name": "bad", "scene": {"kind": ');
+        check(await start.isDisabled(), "a body that cannot be read can be started");
+        check(await page.getByLabel("spacing", { exact: true }).first().isDisabled(), "the form writes over a body that cannot be read");
+        for (const odd of ['{"scene": null}', "[]", "3", '{"scene": {"kind": "redistance"}, "output": 7}', '{"scene": {"kind": "redistance", "shape": [1]}}', '{"restart": {"upload": "upl_1"}}']) {
+            await body.fill(odd);
+            check((await body.inputValue()) === odd, `the page does not live with ${odd}`);
+            check(await page.getByRole("link", { name: "Jobs", exact: true }).isVisible(), `the page is gone after ${odd}`);
+        }
+        await body.fill('{"name": "kept", "scene": {"kind": "redistance", "spacing": 0.1}}');
+        // Numbers as people write them.
+        const field = page.getByLabel("spacing", { exact: true }).first();
+        await field.fill(".2");
+        await field.blur();
+        await until("the body follows", async () => JSON.parse(await body.inputValue()).scene.spacing === 0.2);
+        // What is being typed stays, while the estimate of what was typed before comes.
+        await field.press("End");
+        await field.pressSequentially("5");
+        await page.waitForTimeout(1500);
+        check((await field.inputValue()) === "0.25", `what was being typed is ${await field.inputValue()}`);
+        await field.blur();
+        await page.getByRole("link", { name: "Service" }).click();
+        await page.getByRole("link", { name: "New", exact: true }).click();
+        check(JSON.parse(await body.inputValue()).name === "kept", "a body that was being written is lost");
+        // A confirmation is of what it was asked for.
+        const ids = [];
+        for (const kind of ["redistance", "vortex"]) ids.push((await api("/v1/jobs", { name: kind, labels: { figure: kind }, scene: { kind, spacing: 0.1, ...(kind === "vortex" ? { end_time: 0.1 } : {}) } })).id);
+        for (const id of ids) await ended(id);
+        await page.goto(`${url}/#/jobs?kind=redistance`);
+        await page.getByRole("button", { name: "delete", exact: true }).click();
+        await page.getByRole("alertdialog").waitFor(WAIT);
+        await page.getByLabel("kind").selectOption("vortex");
+        check((await page.getByRole("alertdialog").count()) === 0, "a confirmation outlives its filter");
+        await page.goto(`${url}/#/jobs?label.figure=vortex`);
+        await until("the list is filtered", async () => (await page.locator("table.jobs tbody tr").count()) === 1);
+        check((await page.getByText("label.figure: vortex").count()) === 1, "the filter is not shown");
+        await page.getByRole("button", { name: "pause", exact: true }).click();
+        await page.getByText("0 of 1 jobs let you pause them").waitFor(WAIT);
+        // Addresses of nothing.
+        for (const place of ["jobs/%", "jobs/job_nothing", "studies/study_nothing", "new?like=job_nothing", `compare/${ids[0]},job_nothing`, "nowhere"]) {
+            await page.goto(`${url}/#/${place}`);
+            await page.getByRole("link", { name: "Jobs", exact: true }).waitFor(WAIT);
+            await until(`${place} says something`, async () => (await page.locator("main").innerText()).trim().length > 12);
+        }
+        await page.goto(`${url}/#/compare/${ids[0]},job_nothing`);
+        await page.getByRole("heading", { name: "redistance" }).waitFor(WAIT);
+    },
+
+    async refine() {
+        await page.goto(`${url}/#/new`);
+        await page.getByRole("button", { name: /^redistance/ }).click();
+        await page.getByRole("textbox", { name: "body", exact: true }).fill('{"name": "to a tolerance", "scene": {"kind": "redistance"}}');
+        await page.getByText("As a study").click();
+        await page.getByLabel("mode").last().selectOption("refine");
+        const at = (name) => page.locator(`#fieldsweep-${name}`);
+        await at("from").fill("0.08");
+        await at("quantity-error-quantity").fill("phi");
+        await at("quantity-error-norm").fill("rms");
+        await at("until-tolerance").fill("1e-4");
+        await at("until-tolerance").blur();
+        await page.getByRole("button", { name: "count" }).click();
+        await page.getByText(/of CPU time,/).waitFor(WAIT);
+        await page.getByRole("button", { name: "start the study" }).click();
+        await page.waitForURL(/studies\//, WAIT);
+        await page.getByText("succeeded").first().waitFor(WAIT);
+        await until("the tolerance is met", async () => /tolerance\s+met/.test(await page.locator("main").innerText()));
+        await until("the levels are shown", async () => (await page.getByRole("table", { name: "levels" }).locator("tbody tr").count()) >= 3);
+        check((await page.locator(".plot canvas").count()) > 0, "the errors have no plot");
     },
 
     async study() {

@@ -32,6 +32,8 @@ export class Unreachable extends Error {}
 
 const STORED_TOKEN = "meniscus-token";
 let token = sessionStorage.getItem(STORED_TOKEN);
+/** Keys of creations that have had no answer yet. */
+const keys = new Map<string, string>();
 const tokenWanted = new Set<() => void>();
 
 /** Signs in. The token stays in memory, and by choice in the storage of this tab. */
@@ -99,6 +101,17 @@ export async function get<T>(path: string, signal?: AbortSignal): Promise<T> {
 export async function post<T>(path: string, body?: unknown): Promise<T> {
     const answer = await request(path, { method: "POST", body });
     return (answer.status === 204 ? undefined : await answer.json()) as T;
+}
+
+/** Makes something, once: a request whose answer was lost and that is sent again makes no second one. */
+export async function create<T>(path: string, body: unknown): Promise<T> {
+    const text = JSON.stringify(body);
+    const attempt = `${path} ${text}`;
+    const key = keys.get(attempt) ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
+    keys.set(attempt, key);
+    const answer = await request(path, { method: "POST", body, headers: { "Idempotency-Key": key } });
+    keys.delete(attempt);
+    return (await answer.json()) as T;
 }
 
 export async function remove(path: string): Promise<void> {

@@ -1,5 +1,9 @@
 // Data of a view: loaded, loaded again while it matters, and kept on the screen while the service is away.
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
+import { Unreachable } from "./api";
+
+/** While the service is away it is asked again so often. */
+export const AGAIN_MS = 2000;
 
 export interface Loaded<T> {
     data: T | null;
@@ -20,6 +24,7 @@ export function useLoaded<T>(load: (signal: AbortSignal) => Promise<T>, keys: un
         const abort = new AbortController();
         let isLoading = false;
         let isWanted = false;
+        let later: number | undefined;
         // A load that is under way comes to its end: else frequent changes would let none of them do so.
         const start = async () => {
             isWanted = true;
@@ -33,14 +38,19 @@ export function useLoaded<T>(load: (signal: AbortSignal) => Promise<T>, keys: un
                     setData(found);
                     setError(null);
                 } catch (failed) {
-                    if (!abort.signal.aborted) setError(failed instanceof Error ? failed : new Error(String(failed)));
+                    if (abort.signal.aborted) return;
+                    setError(failed instanceof Error ? failed : new Error(String(failed)));
+                    if (failed instanceof Unreachable) later = window.setTimeout(() => void start(), AGAIN_MS);
                 }
             }
             isLoading = false;
         };
         starter.current = () => void start();
         void start();
-        return () => abort.abort();
+        return () => {
+            abort.abort();
+            window.clearTimeout(later);
+        };
     }, keys);
     useEffect(() => {
         if (everyMs <= 0) return;

@@ -4,6 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 import "./page.css";
 import { hasToken, onTokenWanted, signIn, signOut } from "./api";
+import { Boundary } from "./parts/boundary";
 import { useRoute } from "./route";
 import { Compare } from "./views/compare";
 import { JobPage } from "./views/job";
@@ -29,7 +30,7 @@ function Page() {
                 {hasToken() && <button type="button" class="link" onClick={() => { signOut(); setTurn(turn + 1); }}>sign out</button>}
             </nav>
             {isWanted && <SignIn onDone={() => { setWanted(false); setTurn(turn + 1); }} />}
-            <div key={turn}>{view(place, id, route)}</div>
+            <Boundary key={`${turn} ${route.path.join("/")}`}>{view(place, id, route)}</Boundary>
         </>
     );
 }

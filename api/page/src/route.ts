@@ -6,9 +6,18 @@ export interface Route {
     query: URLSearchParams;
 }
 
+/** A part of an address; what is no valid part stays as it is. */
+function decoded(part: string): string {
+    try {
+        return decodeURIComponent(part);
+    } catch {
+        return part;
+    }
+}
+
 function read(): Route {
     const [path = "", query = ""] = location.hash.replace(/^#\/?/, "").split("?");
-    return { path: path.split("/").filter(Boolean).map(decodeURIComponent), query: new URLSearchParams(query) };
+    return { path: path.split("/").filter(Boolean).map(decoded), query: new URLSearchParams(query) };
 }
 
 export function useRoute(): Route {

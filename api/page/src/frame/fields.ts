@@ -6,7 +6,7 @@ const FIRST: Record<string, string[]> = {
     vortex: ["phi", "psi"],
     redistance: ["phi", "psi"],
     droplet: ["phase", "pressure", "phi"],
-    surface_pde: ["u", "concentration", "curvature", "mean_curvature"],
+    surface_pde: ["value", "u", "concentration", "curvature", "mean_curvature"],
     front: ["curvature", "mean_curvature", "speed"],
 };
 
@@ -58,7 +58,10 @@ export function vectorsOf(frame: Frame, name: string): Float32Array | null {
     return field && field.components === 3 ? field.values : null;
 }
 
-/** Least and largest of the numbers that exist. */
+/** Relative differences below which numbers are one number but for rounding. */
+const ONE_NUMBER = 1e-5;
+
+/** Least and largest of the numbers that exist; around a number that all have there is room for rounding. */
 export function range(values: Float32Array): [number, number] {
     let low = Infinity;
     let high = -Infinity;
@@ -66,7 +69,9 @@ export function range(values: Float32Array): [number, number] {
         if (value < low) low = value;
         if (value > high) high = value;
     }
-    return low <= high ? [low, high] : [0, 1];
+    if (low > high) return [0, 1];
+    const least = ONE_NUMBER * Math.max(Math.abs(low), Math.abs(high));
+    return high - low < least ? [low - 100 * least, high + 100 * least] : [low, high];
 }
 
 /** Everything that is known of a point. */

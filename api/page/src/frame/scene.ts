@@ -34,6 +34,11 @@ const SLOW_MS = 500;
 /** Cosine of the angle by which a view turns before its points are ordered anew. */
 const SAME_DIRECTION = 0.98;
 
+/** What a key does to a view: share of the radius that it moves, angle that it turns, factor of its zoom. */
+const KEY_SHARE = 0.1;
+const KEY_ANGLE = 0.1;
+const KEY_ZOOM = 1.2;
+
 /** Distance in spacings within which the closest points of particles are shown. */
 const NEXT_TO_SURFACE = 1.5;
 /** Time of a picture of a view that moves: where all points take longer, some of them stand for all, as larger squares. */
@@ -67,6 +72,7 @@ export class FrameScene {
     private camera: Camera & { updateProjectionMatrix(): void };
     private controls: OrbitControls;
     private frame: Frame | null = null;
+    private look: Look | null = null;
     private drawing = 0;
     private isFlat = true;
     private center = new Vector3();
@@ -111,6 +117,8 @@ export class FrameScene {
     }
 
     private follow(other: FrameScene): void {
+        // A flat picture has no side from which a ball could be seen, and the other way round.
+        if (this.isFlat !== other.isFlat || !this.frame || !other.frame) return;
         // Frames of scenes of other places and sizes are seen from the same side, as large.
         const mapped = (place: Vector3) => new Vector3().subVectors(place, other.center).multiplyScalar(this.radius / other.radius).add(this.center);
         this.camera.position.copy(mapped(other.camera.position));
@@ -133,6 +141,7 @@ export class FrameScene {
     show(frame: Frame, look: Look): void {
         const isFirst = this.frame === null;
         this.frame = frame;
+        this.look = look;
         if (isFirst) this.measure(frame);
         [this.stride, this.moving] = [1, 0];
         this.clear();
@@ -151,7 +160,7 @@ export class FrameScene {
             this.addCloud(frame.positions, look.values, look.normals, { ...paint, isLit }, isLit ? 2.4 : 1.05);
         }
         if (look.surface) this.addSurface(frame.positions, look.surface, paint);
-        if (look.hasGlyphs && look.normals) this.addGlyphs(frame.positions, look.normals);
+        if (look.hasGlyphs && look.normals) this.addGlyphs(frame.positions, look.normals, this.clipOf(look));
         this.draw();
     }
 
@@ -197,13 +206,14 @@ export class FrameScene {
         this.addCloud(Float32Array.from(kept), null, null, { ...paint, isLit: false, plain: [0.07, 0.07, 0.09] }, 0.35);
     }
 
-    private addGlyphs(positions: Float32Array, normals: Float32Array): void {
+    private addGlyphs(positions: Float32Array, normals: Float32Array, { clipNormal, clipAt }: { clipNormal: Vector3; clipAt: number }): void {
         const count = positions.length / 3;
         const stride = Math.max(1, Math.ceil(count / MOST_GLYPHS));
         const ends: number[] = [];
         for (let k = 0; k < count; k += stride) {
             const [p, n] = [positions.subarray(3 * k, 3 * k + 3), normals.subarray(3 * k, 3 * k + 3)];
             if (!Number.isFinite((n[0] as number) + (n[1] as number) + (n[2] as number))) continue;
+            if (clipNormal.dot(new Vector3().fromArray(p)) > clipAt) continue;
             for (let c = 0; c < 3; c += 1) ends.push(p[c] as number);
             for (let c = 0; c < 3; c += 1) ends.push((p[c] as number) + 2 * this.spacing * (n[c] as number));
         }
@@ -233,8 +243,42 @@ export class FrameScene {
         this.reset();
     }
 
-    /** Back to the whole. */
-    reset(): void {
+    /** Back to the whole of the frame that is shown. */
+    whole(): void {
+        if (this.frame) this.measure(this.frame);
+        if (this.frame && this.look) this.show(this.frame, this.look);
+    }
+
+    /** Turns, moves or zooms the view by a key; false for keys that mean nothing. */
+    press(key: string): boolean {
+        const steps: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+        const step = steps[key];
+        const way = new Vector3().subVectors(this.camera.position, this.controls.target);
+        if (step && this.isFlat) {
+            const shift = new Vector3(step[0], step[1], 0).multiplyScalar(KEY_SHARE * this.radius);
+            this.camera.position.add(shift);
+            this.controls.target.add(shift);
+        } else if (step) {
+            const side = new Vector3().crossVectors(this.camera.up, way).normalize();
+            way.applyAxisAngle(this.camera.up, KEY_ANGLE * step[0]).applyAxisAngle(side, -KEY_ANGLE * step[1]);
+            this.camera.position.copy(this.controls.target).add(way);
+        } else if (key === "+" || key === "-") {
+            const factor = key === "+" ? KEY_ZOOM : 1 / KEY_ZOOM;
+            if (this.camera instanceof OrthographicCamera) this.camera.zoom *= factor;
+            else this.camera.position.copy(this.controls.target).add(way.divideScalar(factor));
+            this.camera.updateProjectionMatrix();
+        } else if (key === "0") {
+            this.whole();
+        } else {
+            return false;
+        }
+        this.controls.update();
+        this.move();
+        this.linked.forEach((other) => other.follow(this));
+        return true;
+    }
+
+    private reset(): void {
         this.controls.dispose();
         if (this.isFlat) {
             const camera = new OrthographicCamera(-1, 1, 1, -1, -10 * this.radius, 10 * this.radius);
@@ -322,8 +366,11 @@ export class FrameScene {
         let found = -1;
         let least = 12 * 12;
         let depth = Infinity;
+        const clip = this.look ? this.clipOf(this.look) : null;
         for (let k = 0; 3 * k < positions.length; k += 1) {
-            point.fromArray(positions, 3 * k).project(this.camera);
+            point.fromArray(positions, 3 * k);
+            if (clip && clip.clipNormal.dot(point) > clip.clipAt) continue;
+            point.project(this.camera);
             const dx = ((point.x + 1) / 2) * width - x;
             const dy = ((1 - point.y) / 2) * height - y;
             const distance = dx * dx + dy * dy;

@@ -1,8 +1,10 @@
 // The frames of a job: a picture, a slider over time, and what it shows.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import type { FileEntry } from "../api";
+import { get, Unreachable, type FileEntry, type SceneKind } from "../api";
 import { number } from "../format";
+import { AGAIN_MS, useLoaded } from "../load";
 import { Trouble } from "../parts/basics";
+import { readNumber } from "../values";
 import { gradient, MAP_NAMES } from "./colors";
 import { choices, describe, fieldOf, firstChoice, range, valuesOf, vectorsOf } from "./fields";
 import { loadFrame } from "./load";
@@ -19,6 +21,8 @@ export interface FrameViewProps {
 }
 
 const PLAY_MS = 120;
+/** A pointer that has moved no farther has not been dragged. */
+const STILL_PX = 4;
 
 export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewProps) {
     // Without a choice the newest frame is shown, also when further ones come.
@@ -26,6 +30,7 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
     const [isPlaying, setPlaying] = useState(false);
     const [frame, setFrame] = useState<Frame | null>(null);
     const [error, setError] = useState<Error | null>(null);
+    const [tries, setTries] = useState(0);
     const [choice, setChoice] = useState<string | null>(null);
     const [map, setMap] = useState<string | null>(null);
     const [given, setGiven] = useState<[string, string]>(["", ""]);
@@ -34,8 +39,11 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
     const [clip, setClip] = useState<{ axis: 0 | 1 | 2; share: number }>({ axis: 0, share: 1 });
     const [picked, setPicked] = useState<number | null>(null);
     const canvas = useRef<HTMLCanvasElement>(null);
+    const pressed = useRef<[number, number]>([0, 0]);
     const scene = useRef<FrameScene | null>(null);
     const [isReady, setReady] = useState(false);
+
+    const { data: described } = useLoaded(async (signal) => (kind ? get<SceneKind>(`v1/scenes/${kind}`, signal) : null), [kind]);
 
     const last = frames.length - 1;
     const index = Math.min(chosen ?? last, last);
@@ -44,18 +52,24 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
     useEffect(() => {
         if (!file) return;
         let isOver = false;
+        let later: number | undefined;
         loadFrame(job, file.path, file.sha256).then(
             (found) => {
                 if (isOver) return;
                 setFrame(found);
                 setError(null);
             },
-            (failed: unknown) => isOver || setError(failed instanceof Error ? failed : new Error(String(failed))),
+            (failed: unknown) => {
+                if (isOver) return;
+                setError(failed instanceof Error ? failed : new Error(String(failed)));
+                if (failed instanceof Unreachable) later = window.setTimeout(() => setTries(tries + 1), AGAIN_MS);
+            },
         );
         return () => {
             isOver = true;
+            window.clearTimeout(later);
         };
-    }, [job, file?.path, file?.sha256]);
+    }, [job, file?.path, file?.sha256, tries]);
 
     useEffect(() => {
         const at = canvas.current;
@@ -84,22 +98,18 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
 
     const name = frame ? choice ?? firstChoice(frame, kind) : "";
     const values = useMemo(() => (frame ? valuesOf(frame, name) : null), [frame, name]);
-    const [low, high] = useMemo(() => {
-        const [least, most] = values ? range(values) : [0, 1];
-        const [a, b] = given.map((text) => (text.trim() === "" ? Number.NaN : Number(text)));
-        return [Number.isNaN(a) ? least : (a as number), Number.isNaN(b) ? most : (b as number)];
-    }, [values, given]);
-    const usedMap = map ?? (low < 0 && high > 0 ? "diverging" : "viridis");
+    const [least, most] = useMemo(() => (values ? range(values) : [0, 1]), [values]);
+    const usedMap = map ?? (least < 0 && most > 0 ? "diverging" : "viridis");
+    // A map about zero is symmetric.
+    const ends: [number, number] = usedMap === "diverging" && least < 0 && most > 0 ? [-Math.max(-least, most), Math.max(-least, most)] : [least, most];
+    const [low, high] = ends.map((end, k) => readNumber(given[k] ?? "") ?? end) as [number, number];
 
     useEffect(() => {
         if (!frame || !scene.current) return;
         const normals = vectorsOf(frame, "normal") ?? vectorsOf(frame, "normals");
         const isBand = kind === "vortex" || kind === "redistance" || kind === "droplet";
         const surface = hasSurface && isBand ? vectorsOf(frame, "closest_point") : null;
-        // A map about zero is symmetric.
-        const most = Math.max(Math.abs(low), Math.abs(high));
-        const [from, to] = usedMap === "diverging" && given[0] === "" && given[1] === "" ? [-most, most] : [low, high];
-        scene.current.show(frame, { values, low: from, high: to, map: usedMap, surface, normals: isBand && !hasGlyphs ? null : normals, hasGlyphs, clip });
+        scene.current.show(frame, { values, low, high, map: usedMap, surface, normals: isBand && !hasGlyphs ? null : normals, hasGlyphs, clip });
     }, [frame, values, low, high, usedMap, hasSurface, hasGlyphs, clip, isReady, kind]);
 
     useEffect(() => {
@@ -109,6 +119,8 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
     }, [isPlaying, last]);
 
     const pick = (event: MouseEvent) => {
+        // The end of a drag picks nothing.
+        if (Math.hypot(event.clientX - pressed.current[0], event.clientY - pressed.current[1]) > STILL_PX) return;
         const box = canvas.current?.getBoundingClientRect();
         if (!box || !scene.current) return;
         const found = scene.current.pick(event.clientX - box.left, event.clientY - box.top);
@@ -123,11 +135,12 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
         link.click();
         URL.revokeObjectURL(link.href);
     };
+    const unit = described?.fields.find((field) => field.name === fieldOf(name))?.unit;
     const hasNormals = frame !== null && (vectorsOf(frame, "normal") ?? vectorsOf(frame, "normals")) !== null;
     return (
         <div class="frame">
             <div class="canvas">
-                <canvas ref={canvas} onClick={pick} aria-label={`frame at time ${number(frame?.time)}, colored by ${name}`} data-frame={file?.path} data-ready={frame ? "yes" : "no"} />
+                <canvas ref={canvas} tabIndex={0} onPointerDown={(event) => { pressed.current = [event.clientX, event.clientY]; }} onClick={pick} onKeyDown={(event) => { if (scene.current?.press(event.key)) event.preventDefault(); }} title="drag or arrow keys to turn or move, + and − to zoom, 0 for the whole" aria-label={`frame at time ${number(frame?.time)}, colored by ${name}`} data-frame={file?.path} data-ready={frame ? "yes" : "no"} />
                 {!frame && !error && <p class="quiet over">reading the frame</p>}
             </div>
             <Trouble error={error} />
@@ -135,7 +148,7 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
                 <span class="figure">{number(low)}</span>
                 <span class="scale" style={{ background: gradient(usedMap) }} />
                 <span class="figure">{number(high)}</span>
-                <span>{name}</span>
+                <span>{name}{unit ? `, ${unit}` : ""}</span>
             </div>
             <div class="time">
                 <button type="button" onClick={() => setPlaying(!isPlaying)} disabled={frames.length < 2} aria-label={isPlaying ? "stop" : "play"}>{isPlaying ? "❚❚" : "▶"}</button>
@@ -162,7 +175,7 @@ export function FrameView({ job, kind, frames, isRunning, onScene }: FrameViewPr
                     <select value={clip.axis} onChange={(event) => setClip({ ...clip, axis: Number(event.currentTarget.value) as 0 | 1 | 2 })}>{["x", "y", "z"].map((axis, k) => <option key={axis} value={k}>{axis}</option>)}</select>
                     <input type="range" min={0} max={1} step={0.01} value={clip.share} onInput={(event) => setClip({ ...clip, share: Number(event.currentTarget.value) })} aria-label="cut" />
                 </label>
-                <button type="button" onClick={() => scene.current?.reset()}>whole view</button>
+                <button type="button" onClick={() => scene.current?.whole()}>whole view</button>
                 <button type="button" onClick={save}>save as PNG</button>
             </div>
             {frame && frame.stride > 1 && <p class="quiet">One of {frame.stride} points is shown; the file has them all.</p>}

@@ -19,11 +19,12 @@ export function State({ state, reason }: { state: string; reason?: string | null
     );
 }
 
-export function Health({ status }: { status?: string | null }) {
+export function Health({ status, why }: { status?: string | null; why?: string | null }) {
     if (!status) return <span class="quiet">–</span>;
     return (
         <span class={`health ${status}`}>
             <span aria-hidden="true">{status === "sound" ? "●" : "▲"}</span> {status}
+            {why && <span class="reason"> {why}</span>}
         </span>
     );
 }
@@ -80,7 +81,7 @@ export function Findings({ findings }: { findings: Finding[] }) {
 }
 
 /** A button that says what happened to its work. */
-export function Act({ children, work, kind, title }: { children: ComponentChildren; work: () => Promise<unknown>; kind?: string; title?: string }) {
+export function Act({ children, work, kind, title, isOff }: { children: ComponentChildren; work: () => Promise<unknown>; kind?: string; title?: string; isOff?: boolean }) {
     const [busy, setBusy] = useState(false);
     const [error, setError] = useState<Error | null>(null);
     const onClick = async () => {
@@ -96,7 +97,7 @@ export function Act({ children, work, kind, title }: { children: ComponentChildr
     };
     return (
         <>
-            <button type="button" class={kind} disabled={busy} onClick={onClick} title={title}>{children}</button>
+            <button type="button" class={kind} disabled={busy || isOff} onClick={onClick} title={title}>{children}</button>
             {error && <Trouble error={error} />}
         </>
     );
@@ -104,12 +105,24 @@ export function Act({ children, work, kind, title }: { children: ComponentChildr
 
 export function Copy({ text, children }: { text: string; children: ComponentChildren }) {
     const [copied, setCopied] = useState(false);
+    // Browsers lend the clipboard to secure pages alone; elsewhere the text is shown, to be copied by hand.
+    const [isShown, setShown] = useState(false);
     const copy = async () => {
-        await navigator.clipboard.writeText(text);
+        try {
+            await navigator.clipboard.writeText(text);
+        } catch {
+            setShown(!isShown);
+            return;
+        }
         setCopied(true);
         window.setTimeout(() => setCopied(false), 1500);
     };
-    return <button type="button" onClick={copy}>{copied ? "copied" : children}</button>;
+    return (
+        <>
+            <button type="button" onClick={copy}>{copied ? "copied" : children}</button>
+            {isShown && <textarea class="copy" readOnly rows={6} value={text} ref={(place) => place?.select()} aria-label="text to copy" />}
+        </>
+    );
 }
 
 /** What a person may do with a job in its state. */

@@ -1,6 +1,7 @@
 // A form for a JSON Schema as the service writes them: groups, choices between kinds, numbers with ranges, and text for the rest.
 import { useState } from "preact/hooks";
 import type { Problem } from "../api";
+import { isRecord, readNumber, readValue } from "../values";
 
 export interface Schema {
     type?: string;
@@ -62,8 +63,8 @@ function kindsAround(schema: Schema, around: Map<string, Schema> | undefined): M
 /** The kind of a value: its `type`, the word that it is, or the first kind that its fields suit. */
 function kindOf(value: unknown, kinds: Map<string, Schema>): string {
     if (typeof value === "string") return value;
-    const of = value as Record<string, unknown> | null | undefined;
-    if (!of) return "";
+    if (!isRecord(value)) return "";
+    const of = value;
     if (typeof of.type === "string") return of.type;
     const fits = ({ properties, required }: Schema) => Object.keys(of).every((key) => properties?.[key]) && (required ?? []).every((key) => key in of);
     return [...kinds].find(([, kind]) => fits(kind))?.[0] ?? "";
@@ -101,6 +102,13 @@ export function Parameter(props: ParameterProps) {
     return <Leaf {...props} schema={schema} />;
 }
 
+/** Shows further fields, and goes to the first of them: the button that was pressed is gone. */
+function showMore(group: HTMLElement | null, show: () => void): void {
+    const known = new Set(group?.querySelectorAll("input, select"));
+    show();
+    window.setTimeout(() => [...(group?.querySelectorAll<HTMLElement>("input, select") ?? [])].find((field) => !known.has(field))?.focus());
+}
+
 /** A list of records or choices, one below the other. */
 function List({ name, schema, value, pointer, set, errorsAt, around }: ParameterProps) {
     const items = Array.isArray(value) ? (value as unknown[]) : [];
@@ -124,23 +132,26 @@ function List({ name, schema, value, pointer, set, errorsAt, around }: Parameter
 }
 
 function Group({ name, schema, value, pointer, set, errorsAt, isOpen, around }: ParameterProps) {
-    const of = (value ?? {}) as Record<string, unknown>;
+    const of = isRecord(value) ? value : {};
     const entries = Object.entries(schema.properties ?? {}).filter(([, inner]) => inner.const === undefined);
-    // What is given comes first, then plain fields, then groups.
+    // What is given when the form opens comes first, then plain fields, then groups. Later nothing moves, so that no field slips away
+    // from under the hand.
+    const [first] = useState(() => new Set(entries.map(([key]) => key).filter((key) => key in of)));
     const isGroup = (inner: Schema) => inner.properties !== undefined || kindsOf(inner).size > 0 || hasRecords(inner);
-    const rank = ([key, inner]: [string, Schema]) => (key in of ? 0 : isGroup(unwrap(inner)) ? 2 : 1);
+    const rank = ([key, inner]: [string, Schema]) => (first.has(key) ? 0 : isGroup(unwrap(inner)) ? 2 : 1);
     const sorted = [...entries].sort((a, b) => rank(a) - rank(b));
-    const given = sorted.filter((entry) => rank(entry) === 0);
-    const rest = sorted.filter((entry) => rank(entry) !== 0);
+    const [isMore, setMore] = useState(first.size === 0);
+    const isGiven = (entry: [string, Schema]) => rank(entry) === 0 || entry[0] in of;
+    const given = sorted.filter((entry) => isMore || isGiven(entry));
+    const rest = sorted.filter((entry) => !isMore && !isGiven(entry));
     const fields = (list: [string, Schema][]) => list.map(([key, inner]) => <Parameter key={key} name={key} schema={inner} value={of[key]} pointer={[...pointer, key]} set={set} errorsAt={errorsAt} around={around} />);
-    const [isMore, setMore] = useState(given.length === 0);
     return (
         <fieldset class="group">
             <legend title={schema.description}>{name}</legend>
             {!isOpen && schema.description && <p class="doc">{schema.description}</p>}
             {!isOpen && pointer.length > 0 && <Errors items={errorsAt(`/${pointer.join("/")}`)} />}
             {fields(given)}
-            {rest.length > 0 && (isMore ? fields(rest) : <button type="button" class="link" onClick={() => setMore(true)}>{rest.length} more</button>)}
+            {rest.length > 0 && <button type="button" class="link" onClick={(event) => showMore(event.currentTarget.parentElement, () => setMore(true))}>{rest.length} more</button>}
         </fieldset>
     );
 }
@@ -161,7 +172,7 @@ function Kinds({ name, schema, value, pointer, set, errorsAt, kinds, around, isI
                 <p class="doc">{chosen?.description ?? schema.description}</p>
                 <Errors items={errorsAt(`/${pointer.join("/")}`)} />
             </div>
-            {chosen && Object.keys(chosen.properties ?? {}).length > 1 && <Group name={word} schema={{ ...chosen, description: undefined }} value={of} pointer={pointer} set={set} errorsAt={errorsAt} around={around} isOpen />}
+            {chosen && Object.keys(chosen.properties ?? {}).length > 1 && <Group key={word} name={word} schema={{ ...chosen, description: undefined }} value={of} pointer={pointer} set={set} errorsAt={errorsAt} around={around} isOpen />}
         </div>
     );
 }
@@ -172,19 +183,16 @@ function Errors({ items }: { items: Item[] }) {
 
 function Leaf({ name, schema, value, pointer, set, errorsAt }: ParameterProps) {
     const id = `field${pointer.join("-")}`;
+    // What is being typed stays, whatever is drawn anew meanwhile.
+    const [typed, setTyped] = useState<string | null>(null);
     const items = errorsAt(`/${pointer.join("/")}`);
     const options = words(schema);
     const common = { id, "aria-invalid": items.length > 0, "aria-describedby": `${id}-doc` };
     const isNumber = schema.type === "number" || schema.type === "integer";
     const read = (text: string): unknown => {
         if (text.trim() === "") return undefined;
-        if (schema.type === "string" && !/^[[{]/.test(text)) return text;
-        try {
-            return JSON.parse(text) as unknown;
-        } catch {
-            // What is no JSON is text, such as a formula.
-            return text;
-        }
+        if (isNumber) return readNumber(text) ?? text;
+        return schema.type === "string" && !/^[[{]/.test(text) ? text : readValue(text);
     };
     return (
         <div class="field">
@@ -199,7 +207,17 @@ function Leaf({ name, schema, value, pointer, set, errorsAt }: ParameterProps) {
                     {options.map((option) => <option key={option} value={option}>{option}</option>)}
                 </select>
             ) : (
-                <input {...common} value={show(value)} placeholder={show(schema.default)} inputMode={isNumber ? "decimal" : undefined} onChange={(event) => set(pointer, read(event.currentTarget.value))} />
+                <input
+                    {...common}
+                    value={typed ?? show(value)}
+                    placeholder={show(schema.default)}
+                    inputMode={isNumber ? "decimal" : undefined}
+                    onInput={(event) => setTyped(event.currentTarget.value)}
+                    onChange={(event) => {
+                        setTyped(null);
+                        set(pointer, read(event.currentTarget.value));
+                    }}
+                />
             )}
             <p class="doc" id={`${id}-doc`}>{schema.description}{rangeOf(schema) && <span class="range"> {rangeOf(schema)}</span>}</p>
             <Errors items={items} />

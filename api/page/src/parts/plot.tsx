@@ -34,11 +34,16 @@ function positive(values: (number | null)[], isLog: boolean): (number | null)[] 
     return isLog ? values.map((value) => (value !== null && value > 0 ? value : null)) : values;
 }
 
+const isShort = (x: ArrayLike<number | null | undefined>): boolean => (x[x.length - 1] ?? 1) < 10 * (x[0] ?? 0);
+
 export function Plot({ x, xLabel, curves, logX = false, logY = false, height = 260, label }: PlotProps) {
     const place = useRef<HTMLDivElement>(null);
     const plot = useRef<uPlot | null>(null);
     const shape = `${curves.map((curve) => curve.label).join("|")}|${logX}|${logY}|${xLabel}`;
-    const data = [positive(x, logX), ...curves.map((curve) => positive(curve.values, logY))] as uPlot.AlignedData;
+    // On a logarithmic axis a row at 0, such as that of the start, has no place.
+    const rows = x.map((_, row) => row).filter((row) => !logX || (x[row] as number) > 0);
+    const data = [rows.map((row) => x[row] as number), ...curves.map((curve) => positive(rows.map((row) => curve.values[row] ?? null), logY))] as uPlot.AlignedData;
+    const shown = JSON.stringify(data);
 
     useEffect(() => {
         const at = place.current;
@@ -52,7 +57,11 @@ export function Plot({ x, xLabel, curves, logX = false, logY = false, height = 2
                 width: Math.max(at.clientWidth, LEAST_WIDTH),
                 height,
                 scales: { x: { time: false, distr: logX ? 3 : 1 }, y: { distr: logY ? 3 : 1 } },
-                axes: [{ ...axis, label: xLabel, labelSize: 20 }, { ...axis, size: 70 }],
+                axes: [
+                    // Over less than a decade all ticks have their numbers.
+                    { ...axis, label: xLabel, labelSize: 20, ...(logX && isShort(data[0]) ? { filter: (_: uPlot, ticks: number[]) => ticks } : {}) },
+                    { ...axis, size: 70 },
+                ],
                 legend: { live: true },
                 cursor: { drag: { x: true, y: false } },
                 series: [
@@ -81,8 +90,15 @@ export function Plot({ x, xLabel, curves, logX = false, logY = false, height = 2
     }, [shape, height]);
 
     useEffect(() => {
-        plot.current?.setData(data, true);
-    }, [x, curves]);
+        const at = plot.current;
+        if (!at) return;
+        // A part that was chosen by dragging stays, while further rows come.
+        const [first, last] = [at.data[0][0], at.data[0].at(-1)];
+        const { min, max } = at.scales.x ?? {};
+        const isZoomed = min != null && max != null && first !== undefined && last !== undefined && (min > first || max < last);
+        at.setData(data, !isZoomed);
+        if (isZoomed) at.setScale("x", { min, max });
+    }, [shown]);
 
     return <div class="plot" ref={place} role="img" aria-label={label} />;
 }

@@ -1,6 +1,6 @@
 // Two to six jobs beside each other: their series in one plot, their frames with cameras that move together.
 import { useEffect, useRef, useState } from "preact/hooks";
-import { get, type FileEntry, type Job, type Page } from "../api";
+import { get, Refusal, type FileEntry, type Job, type Page } from "../api";
 import { FrameView } from "../frame/view";
 import type { FrameScene } from "../frame/scene";
 import { useLoaded } from "../load";
@@ -8,6 +8,8 @@ import { State, Trouble } from "../parts/basics";
 import { Plot, type Curve } from "../parts/plot";
 import type { Series } from "../series";
 import { loadSeries, OF_THE_METHOD } from "./job";
+
+const MOST = 6;
 
 interface Member {
     job: Job;
@@ -20,8 +22,25 @@ async function loadMember(id: string, signal: AbortSignal): Promise<Member> {
     return { job, series, frames: files.items.filter((file) => /^frames\/.*\.vtkhdf$/.test(file.path)) };
 }
 
+interface Members {
+    members: Member[];
+    /** Jobs that are not there, and what the service says of them. */
+    refused: { id: string; reason: string }[];
+}
+
+async function loadMembers(ids: string[], signal: AbortSignal): Promise<Members> {
+    const found = await Promise.allSettled(ids.map((id) => loadMember(id, signal)));
+    const refused: Members["refused"] = [];
+    for (const [k, one] of found.entries()) {
+        if (one.status === "fulfilled") continue;
+        if (!(one.reason instanceof Refusal)) throw one.reason;
+        refused.push({ id: ids[k] ?? "", reason: one.reason.problem.detail ?? one.reason.problem.title });
+    }
+    return { members: found.flatMap((one) => (one.status === "fulfilled" ? [one.value] : [])), refused };
+}
+
 export function Compare({ ids }: { ids: string[] }) {
-    const { data, error } = useLoaded((signal) => Promise.all(ids.slice(0, 6).map((id) => loadMember(id, signal))), [ids.join()]);
+    const { data, error } = useLoaded((signal) => loadMembers(ids.slice(0, MOST), signal), [ids.join()]);
     const scenes = useRef(new Map<string, FrameScene>());
     const link = (id: string) => (scene: FrameScene | null) => {
         if (scene) scenes.current.set(id, scene);
@@ -29,11 +48,13 @@ export function Compare({ ids }: { ids: string[] }) {
         const all = [...scenes.current.values()];
         all.forEach((one) => one.link(all));
     };
-    const members = data ?? [];
+    const members = data?.members ?? [];
     return (
         <main>
             <header class="title"><h1>Compare</h1><span class="quiet">{members.length} jobs</span></header>
             <Trouble error={error} />
+            {ids.length > MOST && <p class="hint" role="status">The first {MOST} of {ids.length} are shown.</p>}
+            {data?.refused.map(({ id, reason }) => <p key={id} class="trouble" role="alert"><code>{id}</code> {reason}</p>)}
             {members.length > 0 && <Together members={members} />}
             <div class="beside">
                 {members.map(({ job, frames }) => (

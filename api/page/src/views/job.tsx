@@ -1,6 +1,6 @@
 // One job: what it does, whether it can be trusted, its frames, its series, what it cost, and what can be made of it.
 import { useEffect, useState } from "preact/hooks";
-import { get, openAddress, post, remove, request, Refusal, type Checkpoint, type FileEntry, type Job, type Page, type Report } from "../api";
+import { create, get, openAddress, post, remove, request, Refusal, type Checkpoint, type FileEntry, type Job, type Page, type Report } from "../api";
 import { listen } from "../events";
 import { ago, bytes, curl, number, seconds } from "../format";
 import { FrameView } from "../frame/view";
@@ -9,6 +9,7 @@ import { Act, actionsOf, Bar, Copy, Findings, Health, State, Trouble } from "../
 import { Plot } from "../parts/plot";
 import { readSeries, type Series } from "../series";
 import { go } from "../route";
+import { readValue } from "../values";
 
 const REFRESH_MS = 5000;
 
@@ -55,6 +56,8 @@ export function JobPage({ id }: { id: string }) {
     const files = useLoaded((signal) => get<Page<FileEntry>>(`v1/jobs/${id}/files`, signal), [id]);
     const series = useLoaded((signal) => loadSeries(id, signal), [id]);
     useReload([files.reload, series.reload], [slow, job?.finished_at]);
+    // It may have been deleted elsewhere while it was shown.
+    if (error instanceof Refusal && error.problem.status === 404) return <main><Trouble error={error} /><p><a href="#/jobs">all jobs</a></p></main>;
     if (!job) return <main><Trouble error={error} />{!error && <p class="quiet">loading</p>}</main>;
     const frames = (files.data?.items ?? []).filter((file) => /^frames\/.*\.vtkhdf$/.test(file.path));
     const kind = (job.resolved as { scene?: { kind?: string } } | null)?.scene?.kind ?? "";
@@ -103,7 +106,7 @@ export function JobPage({ id }: { id: string }) {
                 </section>
                 <section>
                     <h2>Body</h2>
-                    <p><Copy text={curl("v1/jobs", job.spec)}>copy as curl</Copy> <a class="button" href={`#/new?like=${id}`}>edit as a new job</a></p>
+                    <p class="choices"><Copy text={curl("v1/jobs", job.spec)}>copy as curl</Copy> <a class="button" href={`#/new?like=${id}`}>edit as a new job (fork)</a></p>
                     <pre>{JSON.stringify(job.spec, null, 2)}</pre>
                     <details><summary>with all defaults</summary><pre>{JSON.stringify(job.resolved, null, 2)}</pre></details>
                 </section>
@@ -138,11 +141,17 @@ function Story({ job }: { job: Job }) {
                 <dt>made</dt><dd title={job.created_at}>{ago(job.created_at)}</dd>
                 <dt>attempt</dt><dd>{job.attempt}</dd>
                 {job.lineage.study && <><dt>study</dt><dd><a href={`#/studies/${job.lineage.study}`}>{job.lineage.study}</a></dd></>}
-                {job.lineage.restarted_from && <><dt>restarted from</dt><dd>{job.lineage.restarted_from}</dd></>}
+                {job.lineage.restarted_from && <><dt>restarted from</dt><dd><Source checkpoint={job.lineage.restarted_from} /></dd></>}
                 {job.lineage.retry_of && <><dt>retry of</dt><dd><a href={`#/jobs/${job.lineage.retry_of}`}>{job.lineage.retry_of}</a></dd></>}
             </dl>
         </section>
     );
+}
+
+/** A checkpoint, with the job that wrote it. */
+function Source({ checkpoint }: { checkpoint: string }) {
+    const { data } = useLoaded((signal) => get<Checkpoint>(`v1/checkpoints/${checkpoint}`, signal), [checkpoint]);
+    return data?.job ? <a href={`#/jobs/${data.job}`}>{checkpoint}</a> : <>{checkpoint}</>;
 }
 
 export async function loadSeries(id: string, signal: AbortSignal): Promise<Series | null> {
@@ -272,8 +281,10 @@ function Restart({ job, checkpoint }: { job: Job; checkpoint: string }) {
     const at = (pointer: string): unknown => pointer.split("/").slice(1).reduce<unknown>((value, key) => (value as Record<string, unknown> | null)?.[key], scene);
     const submit = async () => {
         const given = Object.entries(values).filter(([, text]) => text !== "");
-        const overrides = Object.fromEntries(given.map(([pointer, text]) => [pointer, JSON.parse(text) as unknown]));
-        const made = await post<Job>("v1/jobs", { name: job.name ?? undefined, restart: { checkpoint, overrides }, output: (job.spec as { output?: unknown }).output });
+        const overrides = Object.fromEntries(given.map(([pointer, text]) => [pointer, readValue(text)]));
+        // All of the body goes over but what the checkpoint has.
+        const { scene: _, restart: __, accuracy: ___, after: ____, ...rest } = job.spec as Record<string, unknown>;
+        const made = await create<Job>("v1/jobs", { ...rest, restart: { checkpoint, overrides } });
         go(`/jobs/${made.id}`);
     };
     return (

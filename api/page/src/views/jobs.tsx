@@ -12,6 +12,21 @@ const SPARE_ROWS = 12;
 const PAGE = 500;
 const MOST = 20_000;
 const REFRESH_MS = 2000;
+const MOST_COMPARED = 6;
+/** Filters with a field of their own; others come by an address. */
+const FIELDS = ["state", "kind", "health", "name"];
+/** What an address may say of the list beside filters. */
+const OF_LISTS = ["sort", "limit", "cursor"];
+
+/** What a view of jobs is filtered by: whatever its address says, so that the service judges it. */
+const filtersOf = (route: Route): string[] => [...new Set(route.query.keys())].filter((name) => !OF_LISTS.includes(name) && route.query.get(name));
+
+/** What an action on many jobs came to. */
+interface Acted {
+    matched: number;
+    changed: number;
+    skipped: { job: string; reason: string }[];
+}
 
 /** The newest jobs that the filters let through; further pages as long as there are any. */
 async function loadAll(query: string, known: Job[], signal: AbortSignal): Promise<Job[]> {
@@ -33,8 +48,8 @@ async function loadAll(query: string, known: Job[], signal: AbortSignal): Promis
 }
 
 export function Jobs({ route }: { route: Route }) {
-    const filters = ["state", "kind", "health", "name", "owner", "study"].filter((name) => route.query.get(name));
-    const query = filters.map((name) => `&${name}=${encodeURIComponent(route.query.get(name) ?? "")}`).join("");
+    const filters = filtersOf(route);
+    const query = [...filters, ...(route.query.get("sort") ? ["sort"] : [])].map((name) => `&${name}=${encodeURIComponent(route.query.get(name) ?? "")}`).join("");
     const known = useRef<{ query: string; jobs: Job[] }>({ query: "", jobs: [] });
     const { data, error, reload } = useLoaded(async (signal) => {
         const jobs = await loadAll(query, known.current.query === query ? known.current.jobs : [], signal);
@@ -43,6 +58,9 @@ export function Jobs({ route }: { route: Route }) {
     }, [query], REFRESH_MS);
     const [selected, setSelected] = useState<Set<string>>(new Set());
     const jobs = data ?? [];
+    // A job that is gone can be compared no more.
+    const listed = new Set(jobs.map((job) => job.id));
+    const compared = [...selected].filter((id) => listed.has(id));
     const toggle = (id: string) => {
         const next = new Set(selected);
         if (!next.delete(id)) next.add(id);
@@ -54,12 +72,13 @@ export function Jobs({ route }: { route: Route }) {
                 <h1>Jobs</h1>
                 <span class="quiet" role="status">{data ? `${jobs.length.toLocaleString("en")}${jobs.length >= MOST ? " newest" : ""}` : "loading"}</span>
                 <span class="grow" />
-                {selected.size >= 2 && selected.size <= 6 && <a class="button" href={`#/compare/${[...selected].join(",")}`}>Compare {selected.size}</a>}
+                {compared.length > MOST_COMPARED && <span class="quiet" role="status">{compared.length} chosen; {MOST_COMPARED} can be compared</span>}
+                {compared.length >= 2 && compared.length <= MOST_COMPARED && <a class="button" href={`#/compare/${compared.join(",")}`}>Compare {compared.length}</a>}
                 <a class="button primary" href="#/new">New job</a>
             </header>
             <Filters route={route} />
             <Trouble error={error} />
-            <Bulk query={query} filters={filters} route={route} count={jobs.length} onDone={reload} />
+            <Bulk key={query} filters={filters} route={route} count={jobs.length} onDone={reload} />
             {data && jobs.length === 0 ? <Nothing isFiltered={filters.length > 0} /> : <Table jobs={jobs} selected={selected} toggle={toggle} />}
         </main>
     );
@@ -85,6 +104,9 @@ function Filters({ route }: { route: Route }) {
             {choice("state", STATES)}
             {choice("kind", (kinds?.items ?? []).map(({ kind }) => kind))}
             {choice("health", ["sound", "doubtful"])}
+            {filtersOf(route).filter((name) => !FIELDS.includes(name)).map((name) => (
+                <button key={name} type="button" class="label" title="take this filter away" onClick={() => setQuery(route, { [name]: null })}>{name}: {route.query.get(name)} ×</button>
+            ))}
             <label>
                 name{" "}
                 <input type="search" value={route.query.get("name") ?? ""} onChange={(event) => setQuery(route, { name: event.currentTarget.value })} />
@@ -94,29 +116,32 @@ function Filters({ route }: { route: Route }) {
 }
 
 /** Acts on all that the filters let through, after it has told how many that are. */
-function Bulk({ query, filters, route, count, onDone }: { query: string; filters: string[]; route: Route; count: number; onDone: () => void }) {
-    const [planned, setPlanned] = useState<{ action: string; matched: number } | null>(null);
-    if (filters.length === 0 || count === 0) return null;
-    const filter = Object.fromEntries(filters.map((name) => [name, route.query.get(name)]));
+function Bulk({ filters, route, count, onDone }: { filters: string[]; route: Route; count: number; onDone: () => void }) {
+    const [planned, setPlanned] = useState<{ action: string; filter: object; matched: number; changed: number } | null>(null);
+    const [done, setDone] = useState<Acted | null>(null);
+    if (filters.length === 0 || (count === 0 && !done)) return null;
     const ask = (action: string) => async () => {
-        const { matched } = await post<{ matched: number }>("v1/jobs/actions", { action, filter, dry_run: true });
-        setPlanned({ action, matched });
+        setDone(null);
+        const filter = Object.fromEntries(filters.map((name) => [name, route.query.get(name)]));
+        setPlanned({ action, filter, ...(await post<Acted>("v1/jobs/actions", { action, filter, dry_run: true })) });
     };
     return (
-        <div class="bulk" key={query}>
+        <div class="bulk">
             <span class="quiet">All of these:</span>
             {["pause", "resume", "cancel", "delete"].map((action) => <Act key={action} work={ask(action)}>{action}</Act>)}
             {planned && (
                 <span class="confirm" role="alertdialog" aria-label="confirm">
-                    {planned.action} {planned.matched} {planned.matched === 1 ? "job" : "jobs"}?{" "}
-                    <Act kind="danger" work={async () => {
-                        await post("v1/jobs/actions", { action: planned.action, filter, dry_run: false });
+                    {planned.changed < planned.matched ? `${planned.changed} of ${planned.matched} jobs let you ${planned.action} them. ` : ""}
+                    {planned.action} {planned.changed} {planned.changed === 1 ? "job" : "jobs"}?{" "}
+                    {planned.changed > 0 && <Act kind="danger" work={async () => {
+                        setDone(await post<Acted>("v1/jobs/actions", { action: planned.action, filter: planned.filter, dry_run: false }));
                         setPlanned(null);
                         onDone();
-                    }}>yes, {planned.action}</Act>
+                    }}>yes, {planned.action}</Act>}
                     <button type="button" onClick={() => setPlanned(null)}>no</button>
                 </span>
             )}
+            {done && <span role="status">{done.changed} done{done.skipped.length > 0 && `, ${done.skipped.length} left as they were: ${[...new Set(done.skipped.map((one) => one.reason))].join("; ")}`}</span>}
         </div>
     );
 }
@@ -149,6 +174,7 @@ function Table({ jobs, selected, toggle }: { jobs: Job[]; selected: Set<string>;
 
 function Row({ job, index, isSelected, toggle }: { job: Job; index: number; isSelected: boolean; toggle: (id: string) => void }) {
     const kind = (job.resolved as { scene?: { kind?: string } } | null)?.scene?.kind ?? (job.spec as { scene?: { kind?: string } })?.scene?.kind ?? "";
+    const doubt = job.health.status === "sound" ? undefined : job.health.findings.find(({ severity }) => severity === "warning");
     return (
         <tr aria-rowindex={index}>
             <td><input type="checkbox" checked={isSelected} onChange={() => toggle(job.id)} aria-label={`compare ${job.name ?? job.id}`} /></td>
@@ -159,7 +185,7 @@ function Row({ job, index, isSelected, toggle }: { job: Job; index: number; isSe
             </td>
             <td>{kind}</td>
             <td class="name"><a href={`#/jobs/${job.id}`}>{job.name ?? job.id}</a>{Object.entries(job.labels).map(([key, value]) => <span key={key} class="label">{key}: {value}</span>)}</td>
-            <td><Health status={job.health.status} /></td>
+            <td title={doubt?.message}><Health status={job.health.status} why={doubt?.code} /></td>
             <td class="figure">{seconds(job.usage.cpu_s)}</td>
             <td title={job.created_at}>{ago(job.created_at)}</td>
         </tr>

@@ -5,7 +5,8 @@ import { listen } from "../events";
 import { ago, number } from "../format";
 import { useLoaded, useReload } from "../load";
 import { Act, Bar, State, Trouble } from "../parts/basics";
-import { Plot, type Curve } from "../parts/plot";
+import { ErrorPlot, type Line } from "../parts/error-plot";
+import { Refinement, type RefinementReport } from "../parts/refinement";
 import { go } from "../route";
 
 const REFRESH_MS = 3000;
@@ -18,7 +19,7 @@ export function Studies() {
             <header class="title"><h1>Studies</h1><span class="quiet">{data ? studies.length : "loading"}</span></header>
             <Trouble error={error} />
             {data && studies.length === 0 ? <p class="empty">There is no study yet. <a href="#/new">New</a> makes one: “As a study”.</p> : (
-                <table>
+                <div class="scroll" tabIndex={0} aria-label="studies"><table>
                     <thead><tr><th scope="col">state</th><th scope="col">done</th><th scope="col">name</th><th scope="col">points</th><th scope="col">axes</th><th scope="col">made</th></tr></thead>
                     <tbody>
                         {studies.map((study) => (
@@ -29,7 +30,7 @@ export function Studies() {
                             </tr>
                         ))}
                     </tbody>
-                </table>
+                </table></div>
             )}
         </main>
     );
@@ -37,14 +38,8 @@ export function Studies() {
 
 type Row = Record<string, string | number | boolean | null>;
 interface Table { columns: string[]; rows: Row[]; next?: number | null }
-interface Line { label: string; order?: number | null; points: { spacing?: number | null; error?: number | null; cpu_s?: number | null; value?: number | null; job?: string }[] }
 interface StudyReport {
     errors?: { quantity: string; norm: string; lines: Line[] }[];
-    order?: number | null;
-    extrapolated?: number | null;
-    gci?: number | null;
-    convergence?: string | null;
-    tolerance_met?: boolean | null;
 }
 
 async function loadTable(id: string, signal: AbortSignal): Promise<Table> {
@@ -108,9 +103,10 @@ export function StudyPage({ id }: { id: string }) {
             <Trouble error={error} />
             <section class="story">
                 <Bar fraction={study.fraction} />
-                {study.message && <p class="message">{study.message}</p>}
+                {study.message && <p class={study.state === "failed" || study.counts.failed ? "message" : "hint"}>{study.message}</p>}
                 <dl>{Object.entries(study.counts).filter(([, count]) => count > 0).map(([state, count]) => <><dt>{state}</dt><dd>{count}</dd></>)}</dl>
             </section>
+            {report.data && "levels" in report.data && <Refinement report={report.data as RefinementReport} isOver={isOver} />}
             {report.data && <Outcome report={report.data} />}
             {table.data && <Points table={table.data} />}
         </main>
@@ -121,14 +117,9 @@ function Outcome({ report }: { report: StudyReport }) {
     const errors = report.errors ?? [];
     const [chosen, setChosen] = useState(0);
     const [over, setOver] = useState<"spacing" | "cpu_s">("spacing");
-    const facts: [string, string][] = [
-        ["order", number(report.order)], ["extrapolated", number(report.extrapolated)], ["grid convergence index", number(report.gci)],
-        ["convergence", report.convergence ?? "–"], ["tolerance", report.tolerance_met === true ? "met" : report.tolerance_met === false ? "not met" : "–"],
-    ];
     const shown = errors[Math.min(chosen, errors.length - 1)];
     return (
         <section>
-            {facts.some(([, value]) => value !== "–") && <dl>{facts.map(([name, value]) => <><dt>{name}</dt><dd>{value}</dd></>)}</dl>}
             {shown && (
                 <>
                     <h2>Error {over === "spacing" ? "over spacing" : "over CPU time"}</h2>
@@ -142,18 +133,6 @@ function Outcome({ report }: { report: StudyReport }) {
             )}
         </section>
     );
-}
-
-function ErrorPlot({ lines, over, name }: { lines: Line[]; over: "spacing" | "cpu_s"; name: string }) {
-    const points = lines.flatMap((line, which) => line.points.map((point) => ({ which, x: point[over] ?? Number.NaN, y: point.error ?? point.value ?? Number.NaN }))).filter(({ x, y }) => x > 0 && y > 0);
-    points.sort((a, b) => a.x - b.x);
-    const curves: Curve[] = lines.map((line, which) => ({
-        label: `${line.label || name}${line.order ? ` (order ${number(line.order)})` : ""}`,
-        values: points.map((point) => (point.which === which ? point.y : null)),
-        isMarked: true,
-    }));
-    if (points.length === 0) return <p class="empty">No error yet.</p>;
-    return <Plot x={points.map((point) => point.x)} xLabel={over === "spacing" ? "spacing" : "CPU seconds"} curves={curves} logX logY label={`error of ${name} over ${over}`} />;
 }
 
 function Points({ table }: { table: Table }) {
