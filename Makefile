@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
-.PHONY: help build page demo test test-cluster screenshots soak soak-cluster dist load estimates check check-deploy check-portable setup clean
+.PHONY: help build page demo test test-cluster screenshots soak soak-cluster dist load estimates check client check-deploy check-portable setup clean
 
 # Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
 ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
@@ -94,6 +94,12 @@ soak-cluster: setup
 	cargo build --profile test --locked -p meniscus-api
 	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_LATE_FILES=1 \
 	cargo test --locked --test cluster -- --ignored --test-threads 1 --nocapture soak:: files_that_come_late
+
+# The types of the client for Python, from the document of the API.
+client: $(VENV)/ready
+	cargo build --profile test --locked -p meniscus-api
+	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)" MENISCUS_UPDATE=1 \
+	cargo test --locked --test service the_client_for_python
 
 check:
 	cargo fmt --all --check

@@ -35,6 +35,48 @@ fn a_generated_python_client_submits_a_job_and_reads_its_report() {
     run(Command::new(&python).arg(script).arg(&service.url).arg(&folder));
 }
 
+/// Where the client for Python is, and what Python needs to find it.
+fn own_client() -> (PathBuf, PathBuf) {
+    let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("api/clients/python");
+    let source = place.join("src");
+    (place, source)
+}
+
+#[test]
+fn the_client_for_python_does_what_it_says() {
+    let Some(python) = python() else { return };
+    let (_directory, service) = service(&["--slots", "2"]);
+    let (place, source) = own_client();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/own_client.py");
+    run(Command::new(&python).arg(script).arg(&service.url).env("PYTHONPATH", &source));
+    // Its types are those of the document.
+    let document = service.data.join("openapi.json");
+    std::fs::write(&document, service.get("/openapi.json").bytes).unwrap();
+    let written = service.data.join("models.py");
+    run(Command::new(&python).arg(place.join("generate.py")).arg(&document).arg(&written));
+    let kept = source.join("meniscus_client/models.py");
+    if std::env::var_os("MENISCUS_UPDATE").is_some() {
+        std::fs::copy(&written, &kept).unwrap();
+    }
+    let read = |path: &Path| std::fs::read_to_string(path).unwrap();
+    assert!(read(&written) == read(&kept), "`make client` writes models.py anew");
+}
+
+#[test]
+fn the_notebook_of_first_steps_runs() {
+    let Some(python) = python() else { return };
+    let (directory, service) = service(&["--slots", "2"]);
+    let (place, source) = own_client();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/run_notebook.py");
+    run(Command::new(&python)
+        .arg(script)
+        .arg(place.join("examples/first-steps.ipynb"))
+        .arg(directory.path())
+        .env("PYTHONPATH", &source)
+        .env("MPLBACKEND", "agg")
+        .env("MENISCUS_URL", &service.url));
+}
+
 #[test]
 fn types_for_typescript_are_generated_and_compile() {
     let Some(tools) = std::env::var_os("MENISCUS_NODE_TOOLS").map(PathBuf::from) else {
