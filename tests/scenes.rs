@@ -14,6 +14,8 @@ mod fronts;
 mod own_inputs;
 #[path = "scenes/shapes.rs"]
 mod shapes;
+#[path = "scenes/shear.rs"]
+mod shear;
 #[path = "scenes/surfaces.rs"]
 mod surfaces;
 #[path = "scenes/walls.rs"]
@@ -63,6 +65,7 @@ fn bodies() -> Vec<Value> {
     bodies.extend(fronts::bodies());
     bodies.extend(own_inputs::bodies());
     bodies.extend(shapes::bodies());
+    bodies.extend(shear::bodies());
     bodies.push(json!({"kind": "redistance", "dimension": 3, "spacing": 0.125, "repeat": 3, "method": {"type": "pcp", "degree": 3}}));
     bodies.push(json!({
         "kind": "vortex", "spacing": 0.1, "band_h": 8, "end_time": 0.5, "steps": 4,

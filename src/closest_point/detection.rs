@@ -89,6 +89,11 @@ impl<const D: usize> Detection<D> {
         }
     }
 
+    /// Replaces the domain, before the next detection.
+    pub fn set_domain(&mut self, domain: &Domain<D>) {
+        self.cells.set_domain(domain);
+    }
+
     /// The cell list of all particles.
     #[must_use]
     pub fn cells(&self) -> &CellList<D> {

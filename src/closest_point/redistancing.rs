@@ -139,6 +139,13 @@ impl<const D: usize> Redistancing<D> {
         }
     }
 
+    /// Replaces the domain, before particles are detected anew.
+    pub fn set_domain(&mut self, domain: &Domain<D>) {
+        self.detection.set_domain(domain);
+        self.sample_cells.set_domain(domain);
+        self.domain = domain.clone();
+    }
+
     /// Spacing h of the particles.
     #[must_use]
     pub fn spacing(&self) -> f64 {

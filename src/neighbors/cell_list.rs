@@ -2,7 +2,8 @@
 //!
 //! The index x runs fastest, so that the points of adjacent cells in a row form one contiguous range. Along periodic
 //! axes the grid divides the period into whole cells, and rows wrap around. Along the other axes it covers the bounding
-//! box of the points. A rebuild reuses all memory.
+//! box of the points. In a sheared box the cells lean with it, so that rows still meet across its ends. A rebuild reuses all
+//! memory.
 
 use super::{Neighbor, NeighborSearch};
 use crate::geometry::domain::Axis;
@@ -32,6 +33,8 @@ pub struct CellList<const D: usize> {
     inverse_edge: Vector<D>,
     /// Whether any axis is periodic.
     is_wrapped: bool,
+    /// The axis along which cells lean in x, and by how much; 0 in a box that is not sheared.
+    lean: (usize, f64),
     /// Number of cells along each axis.
     counts: [usize; D],
     /// First sorted slot of each cell, and the number of points at the end.
@@ -50,6 +53,7 @@ impl<const D: usize> CellList<D> {
     pub fn new(domain: Domain<D>) -> Self {
         Self {
             is_wrapped: domain.axes().iter().any(|axis| matches!(axis, Axis::Periodic { .. })),
+            lean: lean(&domain),
             domain,
             low: Vector::<D>::zeros(),
             edge: Vector::<D>::repeat(1.0),
@@ -60,6 +64,12 @@ impl<const D: usize> CellList<D> {
             sorted: Vec::new(),
             cell_of: Vec::new(),
         }
+    }
+
+    /// Replaces the domain, before the next rebuild.
+    pub fn set_domain(&mut self, domain: &Domain<D>) {
+        self.lean = lean(domain);
+        self.domain = domain.clone();
     }
 
     /// Sorts points into cells with edges of at least `edge`.
@@ -89,10 +99,12 @@ impl<const D: usize> CellList<D> {
                     Axis::Periodic { start, length } => (start, length),
                 };
                 self.low[d] = start;
+                // What is within an edge of a cell lies in those next to it, where they lean as well.
+                let least = if d == 0 { wanted * self.lean.1.hypot(1.0) } else { wanted };
                 let along = match self.domain.axes()[d] {
                     // One more cell for the point with the largest coordinate.
                     Axis::Unbounded => (length / wanted).floor() + 1.0,
-                    Axis::Periodic { .. } => (length / wanted).floor().max(1.0),
+                    Axis::Periodic { .. } => (length / least).floor().max(1.0),
                 };
                 self.edge[d] = match self.domain.axes()[d] {
                     Axis::Unbounded => wanted,
@@ -153,10 +165,17 @@ impl<const D: usize> CellList<D> {
         self.order.is_empty()
     }
 
+    /// How far a point lies behind the lower end of the grid along axis d, along x behind that of its row.
+    #[inline(always)]
+    fn along(&self, x: &Vector<D>, d: usize) -> f64 {
+        let (axis, slope) = self.lean;
+        if d == 0 && axis > 0 { x[0] - self.low[0] - slope * (x[axis] - self.low[axis]) } else { x[d] - self.low[d] }
+    }
+
     /// Grid indices of the cell that contains a wrapped point.
     fn cell(&self, x: &Vector<D>) -> [usize; D] {
         std::array::from_fn(|d| {
-            let index = (x[d] - self.low[d]) * self.inverse_edge[d];
+            let index = self.along(x, d) * self.inverse_edge[d];
             (index.max(0.0) as usize).min(self.counts[d] - 1)
         })
     }
@@ -166,9 +185,18 @@ impl<const D: usize> CellList<D> {
         (0..D).rev().fold(0, |flat, d| flat * self.counts[d] + cell[d])
     }
 
+    /// The image of a point in the grid.
     #[inline(always)]
     fn wrap(&self, x: Vector<D>) -> Vector<D> {
-        if self.is_wrapped { self.domain.wrap(x) } else { x }
+        if !self.is_wrapped {
+            return x;
+        }
+        let mut x = self.domain.wrap(x);
+        if self.lean.0 > 0 {
+            let length = self.domain.length(0);
+            x[0] -= (self.along(&x, 0) / length).floor() * length;
+        }
+        x
     }
 
     /// The displacement `to - from`, `wraps` as in [`Self::displacement`].
@@ -209,7 +237,8 @@ impl<const D: usize> CellList<D> {
     /// First and last cell index along axis d, not wrapped, whose cells can contain points within `radius` of `x`.
     fn span(&self, x: &Vector<D>, radius: f64, d: usize) -> (i64, i64) {
         // The padding covers the rounding of the products for points at the distance `radius` itself.
-        let (at, cutoff) = ((x[d] - self.low[d]) * self.inverse_edge[d], radius * self.inverse_edge[d]);
+        let reach = if d == 0 && self.lean.0 > 0 { radius * self.lean.1.hypot(1.0) } else { radius };
+        let (at, cutoff) = (self.along(x, d) * self.inverse_edge[d], reach * self.inverse_edge[d]);
         let pad = 1e-9 * (1.0 + at.abs());
         let first = (at - cutoff - pad).floor();
         let last = (at + cutoff + pad).floor();
@@ -337,6 +366,11 @@ impl<const D: usize> CellList<D> {
     }
 }
 
+/// The axis of a domain along which its images are displaced, and by how much of its length.
+fn lean<const D: usize>(domain: &Domain<D>) -> (usize, f64) {
+    domain.tilt().map_or((0, 0.0), |tilt| (tilt.axis, tilt.offset / domain.length(tilt.axis)))
+}
+
 impl<const D: usize> NeighborSearch<D> for CellList<D> {
     fn gather(&self, x: &Vector<D>, radius: f64, found: &mut Vec<Neighbor<D>>) {
         let x = self.wrap(*x);
@@ -447,7 +481,8 @@ impl<const D: usize> CellList<D> {
     /// An upper bound of the distance from `x` to any point of the list.
     fn farthest(&self, x: &Vector<D>) -> f64 {
         let high = Vector::<D>::from_fn(|d, _| self.low[d] + self.edge[d] * self.counts[d] as f64);
-        (x - self.low).abs().sup(&(x - high).abs()).norm()
+        let (axis, slope) = self.lean;
+        (x - self.low).abs().sup(&(x - high).abs()).norm() + (slope * (high[axis] - self.low[axis])).abs()
     }
 }
 

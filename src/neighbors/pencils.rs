@@ -8,7 +8,8 @@
 //! A loop over groups needs no condition. The last group of a range may contain points beyond the cutoff, whose kernel
 //! is zero, or padding slots, with which every pencil ends. Periodic images are not copied: a group comes with the
 //! period by which its point must be shifted. A list is valid while no point has moved by more than half the skin. The
-//! order depends only on the positions from which it was built.
+//! order depends only on the positions from which it was built. In a sheared box images slide along x: a list holds for
+//! any displacement by which the points still are neighbors.
 
 use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Vector};
@@ -111,6 +112,8 @@ pub struct Pencils<const D: usize> {
     slabs: Vec<Slab>,
     /// Displacements of the periodic images.
     shifts: Vec<Vector<D>>,
+    /// How far the image a period up along each axis is displaced along x, at most half of its length when lists are made.
+    slides: Vector<D>,
 }
 
 /// The box is too small for the cutoff radius.
@@ -151,11 +154,7 @@ impl<const D: usize> Pencils<D> {
         });
         let edges = Vector::<D>::from_fn(|d, _| lengths[d] / counts[d] as f64);
         let spans = std::array::from_fn(|d| if d == 0 { 0 } else { (cutoff / edges[d]).ceil() as i64 });
-        let shifts = (0..3_usize.pow(D as u32))
-            .map(|image| Vector::<D>::from_fn(|d, _| (image / 3_usize.pow(d as u32) % 3) as f64 - 1.0))
-            .map(|turns| turns.component_mul(&lengths))
-            .collect();
-        Ok(Self {
+        let mut pencils = Self {
             low,
             lengths,
             counts,
@@ -167,8 +166,24 @@ impl<const D: usize> Pencils<D> {
             order: Vec::new(),
             sorted: Vec::new(),
             slabs: Vec::new(),
-            shifts,
-        })
+            shifts: Vec::new(),
+            slides: Vector::<D>::zeros(),
+        };
+        pencils.slide(0, 0.0);
+        Ok(pencils)
+    }
+
+    /// Displaces the images a period up along an axis by `offset` along x.
+    pub fn slide(&mut self, axis: usize, offset: f64) {
+        self.slides[axis] = offset;
+        let (lengths, slides) = (self.lengths, self.slides);
+        self.shifts.clear();
+        self.shifts.extend((0..3_usize.pow(D as u32)).map(|image| {
+            let turns = Vector::<D>::from_fn(|d, _| (image / 3_usize.pow(d as u32) % 3) as f64 - 1.0);
+            let mut shift = turns.component_mul(&lengths);
+            shift[0] += turns.dot(&slides);
+            shift
+        }));
     }
 
     /// Sorts points, which must lie in the box, and lists their neighbors.
@@ -301,7 +316,7 @@ impl<const D: usize> Pencils<D> {
     fn add_pencil(&self, slot: usize, own: &[i64; D], offset: &[i64; D], first_run: usize, found: &mut Slab) {
         let x = &self.sorted[slot];
         let is_own = offset.iter().all(|steps| *steps == 0);
-        let (mut chord, mut base, mut image, mut digit) = (self.cutoff * self.cutoff, 0, 0, 1);
+        let (mut chord, mut slide, mut base, mut image, mut digit) = (self.cutoff * self.cutoff, 0.0, 0, 0, 1);
         for d in 1..D {
             let pencil = own[d] + offset[d];
             let start = self.low[d] + pencil as f64 * self.edges[d];
@@ -310,7 +325,9 @@ impl<const D: usize> Pencils<D> {
             digit *= 3;
             let count = self.counts[d] as i64;
             // A pencil beyond one end of the box is one at the other end: the point is shifted by a period.
-            image += digit * usize::try_from(1 - pencil.div_euclid(count)).unwrap_or(1);
+            let turns = -pencil.div_euclid(count);
+            image += digit * usize::try_from(1 + turns).unwrap_or(1);
+            slide += turns as f64 * self.slides[d];
         }
         if chord < 0.0 {
             return;
@@ -325,7 +342,7 @@ impl<const D: usize> Pencils<D> {
         let chord = chord.sqrt();
         // In its own pencil a point lists the points to its right and, across the periodic end, those at the left.
         for turn in if is_own { -1..=0_i64 } else { -1..=1 } {
-            let at = x[0] + turn as f64 * self.lengths[0];
+            let at = x[0] + slide + turn as f64 * self.lengths[0];
             let (from, to) = (at - chord, at + chord);
             let (low, high) = (self.low[0], self.low[0] + self.lengths[0]);
             if to < low || from >= high {
@@ -368,6 +385,10 @@ mod tests {
 
     fn check<const D: usize>(lengths: [f64; D], count: usize, cutoff: f64) {
         let domain = Domain::new(std::array::from_fn(|d| Axis::Periodic { start: -0.3, length: lengths[d] }));
+        check_in(&domain, lengths, count, cutoff);
+    }
+
+    fn check_in<const D: usize>(domain: &Domain<D>, lengths: [f64; D], count: usize, cutoff: f64) {
         let random = CounterRandom::new(7);
         let points: Vec<Vector<D>> = (0..count as i64)
             .map(|i| {
@@ -375,7 +396,10 @@ mod tests {
                 domain.wrap(Vector::<D>::from_fn(|d, _| -0.3 + lengths[d] * draw(d)))
             })
             .collect();
-        let mut pencils = Pencils::new(&domain, cutoff).unwrap();
+        let mut pencils = Pencils::new(domain, cutoff).unwrap();
+        if let Some(tilt) = domain.tilt() {
+            pencils.slide(tilt.axis, tilt.offset);
+        }
         pencils.rebuild(&points, &Interrupt::default()).unwrap();
         let points_in_slots: Vec<Option<usize>> =
             pencils.order.iter().map(|i| (*i != EMPTY_SLOT).then_some(*i as usize)).collect();
@@ -398,7 +422,7 @@ mod tests {
                 }
             })
             .unwrap();
-        let brute = BruteForce { domain: &domain, points: &points };
+        let brute = BruteForce { domain, points: &points };
         let mut expected = Vec::new();
         for (slot, i) in pencils.occupied() {
             let mut neighbors = 0;
@@ -423,6 +447,19 @@ mod tests {
         check::<2>([1.0, 0.7], 300, 0.2);
         check::<2>([0.9, 2.3], 700, 0.2);
         check::<3>([1.0, 1.3, 0.9], 1500, 0.2);
+    }
+
+    #[test]
+    fn in_a_sheared_box_every_pair_is_met_once() {
+        for offset in [0.2, -0.45, 0.5] {
+            let axes = |lengths: [f64; 2]| Domain::new(lengths.map(|length| Axis::Periodic { start: -0.3, length }));
+            check_in::<2>(&axes([1.0, 1.3]).tilted(1, offset), [1.0, 1.3], 500, 0.15);
+            check_in::<2>(&axes([1.0, 0.7]).tilted(1, offset), [1.0, 0.7], 300, 0.2);
+            let lengths = [1.0, 1.3, 0.9];
+            let domain = Domain::new(lengths.map(|length| Axis::Periodic { start: -0.3, length }));
+            check_in::<3>(&domain.tilted(1, offset), lengths, 1000, 0.2);
+            check_in::<3>(&domain.tilted(2, offset), lengths, 1000, 0.2);
+        }
     }
 
     #[test]

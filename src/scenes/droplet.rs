@@ -15,6 +15,7 @@ mod own_motion;
 mod plan;
 mod preset;
 mod room;
+mod shear;
 pub mod spec;
 mod start_lattice;
 mod start_levels;

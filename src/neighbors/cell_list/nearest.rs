@@ -46,8 +46,9 @@ impl<const D: usize> CellList<D> {
             }
             let mut along = spans[0];
             if !is_whole[0] && !self.is_row_short(base, along) {
-                let cutoff = (best.1 - row_distance * (1.0 - 1e-9)).sqrt();
-                let narrow = self.span(x, cutoff, 0);
+                // Rows that lean are met at another place along them than the nearest.
+                let used = if self.lean.0 > 0 { 0.0 } else { row_distance * (1.0 - 1e-9) };
+                let narrow = self.span(x, (best.1 - used).sqrt(), 0);
                 along = (along.0.max(narrow.0), along.1.min(narrow.1));
             }
             self.for_each_part(base, along, |from, to| {

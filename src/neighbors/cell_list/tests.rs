@@ -84,3 +84,38 @@ fn empty_and_single() {
     cells.rebuild([Vector::<3>::new(5.0, 5.0, 5.0)].into_iter(), 0.1);
     assert_eq!(cells.nearest(&Vector::<3>::new(5.0, 5.0, 1.0), 1e9), Some((0, 4.0)));
 }
+
+/// Of a box in shear, cells find what all points of the box and their images tell.
+fn compare_tilted<const D: usize>(offset: f64) {
+    let axes = std::array::from_fn(|d| Axis::Periodic { start: -1.0, length: 2.0 + 0.5 * d as f64 });
+    for axis in 1..D {
+        let domain = Domain::new(axes).tilted(axis, offset);
+        let points: Vec<Vector<D>> = cloud::<D>(300, 5).iter().map(|x| domain.wrap(x * 1.2)).collect();
+        let oracle = BruteForce { domain: &domain, points: &points };
+        for edge in [0.1, 0.31, 0.9] {
+            let mut cells = CellList::new(Domain::new(axes));
+            cells.set_domain(&domain);
+            cells.rebuild(points.iter().copied(), edge);
+            for x in cloud::<D>(60, 6) {
+                let indices = |search: Vec<(usize, u64)>| search.into_iter().map(|(j, _)| j).collect::<Vec<_>>();
+                assert_eq!(indices(within(&cells, &x, 0.37)), indices(within(&oracle, &x, 0.37)), "{offset}: {x}");
+                let (index, nearest) = oracle.nearest(&x, 0.9).unwrap();
+                let found = cells.nearest(&x, 0.9).unwrap();
+                assert!(found.0 == index && (found.1 - nearest).abs() < 1e-14);
+                let known = (7, domain.displacement(&x, &points[7]).norm_squared());
+                assert_eq!(cells.nearest_from(&x, known).0, index);
+                assert!(
+                    cells.any_within(&x, nearest * 1.001, |_| true) && !cells.any_within(&x, nearest * 0.999, |_| true)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn in_a_sheared_box_images_are_found_where_they_have_slid_to() {
+    for offset in [0.0, 0.3, -0.97, 1.0] {
+        compare_tilted::<2>(offset);
+        compare_tilted::<3>(offset);
+    }
+}

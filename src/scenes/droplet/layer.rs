@@ -85,7 +85,7 @@ pub(super) fn standing_wave<const D: usize>(
     };
     let is_linear = wavenumber * thinner >= VALIDITY.depth && wavenumber * layer.amplitude <= VALIDITY.steepness;
     let is_constant = spec.surfactant.is_none() && spec.tension_slope.is_none();
-    let holds = is_alike && is_linear && is_constant && room.obstacles.is_empty();
+    let holds = is_alike && is_linear && is_constant && room.obstacles.is_empty() && room.mean_shear.is_none();
     let theory = gravity
         .filter(|_| holds)
         .and_then(|gravity| CapillaryWave::new(wavenumber, densities, kinematic[0], (tension, gravity)));

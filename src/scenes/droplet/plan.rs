@@ -11,6 +11,7 @@ use super::numbers::{SceneNumbers, smallest_radius};
 use super::obstacles;
 use super::own_motion::{StartMotion, motion_at_start};
 use super::room::{Room, check_needs, check_size, surround};
+use super::shear;
 use super::spec::{BoxSpec, Droplet, GeometryChoice, IntegratorWord, NumbersSpec, Shifting, StopWhen, TensionWord};
 use super::start_lattice::{StartLattice, start_lattice};
 use super::steps::time_step;
@@ -214,7 +215,7 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     }))
 }
 
-/// Puts walls around the fluids, where there are any.
+/// Puts walls around the fluids, where there are any, or shears the box.
 fn enclose<const D: usize>(
     config: &mut SphConfig<D>,
     shape: Option<&Shape>,
@@ -222,12 +223,14 @@ fn enclose<const D: usize>(
     (room, numbers, scope): (&Room<D>, &SceneNumbers, Scope),
     errors: &mut Vec<Violation>,
 ) {
+    shear::check(spec, config, (scope, !room.obstacles.is_empty()), errors);
+    let is_flat = matches!(shape, Some(Shape::Layer { amplitude: 0.0, .. }));
+    config.starts_in_layers = is_flat && (room.container.is_some() || room.mean_shear.is_some());
     if room.container.is_none() {
         return;
     }
     check_needs(spec, scope.is_summation, config.has_tension(), errors);
     config.container.clone_from(&room.container);
-    config.starts_in_layers = shape.is_some_and(|shape| matches!(shape, Shape::Layer { amplitude: 0.0, .. }));
     config.steady_flow = shape.and_then(|shape| steady_flow(shape, config, room));
     config.hydrostatic_pressure = pressure_of_height(spec, config, room, numbers);
 }
@@ -254,7 +257,7 @@ fn sph_config<const D: usize>(
     let force = spec.body_force.get_or_insert_with(|| case.body_force.clone());
     let body_force = body_force(force, &spec.fluids, (room, spec.end_time), errors);
     let pressure = pressures(spec, flow.scope, errors);
-    let is_stirred = room.container.is_some() && flow.scope.is_summation && is_stirred(spec, body_force.as_ref(), room);
+    let is_stirred = flow.scope.is_summation && is_stirred(spec, body_force.as_ref(), room);
     let default_shifting = if is_stirred { Shifting::Pst } else { flow.default_shifting };
     SphConfig {
         spacing: spec.spacing,
@@ -273,7 +276,11 @@ fn sph_config<const D: usize>(
         discretization: flow.discretization,
         density: flow.density,
         is_shifted: *spec.shifting.get_or_insert(default_shifting) == Shifting::Pst,
-        shifting_rate: if room.container.is_some() { SHIFTING_BETWEEN_WALLS } else { SHIFTING },
+        shifting_rate: if room.container.is_some() || room.mean_shear.is_some() {
+            SHIFTING_BETWEEN_WALLS
+        } else {
+            SHIFTING
+        },
         body_force,
         integrator: match spec.integrator {
             IntegratorWord::KickDriftKick => Integrator::KickDriftKick,
@@ -282,6 +289,7 @@ fn sph_config<const D: usize>(
         start_velocity: Vector::<D>::zeros(),
         is_at_rest: true,
         wave: None,
+        mean_shear: room.mean_shear,
         container: None,
         starts_in_layers: false,
         steady_flow: None,

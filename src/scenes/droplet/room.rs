@@ -2,6 +2,7 @@
 
 use super::given_wall::wall;
 use super::obstacles::PlannedObstacle;
+use super::shear::mean_shear;
 use super::spec::{AxisSpec, BoxSpec, Droplet, GeometryChoice};
 use super::start_lattice::StartLattice;
 use super::vectors::vector;
@@ -9,8 +10,8 @@ use crate::geometry::domain::Axis;
 use crate::geometry::{Domain, Surface, Vector};
 use crate::neighbors::Pencils;
 use crate::scenes::shapes::Shape;
-use crate::schemes::weakly_compressible_sph::SphConfig;
 use crate::schemes::weakly_compressible_sph::walls::{Container, Wall};
+use crate::schemes::weakly_compressible_sph::{MeanShear, SphConfig};
 use crate::spec::{Choice, Parameter, Violation};
 use serde_json::{Value, json};
 
@@ -20,6 +21,8 @@ pub(super) struct Room<const D: usize> {
     pub low: Vector<D>,
     pub high: Vector<D>,
     pub container: Option<Container<D>>,
+    /// The mean flow where the box is in shear.
+    pub mean_shear: Option<MeanShear>,
     /// Cells of the lattice behind each end of each axis; 0 along periodic ones.
     pub layers: [usize; D],
     /// Thickness of these layers.
@@ -42,11 +45,14 @@ impl<const D: usize> Room<D> {
             errors.push(Violation::new("/domain/high", "range", detail, spec.high.to_json(), Value::Null));
         }
         let sides = sides(spec, errors).or_else(|| (!obstacles.is_empty()).then_some([const { None }; D]));
+        let axes = spec.axes.as_ref().map_or(&[][..], |axes| &axes.0);
+        let mean_shear = if axes.len() == D { mean_shear(axes, (&low, &high), errors) } else { None };
         let container = sides.map(|sides| Container::new(low, high, sides));
         Self {
             low,
             high,
             container,
+            mean_shear,
             layers: [0; D],
             depth: Vector::<D>::zeros(),
             obstacles,
@@ -90,7 +96,7 @@ impl<const D: usize> Room<D> {
     /// Along a periodic axis a force meets no wall: between walls that hold the fluids it drives the flow of Poiseuille, at most
     /// |g| H²/(8ν), or what falls freely until then.
     pub fn driven(&self, spec: &Droplet, acceleration: &Vector<D>) -> (f64, f64) {
-        let Some(container) = &self.container else { return (acceleration.norm(), 0.0) };
+        let Some(container) = &self.container else { return (acceleration.norm(), self.side_speed()) };
         let bounded = |d: usize| if container.is_bounded(d) { acceleration[d] } else { 0.0 };
         let across = Vector::<D>::from_fn(|d, _| bounded(d));
         let along = (acceleration - across).norm();
@@ -100,13 +106,14 @@ impl<const D: usize> Room<D> {
         let poiseuille = self.gap().filter(|_| holds).map_or(f64::INFINITY, |gap| along * gap * gap / (8.0 * least));
         let falling = (2.0 * along * self.lengths().max()).sqrt();
         let slide = if along > 0.0 { poiseuille.min(falling) } else { 0.0 };
-        (across.norm(), slide.max(self.wall_speed()))
+        (across.norm(), slide.max(self.side_speed()))
     }
 
-    /// The largest speed of a wall.
-    pub fn wall_speed(&self) -> f64 {
-        let walls = self.container.iter().flat_map(Container::walls);
-        walls.map(|wall| wall.velocity.norm()).fold(0.0, f64::max)
+    /// The largest speed of a wall, or of the sides of a box in shear.
+    pub fn side_speed(&self) -> f64 {
+        let walls = self.container.iter().flat_map(Container::walls).map(|wall| wall.velocity.norm());
+        let sheared = self.mean_shear.iter().map(|shear| 0.5 * (shear.rate * shear.length).abs());
+        walls.chain(sheared).fold(0.0, f64::max)
     }
 
     /// The shortest distance of walls that face each other.
@@ -120,7 +127,7 @@ impl<const D: usize> Room<D> {
         let axes = spec.axes.iter().flat_map(|axes| axes.0.iter().enumerate());
         let walls = axes.filter_map(|(d, axis)| match axis {
             AxisSpec::Walls { low, high } => Some((d, [("low", low.has_angle()), ("high", high.has_angle())])),
-            AxisSpec::Periodic => None,
+            AxisSpec::Periodic | AxisSpec::LeesEdwards { .. } => None,
         });
         let beyond = |d: usize, end: usize| if end == 0 { self.low[d] - low[d] } else { high[d] - self.high[d] };
         let all = walls.flat_map(|(d, ends)| {

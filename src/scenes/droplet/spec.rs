@@ -57,6 +57,12 @@ crate::choice! {
             low: WallSpec = WallSpec::default();
             /// wall at the upper end
             high: WallSpec = WallSpec::default();
+        },
+        /// a box in shear: its images slide past each other along x, so that the fluids flow on an average as the rate times the
+        /// distance from the middle
+        LeesEdwards = "lees_edwards" {
+            /// shear rate γ
+            shear_rate: f64;
         }
     }
 }
@@ -259,7 +265,7 @@ impl BoxSpec {
     /// Whether there are walls along any axis.
     #[must_use]
     pub fn has_walls(&self) -> bool {
-        self.axes.iter().flat_map(|axes| &axes.0).any(|axis| *axis != AxisSpec::Periodic)
+        self.axes.iter().flat_map(|axes| &axes.0).any(|axis| matches!(axis, AxisSpec::Walls { .. }))
     }
 }
 

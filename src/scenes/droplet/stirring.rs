@@ -1,4 +1,4 @@
-//! Scenes in which a force or a moving wall deforms the fluids between walls for long.
+//! Scenes in which a force, a moving wall or a shear deforms the fluids for long.
 
 use super::room::Room;
 use super::spec::Droplet;
@@ -13,10 +13,14 @@ pub(super) const SHIFTING: f64 = 0.05;
 /// docs/results/wall-notes.md).
 pub(super) const SHIFTING_BETWEEN_WALLS: f64 = 0.015;
 
-/// Whether a force or a moving wall deforms what starts between walls for long. Flat layers are at rest or slide along themselves.
+/// Whether a force, a moving wall or a shear deforms for long what starts between walls or in shear. Flat layers are at rest or slide along
+/// themselves.
 pub(super) fn is_stirred<const D: usize>(spec: &Droplet, force: Option<&BodyForce<D>>, room: &Room<D>) -> bool {
+    if room.container.is_none() && room.mean_shear.is_none() {
+        return false;
+    }
     let is_flat = matches!(spec.shape, Some(Shape::Layer { amplitude: 0.0, .. }));
-    (!is_flat || !room.obstacles.is_empty()) && (force.is_some() || room.wall_speed() > 0.0)
+    (!is_flat || !room.obstacles.is_empty()) && (force.is_some() || room.side_speed() > 0.0)
 }
 
 /// A warning where the pressure of the whole weight of fluids that move holds them back: pressure acts as an elasticity of the lattice of

@@ -94,8 +94,8 @@ impl<const D: usize> SphSystem<D> {
         near.map(|i| self.flow.volume[*i] * smoothed_delta(phi[*i], self.config.smoothing_length)).sum()
     }
 
-    /// Power Σ m a·u and sum Σ m a of what comes from outside at a time: the body force, walls, and what keeps up a slope of the
-    /// tension.
+    /// Power Σ m a·u and sum Σ m a of what comes from outside at a time: the body force, walls, images that slide, and what keeps up a
+    /// slope of the tension.
     pub(super) fn body_force_sums(&self, time: f64) -> (f64, Vector<D>) {
         let mut sums = (0.0, Vector::<D>::zeros());
         if let Some(force) = &self.config.body_force {
@@ -113,7 +113,8 @@ impl<const D: usize> SphSystem<D> {
             sums.0 += power;
             sums.1 += force + self.held_by_walls();
         }
-        sums
+        let (power, force) = self.shear_supply();
+        (sums.0 + power, sums.1 + force)
     }
 
     /// The error of a step after which a velocity is not finite: that the body force has no value, where that is so.

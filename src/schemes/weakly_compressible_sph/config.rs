@@ -5,6 +5,7 @@ use super::interactions::{BodyForce, TensionForce};
 use super::interface::level_set;
 use super::kernel_choice::KernelChoice;
 use super::level_update::LevelUpdate;
+use super::mean_shear::MeanShear;
 use super::species::Fluids;
 use super::standing_wave::StandingWave;
 use super::steady_flow::SteadyFlow;
@@ -132,6 +133,8 @@ pub struct SphConfig<const D: usize> {
     pub is_shifted: bool,
     /// Displacement of a shift by ε² ∇C; .05 in the paper.
     pub shifting_rate: f64,
+    /// The mean shear of a box whose images slide past each other.
+    pub mean_shear: Option<MeanShear>,
     /// The walls; None in a box that is periodic along every axis.
     pub container: Option<Container<D>>,
     /// Whether the fluids are flat layers at the start.

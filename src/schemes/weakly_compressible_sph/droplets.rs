@@ -70,6 +70,11 @@ impl<const D: usize> Droplets<D> {
         }
     }
 
+    /// Replaces the domain, before droplets are counted.
+    pub fn set_domain(&mut self, domain: &Domain<D>) {
+        self.components.cells.set_domain(domain);
+    }
+
     /// The number of droplets.
     pub fn number(&self) -> usize {
         self.ball_curvatures.len()

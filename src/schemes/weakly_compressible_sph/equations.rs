@@ -33,7 +33,11 @@ impl<const D: usize> FlowEquations<D> {
             },
             (Discretization::Kernels, Some(diffusion)) => Self::MassForm { diffusion },
             (Discretization::Kernels, None) => Self::VolumeForm {
-                forms: Forms { pressure: config.pressure.form, has_whole_stress: config.has_whole_stress() },
+                forms: Forms {
+                    pressure: config.pressure.form,
+                    has_whole_stress: config.has_whole_stress(),
+                    mean_shear: config.mean_shear,
+                },
             },
         }
     }
@@ -65,7 +69,10 @@ impl<const D: usize> FlowEquations<D> {
         interrupt: &Interrupt,
     ) -> Result<(), Interrupted> {
         match self {
-            Self::VolumeForm { forms } => volume_form::accelerate(flow, walls, *forms, pairs, &mut rates.acceleration),
+            Self::VolumeForm { forms } => {
+                rates.pair_virial = volume_form::accelerate(flow, walls, *forms, pairs, &mut rates.acceleration)?;
+                Ok(())
+            }
             Self::MassForm { diffusion } => mass_form::find_rates(flow, *diffusion, pairs, rates),
             Self::Fits { fits, spread } => fits.find_rates(positions, flow, *spread, rates, interrupt),
         }
@@ -89,7 +96,7 @@ mod tests {
             FlowEquations::VolumeForm { forms } => forms,
             _ => panic!("no volume form"),
         };
-        assert_eq!(forms(&config), Forms { pressure: PressureForm::Mean, has_whole_stress: false });
+        assert_eq!(forms(&config), Forms { pressure: PressureForm::Mean, has_whole_stress: false, mean_shear: None });
         let mut unequal = config.clone();
         unequal.pressure.form = PressureForm::Hamiltonian;
         unequal.fluids.inside.viscosity *= 2.0;

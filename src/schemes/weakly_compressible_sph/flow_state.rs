@@ -38,6 +38,8 @@ pub(super) struct Rates<const D: usize> {
     pub acceleration: Vec<Vector<D>>,
     /// Rates of density; empty where densities are not integrated.
     pub density: Vec<f64>,
+    /// Σ_pairs F_x y_ij of a box in shear; 0 elsewhere.
+    pub pair_virial: f64,
 }
 
 impl<const D: usize> FlowState<D> {
@@ -143,6 +145,7 @@ impl<const D: usize> Rates<D> {
     /// Rates of zero.
     pub fn none(count: usize, is_density_integrated: bool) -> Self {
         Self {
+            pair_virial: 0.0,
             acceleration: vec![Vector::<D>::zeros(); count],
             density: vec![0.0; if is_density_integrated { count } else { 0 }],
         }

@@ -15,7 +15,7 @@ fn table<const D: usize>() -> [FrameField<SphConfig<D>, SphSystem<D>>; 7] {
     [
         FrameField::new(
             &Quantity { name: "velocity", unit: "length/time", doc: "Velocity of the particle." },
-            |system: &SphSystem<D>| FieldValues::vectors(system.flow.velocity.iter().copied()),
+            |system: &SphSystem<D>| FieldValues::vectors(system.whole_velocities()),
         ),
         FrameField::new(
             &Quantity { name: "density", unit: "mass/length^D", doc: "Mass density at the particle." },

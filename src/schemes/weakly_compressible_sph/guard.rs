@@ -172,8 +172,8 @@ impl<const D: usize> Guard<D> {
             && !config.container.iter().flat_map(Container::walls).any(|wall| wall.contact.has_hysteresis())
             // The impulse of another integrator is not the trapezoidal rule.
             && config.integrator == Integrator::KickDriftKick
-            // Between walls shifts are so small that budgets close all the same.
-            && (!config.is_shifted || config.container.is_some())
+            // Between walls and in shear shifts are so small that budgets close all the same.
+            && (!config.is_shifted || config.container.is_some() || config.mean_shear.is_some())
     }
 
     fn watches(&self, system: &SphSystem<D>) -> Vec<Watch> {

@@ -139,10 +139,29 @@ impl<const D: usize> SphSystem<D> {
 
     /// A center from which nothing is cut: along periodic axes opposite to the widest gap between points.
     fn circular_center(&self, points: &[Vector<D>]) -> Vector<D> {
-        Vector::<D>::from_fn(|d, _| match self.domain.axes()[d] {
-            Axis::Unbounded => points.iter().map(|x| x[d]).sum::<f64>() / points.len().max(1) as f64,
+        let mut center = Vector::<D>::zeros();
+        let mut points = points.to_vec();
+        // x comes last: in a box in shear images along another axis are displaced along it.
+        for d in (0..D).rev() {
+            center[d] = self.circular_center_along(d, points.iter().map(|x| x[d]));
+            if let Some(tilt) = self.domain.tilt().filter(|tilt| tilt.axis == d) {
+                for x in &mut points {
+                    x[0] -= ((x[d] - center[d]) / self.domain.length(d)).round() * tilt.offset;
+                    x[0] = self.domain.wrap(*x)[0];
+                }
+            }
+        }
+        center
+    }
+
+    fn circular_center_along(&self, d: usize, places: impl ExactSizeIterator<Item = f64>) -> f64 {
+        match self.domain.axes()[d] {
+            Axis::Unbounded => {
+                let count = places.len().max(1) as f64;
+                places.sum::<f64>() / count
+            }
             Axis::Periodic { start, length } => {
-                let mut places: Vec<f64> = points.iter().map(|x| x[d]).collect();
+                let mut places: Vec<f64> = places.collect();
                 places.sort_by(f64::total_cmp);
                 let last = places.last().map_or(start, |last| last - length);
                 let before = std::iter::once(last).chain(places.iter().copied());
@@ -150,7 +169,7 @@ impl<const D: usize> SphSystem<D> {
                 let (_, middle) = gaps.fold((0.0, start), |most, gap| if gap.0 > most.0 { gap } else { most });
                 start + (middle + 0.5 * length - start).rem_euclid(length)
             }
-        })
+        }
     }
 
     /// The least distance of two particles, in h, and the share of particles that have another closer than `crowded`, in h.
@@ -270,10 +289,27 @@ fn elongation<const D: usize>(moments: &EnclosedMoments<D>) -> (f64, f64) {
         let mixed = covariance[(0, 1)];
         return (half.hypot(mixed) / mean, 0.5 * mixed.atan2(half));
     }
+    let (least, most) = extreme_moments(moments);
+    ((most - least) / (most + least), f64::NAN)
+}
+
+/// Lengths by which the longest and the shortest axis of a drop stand to each other: roots of the eigenvalues of its second moments.
+pub(super) fn semi_axes<const D: usize>(moments: &EnclosedMoments<D>) -> [f64; 2] {
+    let (least, most) = extreme_moments(moments);
+    [most.sqrt(), least.sqrt()]
+}
+
+/// The least and the largest eigenvalue of the central second moments.
+fn extreme_moments<const D: usize>(moments: &EnclosedMoments<D>) -> (f64, f64) {
+    let covariance = moments.covariance();
+    if D == 2 {
+        let mean = 0.5 * (covariance[(0, 0)] + covariance[(1, 1)]);
+        let half = (0.5 * (covariance[(0, 0)] - covariance[(1, 1)])).hypot(covariance[(0, 1)]);
+        return (mean - half, mean + half);
+    }
     let full = Matrix3::from_fn(|d, e| covariance[(d.min(D - 1), e.min(D - 1))]);
     let values = full.symmetric_eigenvalues();
-    let (most, least) = (values.max(), values.min());
-    ((most - least) / (most + least), f64::NAN)
+    (values.min(), values.max())
 }
 
 /// Perimeter of the disk of the same area by that of the interface, in space the area of the ball of the same volume.

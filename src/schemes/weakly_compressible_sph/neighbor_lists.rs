@@ -1,5 +1,7 @@
-//! Neighbor lists with a skin: they hold until a particle has moved by half of the skin.
+//! Neighbor lists with a skin: they hold until a particle has moved by half of the skin. In a box in shear they hold until neighbors have
+//! moved by the skin, half of it each about the mean flow and what that moves them past each other.
 
+use super::mean_shear::MeanShear;
 use crate::geometry::{Domain, Vector};
 use crate::neighbors::Pencils;
 use crate::neighbors::pencils::BoxTooSmall;
@@ -15,6 +17,20 @@ pub(super) struct NeighborLists<const D: usize> {
     reference: Vec<Vector<D>>,
     /// Number of the particles.
     count: usize,
+    sliding: Option<Sliding>,
+}
+
+/// How a mean shear moves particles and images since lists were made.
+#[derive(Debug)]
+struct Sliding {
+    shear: MeanShear,
+    /// Distance within which particles must find each other.
+    reach: f64,
+    /// Time at which the lists were made, and how images were displaced then.
+    listed: f64,
+    offset: f64,
+    /// The present time.
+    now: f64,
 }
 
 impl<const D: usize> NeighborLists<D> {
@@ -31,7 +47,44 @@ impl<const D: usize> NeighborLists<D> {
     ) -> Result<Self, BoxTooSmall> {
         let mut reference = vec![Vector::<D>::zeros(); count];
         reference.extend(fixed);
-        Ok(Self { domain: domain.clone(), pencils: Pencils::new(domain, cutoff)?, skin, reference, count })
+        let pencils = Pencils::new(domain, cutoff)?;
+        Ok(Self { domain: domain.clone(), pencils, skin, reference, count, sliding: None })
+    }
+
+    /// The same lists in a mean shear, of particles that must find each other within `reach`.
+    pub fn in_shear(mut self, shear: Option<MeanShear>, reach: f64) -> Self {
+        self.sliding = shear.map(|shear| Sliding { shear, reach, listed: 0.0, offset: 0.0, now: 0.0 });
+        self
+    }
+
+    /// Slides the images of a box in shear to where they are at a time.
+    pub fn slide_images(&mut self, domain: &Domain<D>, time: f64) {
+        let Some(Sliding { shear, listed, offset, now, .. }) = &mut self.sliding else { return };
+        self.domain = domain.clone();
+        *now = time;
+        self.pencils.slide(shear.axis, *offset + shear.offset(time) - shear.offset(*listed));
+    }
+
+    /// Time at which the lists of a box in shear were made.
+    pub fn listed_at(&self) -> Option<f64> {
+        self.sliding.as_ref().map(|sliding| sliding.listed)
+    }
+
+    /// Goes back to the time at which lists were made, as a restart does.
+    pub fn return_to(&mut self, time: f64) {
+        if let Some(Sliding { shear, now, .. }) = &mut self.sliding {
+            self.domain = shear.domain(&self.domain, time);
+            *now = time;
+        }
+    }
+
+    /// Where the mean flow has carried a place since the lists were made.
+    fn carried(&self, from: &Vector<D>) -> Vector<D> {
+        let mut place = *from;
+        if let Some(Sliding { shear, listed, now, .. }) = &self.sliding {
+            place[0] += shear.speed(from) * (now - listed);
+        }
+        place
     }
 
     /// Positions of the particles when the lists were made.
@@ -44,11 +97,14 @@ impl<const D: usize> NeighborLists<D> {
         &mut self.reference[..self.count]
     }
 
-    /// Whether the lists may miss a neighbor: there are none, or a particle has moved by half of the skin.
+    /// Whether the lists may miss a neighbor: there are none, or a particle has moved by half of the skin, in a shear by half of what
+    /// the mean flow has left of it.
     pub fn are_stale(&self, positions: &[Vector<D>]) -> bool {
-        let most = 0.25 * self.skin * self.skin;
-        let has_moved = |(x, from)| self.domain.displacement(from, x).norm_squared() > most;
-        self.pencils.slot_count() == 0 || positions.iter().zip(self.reference()).any(has_moved)
+        let strain = |sliding: &Sliding| sliding.shear.rate.abs() * (sliding.now - sliding.listed) * sliding.reach;
+        let skin = self.skin - self.sliding.as_ref().map_or(0.0, strain);
+        let most = 0.25 * skin * skin;
+        let has_moved = |(x, from)| self.domain.displacement(&self.carried(from), x).norm_squared() > most;
+        self.pencils.slot_count() == 0 || skin <= 0.0 || positions.iter().zip(self.reference()).any(has_moved)
     }
 
     /// Makes the lists of new positions.
@@ -59,6 +115,10 @@ impl<const D: usize> NeighborLists<D> {
 
     /// Makes the lists of the present reference positions, as a restart does.
     pub fn rebuild_from_reference(&mut self, interrupt: &Interrupt) -> Result<(), Interrupted> {
+        if let (Some(sliding), Some(tilt)) = (&mut self.sliding, self.domain.tilt()) {
+            (sliding.listed, sliding.offset) = (sliding.now, tilt.offset);
+            self.pencils.slide(tilt.axis, tilt.offset);
+        }
         self.pencils.rebuild(&self.reference, interrupt)
     }
 
@@ -66,7 +126,10 @@ impl<const D: usize> NeighborLists<D> {
     /// a fixed point.
     pub fn unwrapped(&self, i: usize, positions: &[Vector<D>]) -> Vector<D> {
         let from = &self.reference[i];
-        positions.get(i).map_or(*from, |position| from + self.domain.displacement(from, position))
+        positions.get(i).map_or(*from, |position| {
+            let from = self.carried(from);
+            from + self.domain.displacement(&from, position)
+        })
     }
 }
 

@@ -87,6 +87,8 @@ pub(super) struct PairLoop<'a, const D: usize> {
     pub pencils: &'a Pencils<D>,
     /// 1/ε.
     pub inverse_smoothing: f64,
+    /// An axis and how much the first component of the second vector changes with the way of an image along it.
+    pub image_shear: Option<(usize, f64)>,
     /// Ends the loop early.
     pub interrupt: &'a Interrupt,
 }
@@ -107,9 +109,13 @@ impl<const D: usize> PairLoop<'_, D> {
             if !meets(place) {
                 return;
             }
-            let own = columns.at(place);
+            let mut own = columns.at(place);
             let mut totals = [Lanes::splat(0.0); N];
+            let along = own.vectors[V - 1][0];
             for (shift, groups) in near.runs() {
+                if let (Some((axis, change)), true) = (self.image_shear, V > 1) {
+                    own.vectors[V - 1][0] = along + Lanes::splat(shift[axis] * change);
+                }
                 let x: [Lanes; D] = from_fn(|d| own.vectors[0][d] + Lanes::splat(shift[d] * self.inverse_smoothing));
                 columns.over(groups, window, |other| {
                     let (dx, square) = separation(&x, &other.vectors[0]);

@@ -4,6 +4,7 @@
 
 use super::column::Column;
 use super::kernel_choice::ScaledKernel;
+use super::mean_shear::MeanShear;
 use super::neighbor_lists::NeighborLists;
 use super::pair_sums::{Columns, Pair, PairLoop, Shares};
 use crate::geometry::Vector;
@@ -33,6 +34,8 @@ pub(super) struct PairWorkspace<const D: usize> {
     vectors: [Column; D],
     scalars: [Column; SCALARS],
     sums: Vec<Column>,
+    /// How the gathered vectors of images differ; see [`PairLoop::image_shear`].
+    image_shear: Option<(usize, f64)>,
     interrupt: Interrupt,
 }
 
@@ -53,6 +56,7 @@ impl<const D: usize> PairWorkspace<D> {
             vectors: from_fn(|d| Column::new(D + d)),
             sums: (0..most_sums(D)).map(|n| Column::new(2 * D + n)).collect(),
             scalars: from_fn(|n| Column::new(2 * D + most_sums(D) + n)),
+            image_shear: None,
             interrupt,
         }
     }
@@ -93,8 +97,27 @@ impl<const D: usize> PairWorkspace<D> {
 
     /// Gathers a vector of each particle, times a factor, into the vector columns.
     pub fn gather_vectors(&mut self, factor: f64, value: impl Fn(usize) -> Vector<D>) {
+        self.image_shear = None;
         for (d, column) in self.vectors.iter_mut().enumerate() {
             column.refill(self.lists.pencils.by_slot(0.0, |i| value(i)[d] * factor));
+        }
+    }
+
+    /// Gathers velocities, times a factor, into the vector columns: with the mean flow at the gathered positions, where there is one.
+    pub fn gather_velocities(
+        &mut self,
+        factor: f64,
+        mean_shear: Option<&MeanShear>,
+        velocity: impl Fn(usize) -> Vector<D>,
+    ) {
+        self.gather_vectors(factor, velocity);
+        let Some(MeanShear { axis, rate, middle, .. }) = mean_shear else { return };
+        let (rate, smoothing_length) = (rate * factor, self.kernel.smoothing_length);
+        self.image_shear = Some((*axis, rate));
+        for (velocity, place) in self.vectors[0].iter_mut().zip(&self.positions[*axis][..]) {
+            if *place < FAR {
+                *velocity += rate * (place * smoothing_length - middle);
+            }
         }
     }
 
@@ -119,11 +142,12 @@ impl<const D: usize> PairWorkspace<D> {
         share: impl Fn(&Pair<'_, D, V, S>) -> Shares<N> + Sync,
     ) -> Result<(), Interrupted> {
         let inverse_smoothing = self.inverse_smoothing();
-        let Self { lists, positions, vectors, scalars, sums, interrupt, .. } = self;
+        let Self { lists, positions, vectors, scalars, sums, image_shear, interrupt, .. } = self;
         let by_vector = [&positions[..], &vectors[..]];
         let columns: Columns<'_, D, V, S> =
             Columns { vectors: from_fn(|v| slices(by_vector[v])), scalars: slices(&scalars[..]) };
-        let pair_loop = PairLoop { pencils: &lists.pencils, inverse_smoothing, interrupt };
+        let image_shear = *image_shear;
+        let pair_loop = PairLoop { pencils: &lists.pencils, inverse_smoothing, image_shear, interrupt };
         pair_loop.sum(&columns, sums, |place| meets(&columns.scalars, place), share)
     }
 

@@ -44,6 +44,9 @@ quantities! {
         SURFACTANT_OFF_INTERFACE = "surfactant_off_interface", "", "Share of the surfactant on particles that are far from any interface.";
         COVERAGE_MIN = "coverage_min", "", "Least coverage of the interface by the surfactant.";
         COVERAGE_MAX = "coverage_max", "", "Largest coverage of the interface by the surfactant.";
+        SHEAR_STRESS = "shear_stress", "mass*length^(2-D)/time^2", "Mean shear stress of a box in shear, with that of the interface.";
+        STRAIN = "strain", "", "Shear rate times time of a box in shear.";
+        TAYLOR_DEFORMATION = "taylor_deformation", "", "(L - B)/(L + B) of the longest and the shortest axis of a single drop in a box in shear, by its second moments.";
         DROPLETS = "droplets", "", "Connected components of the inner fluid.";
         MACH = "mach", "", "Largest speed by the lower speed of sound.";
         CFL = "cfl", "spacings", "Longest way of a particle in a part of the last step.";

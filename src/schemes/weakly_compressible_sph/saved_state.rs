@@ -16,7 +16,7 @@ impl<const D: usize> SphSystem<D> {
         state.put_section("pressure", |section| {
             section.put_real("calibration", self.flow.calibration);
             section.put_real("background", self.flow.background);
-            if self.walls.is_some() {
+            if self.walls.is_some() || self.config.mean_shear.is_some() {
                 section.put_real("viscosity_factor", self.flow.viscosity_factor);
             }
             section.put_reals("last_volume", &self.flow.last_volume);
@@ -27,6 +27,9 @@ impl<const D: usize> SphSystem<D> {
             section.put_vectors("velocity", &self.flow.velocity);
             section.put_vectors("acceleration", &self.rates.acceleration);
             section.put_vectors("reference", self.pairs.lists.reference());
+            if let Some(time) = self.pairs.lists.listed_at() {
+                section.put_real("listed_at", time);
+            }
             section.put_reals("density", &self.flow.density);
             section.put_reals("density_rate", &self.rates.density);
         });
@@ -142,6 +145,9 @@ fn check_columns<const D: usize>(system: &SphSystem<D>, section: &Section) -> Re
     for name in ["velocity", "acceleration", "reference"] {
         section.reals_of(name, count * D)?;
     }
+    if system.config.mean_shear.is_some() {
+        section.real("listed_at")?;
+    }
     section.reals_of("density", count)?;
     section.reals_of("density_rate", system.rates.density.len())?;
     Ok(())
@@ -153,6 +159,9 @@ fn load_columns<const D: usize>(system: &mut SphSystem<D>, section: &Section) ->
     copy_vectors(section.reals("velocity")?, &mut system.flow.velocity);
     copy_vectors(section.reals("acceleration")?, &mut system.rates.acceleration);
     copy_vectors(section.reals("reference")?, system.pairs.lists.reference_mut());
+    if system.config.mean_shear.is_some() {
+        system.pairs.lists.return_to(section.real("listed_at")?);
+    }
     system.flow.density.copy_from_slice(section.reals("density")?);
     system.rates.density.copy_from_slice(section.reals("density_rate")?);
     Ok(())

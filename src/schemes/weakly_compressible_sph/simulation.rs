@@ -10,6 +10,7 @@ use super::guard::Guard;
 use super::monitors::{Row, deformation, load_row, names, save_row};
 use super::pacing::{PACING, measurement_interval};
 use super::quantities::{TIME, TIME_STEP, WAVE_AMPLITUDE};
+use super::shear_record::ShearRecord;
 use super::stepping::Stepper;
 use super::summary::Summary;
 use super::system::{EvaluationError, Instant, SphSystem};
@@ -49,6 +50,7 @@ pub struct WeaklyCompressibleSph<const D: usize> {
     wave: Option<WaveRecord>,
     tension: Option<TensionRecord<D>>,
     walls: Option<WallRecord>,
+    shear: Option<ShearRecord>,
     course: Course,
 }
 
@@ -74,6 +76,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         let has_surfactant = matches!(system.config.tension_law, Some(TensionLaw::Surfactant(_)));
         let tension = system.varying.as_ref().map(|_| TensionRecord::new(has_surfactant, end_time));
         let walls = system.walls.as_ref().map(|_| WallRecord::UNKNOWN);
+        let shear = system.config.mean_shear.map(|_| ShearRecord::UNKNOWN);
         let mut this = Self {
             failure: None,
             stepper: Stepper::new(&system.config, system.flow.count()),
@@ -89,6 +92,7 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
             wave,
             tension,
             walls,
+            shear,
             course: Course::new(pace, Phases::new(cpu_clock), method),
         };
         this.failure = this.begin().err();
@@ -149,6 +153,9 @@ impl<const D: usize> WeaklyCompressibleSph<D> {
         });
         self.row = row;
         let Clock { step, time } = self.clock();
+        if let Some(shear) = &mut self.shear {
+            shear.take(system, moments.as_ref(), time);
+        }
         self.summary.take_energy(time, contents.inner_kinetic());
         let of = |name: &str| self.row_value(name);
         let jump = of("pressure_inside") - of("pressure_outside");
@@ -350,6 +357,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         row.extend(self.wave.as_ref().map(|wave| (&WAVE_AMPLITUDE, wave.amplitude)));
         row.extend(self.tension.iter().flat_map(TensionRecord::observables));
         row.extend(self.walls.iter().flat_map(WallRecord::observables));
+        row.extend(self.shear.iter().flat_map(ShearRecord::observables));
         row
     }
 
@@ -378,6 +386,9 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         }
         if let Some(walls) = &self.walls {
             state.put_component("walls", walls);
+        }
+        if let Some(shear) = &self.shear {
+            state.put_component("shear", shear);
         }
     }
 
@@ -412,12 +423,17 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
             Some(_) => Some(state.component("walls")?),
             None => None,
         };
+        let shear = match self.shear {
+            Some(_) => Some(state.component("shear")?),
+            None => None,
+        };
         self.system.load(state)?;
         // 2. From here on nothing fails.
         // An interrupt ends the run before its next step.
         let _ = self.system.derive();
+        self.system.slide_images(clock.time);
         self.guard = guard.unwrap_or_else(|| Guard::new(&self.system));
-        (self.failure, self.wave, self.tension, self.walls) = (None, wave, tension, walls);
+        (self.failure, self.wave, self.tension, self.walls, self.shear) = (None, wave, tension, walls, shear);
         (self.parts_of_step, self.max_cfl, self.resting) = (parts_of_step.max(1), max_cfl, resting);
         (self.row, self.summary) = (row, summary.with_end(self.end_time));
         self.course.pace = pace;
@@ -445,6 +461,7 @@ impl<const D: usize> Simulation for WeaklyCompressibleSph<D> {
         errors.extend(self.tension.iter().flat_map(|record| record.errors(&self.system, measure, self.clock().time)));
         errors.extend(self.wave.iter().flat_map(|wave| wave.errors(self.clock().time)));
         errors.extend(self.walls.iter().flat_map(|walls| walls.errors(&self.system, self.clock().time)));
+        errors.extend(self.shear.iter().flat_map(|shear| shear.errors(&self.system, self.clock().time)));
         Report {
             errors,
             health: self.health(),

@@ -61,13 +61,15 @@ impl<const D: usize> Stepper<D> {
         let half = 0.5 * step;
         phases.measure("sph/advance", || {
             kick(system, half);
-            let (flow, domain) = (&mut system.flow, &system.domain);
+            system.slide_images(time + step);
+            let (flow, domain, shear) = (&mut system.flow, &system.domain, &system.config.mean_shear);
             for (x, u) in system.particles.positions_mut().iter_mut().zip(&flow.velocity) {
-                *x = domain.wrap(*x + u * step);
+                let way = shear.as_ref().map_or_else(|| u * step, |shear| shear.way(x, u, step));
+                *x = domain.wrap(*x + way);
             }
             let kicked = flow.velocity.iter().zip(&system.rates.acceleration);
             for (predicted, (u, a)) in flow.predicted.iter_mut().zip(kicked) {
-                *predicted = u + a * half;
+                *predicted = shear.as_ref().map_or_else(|| u + a * half, |shear| shear.kicked(u, a, half));
             }
             self.start.density.clone_from(&flow.density);
             add_scaled(&mut flow.density, half, &system.rates.density);
@@ -128,8 +130,9 @@ impl<const D: usize> Stepper<D> {
 
 /// Advances velocities, and integrated densities, by their rates.
 fn kick<const D: usize>(system: &mut SphSystem<D>, step: f64) {
+    let shear = &system.config.mean_shear;
     for (u, a) in system.flow.velocity.iter_mut().zip(&system.rates.acceleration) {
-        *u += a * step;
+        *u = shear.as_ref().map_or_else(|| *u + a * step, |shear| shear.kicked(u, a, step));
     }
     add_scaled(&mut system.flow.density, step, &system.rates.density);
 }

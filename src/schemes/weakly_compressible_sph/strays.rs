@@ -33,6 +33,11 @@ impl<const D: usize> Strays<D> {
         Self { cells: CellList::new(domain), found: Vec::new(), absorbed: 0, lost: 0, allowance, waiting: 0 }
     }
 
+    /// Replaces the domain.
+    pub fn set_domain(&mut self, domain: &Domain<D>) {
+        self.cells.set_domain(domain);
+    }
+
     /// Changes species and levels (signed distance and carried level) of the particles among `near` that have no neighbor of
     /// their own species, as far as the allowance lets them. All particles are
     /// judged by the species before the change.

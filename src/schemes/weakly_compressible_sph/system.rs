@@ -72,6 +72,12 @@ pub struct SphSystem<const D: usize> {
     pub(super) interrupt: Interrupt,
 }
 
+/// Lengths and times by which a surfactant is exchanged.
+fn scales<const D: usize>(config: &SphConfig<D>) -> Scales {
+    let repair_time = config.repair_time();
+    Scales { spacing: config.spacing, smoothing_length: config.smoothing_length, repair_time }
+}
+
 /// When an evaluation happens.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Instant {
@@ -100,7 +106,8 @@ impl<const D: usize> SphSystem<D> {
         let count = drop.positions.len();
         let walls = new_walls(&config, &domain, &drop.behind_walls, cell);
         let fixed = walls.iter().flat_map(Walls::positions);
-        let lists = NeighborLists::new(&domain, (config.cutoff(), config.skin()), count, fixed)?;
+        let lists = NeighborLists::new(&domain, (config.cutoff(), config.skin()), count, fixed)?
+            .in_shear(config.mean_shear, config.layer_thickness());
         config.body_force = config.body_force.take().map(|force| balance(force, &config.fluids, &drop.level));
         let kernel = ScaledKernel::new(config.kernel, config.smoothing_length, D);
         let mut particles = Particles::new(drop.positions);
@@ -108,20 +115,16 @@ impl<const D: usize> SphSystem<D> {
         particles.scalar_mut(columns.phi).copy_from_slice(&drop.level);
         let interface = new_interface(&config, &domain, &mut particles, &columns);
         let tension = config.has_tension().then(|| config.surface_tension());
-        let scales = Scales {
-            spacing: config.spacing,
-            smoothing_length: config.smoothing_length,
-            repair_time: config.repair_time(),
-        };
         let law = config.tension_law.filter(|_| interface.level_set().is_some());
-        let varying = law.map(|law| VaryingTension::new((law, config.tension), &domain, scales, &mut particles));
+        let varying =
+            law.map(|law| VaryingTension::new((law, config.tension), &domain, scales(&config), &mut particles));
         let contact_lines = tension
             .zip(config.container.clone())
             .map(|(tension, container)| ContactLines::new(container, tension, config.tension, config.smoothing_length));
         let mut forces: Vec<Box<dyn ParticleForce<D>>> = Vec::new();
         forces.extend(tension.map(|tension| Box::new(tension) as Box<dyn ParticleForce<D>>));
         forces.extend(config.body_force.clone().map(|force| Box::new(force) as Box<dyn ParticleForce<D>>));
-        Ok(Self {
+        let mut system = Self {
             flow: FlowState::in_motion(
                 config.fluids,
                 cell,
@@ -146,7 +149,9 @@ impl<const D: usize> SphSystem<D> {
             config,
             domain,
             interrupt,
-        })
+        };
+        system.slide_images(0.0);
+        Ok(system)
     }
 
     /// One evaluation: from positions, and the velocities in `predicted`, to rates. `elapsed` is the time since the last
@@ -246,7 +251,7 @@ impl<const D: usize> SphSystem<D> {
     /// Sets what pressures are measured by: the volumes of the start fill the box, and the background pressure follows from the
     /// curvature κ₀ of the smallest droplet. A layer has none; 2 by the shortest side of the box stands for it.
     ///
-    /// Between walls viscosities are calibrated, too: there friction decides the flow.
+    /// Between walls and in shear viscosities are calibrated, too: there friction decides the flow.
     ///
     /// Returns whether anything changed, so that the rates have to be found again.
     pub(super) fn calibrate(&mut self) -> Result<bool, Interrupted> {
@@ -259,7 +264,7 @@ impl<const D: usize> SphSystem<D> {
             let of_walls: &[f64] = self.walls.as_ref().map_or(&[], |walls| &walls.volume);
             let filled: f64 = self.flow.volume.iter().chain(of_walls).sum();
             self.flow.calibration *= self.flow.cell * (self.flow.count() + of_walls.len()) as f64 / filled;
-            if self.walls.is_some() {
+            if self.walls.is_some() || self.config.mean_shear.is_some() {
                 // Volumes scale with the calibration, and so does the share.
                 self.sum_densities()?;
                 let share = viscosity_share(&self.flow, self.walls.as_ref(), &mut self.pairs)?;

@@ -50,6 +50,7 @@ pub(super) fn setting<const D: usize>(kernel: KernelChoice, ratio: f64) -> Setti
         expected_speed: 3.0,
         is_adaptive: true,
         rest_below: None,
+        mean_shear: None,
         container: None,
         starts_in_layers: false,
         steady_flow: None,

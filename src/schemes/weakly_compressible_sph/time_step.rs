@@ -42,9 +42,12 @@ fn stability_numbers<const D: usize>(config: &SphConfig<D>) -> StabilityNumbers 
 #[must_use]
 pub fn longest_step<const D: usize>(config: &SphConfig<D>, speed: f64) -> StepLimit {
     let fluids = Species::ALL.map(|species| config.fluids[species]);
+    // A mean shear moves neighbors past each other.
+    let support = config.kernel.support() * config.smoothing_length;
+    let shear = config.mean_shear.map_or(0.0, |shear| shear.rate.abs() * support);
     let context = LimitContext {
         smoothing_length: config.smoothing_length,
-        speed,
+        speed: speed + shear,
         least_viscosity: if config.has_whole_stress() { config.fluids.least_viscosity() } else { f64::INFINITY },
         numbers: stability_numbers(config),
     };

@@ -19,6 +19,7 @@ use super::interactions::viscosity::{SpeciesViscosity, StressViscosity, UniformV
 use super::interactions::volume_pair::{STRESS, VISCOSITY, VOLUME};
 use super::interactions::{NoTerm, PairTerm};
 use super::kernel_choice::with_kernel;
+use super::mean_shear::MeanShear;
 use super::pair_sums::{Pair, Shares};
 use super::pair_workspace::PairWorkspace;
 use super::walls::{FlowAndWalls, Walls};
@@ -28,23 +29,25 @@ use crate::parallel::Interrupted;
 use crate::smoothing_kernels::RadialKernel;
 
 /// Which of the forms the forces take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Forms {
     pub pressure: PressureForm,
     /// Whether two viscosities act by the whole stress.
     pub has_whole_stress: bool,
+    /// The mean flow of a box in shear.
+    pub mean_shear: Option<MeanShear>,
 }
 
-/// Sets accelerations to those of the pair forces.
+/// Sets accelerations to those of the pair forces. Returns Σ_pairs F_x y_ij of a box in shear, 0 elsewhere.
 ///
 /// Points of walls take part as particles do; their forces are set, too.
 pub(super) fn accelerate<const D: usize>(
     flow: &FlowState<D>,
     mut walls: Option<&mut Walls<D>>,
-    Forms { pressure: form, has_whole_stress }: Forms,
+    Forms { pressure: form, has_whole_stress, mean_shear }: Forms,
     pairs: &mut PairWorkspace<D>,
     acceleration: &mut [Vector<D>],
-) -> Result<(), Interrupted> {
+) -> Result<f64, Interrupted> {
     let (by_cell, inverse) = (1.0 / pairs.cell, pairs.inverse_smoothing());
     let all = FlowAndWalls { flow, walls: walls.as_deref() };
     pairs.gather(VOLUME, 1.0, |i| all.volume(i) * by_cell);
@@ -60,20 +63,28 @@ pub(super) fn accelerate<const D: usize>(
     }
     let is_uniform = flow.fluids.have_one_viscosity();
     if is_uniform {
-        pairs.gather_vectors(flow.fluids.inside.viscosity * flow.viscosity_factor * inverse, |i| all.velocity(i));
+        let factor = flow.fluids.inside.viscosity * flow.viscosity_factor * inverse;
+        pairs.gather_velocities(factor, mean_shear.as_ref(), |i| all.velocity(i));
     } else {
         pairs.gather(VISCOSITY, 1.0, |i| all.viscosity(i));
-        pairs.gather_vectors(flow.viscosity_factor * inverse, |i| all.velocity(i));
+        pairs.gather_velocities(flow.viscosity_factor * inverse, mean_shear.as_ref(), |i| all.velocity(i));
     }
     let stress = StressViscosity { least: flow.fluids.least_viscosity() };
-    with_kernel!(pairs.kernel.choice, K => match (form, is_uniform) {
-        (PressureForm::Mean, true) => sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure), NoTerm),
-        (PressureForm::Mean, false) => sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure), NoTerm),
-        (PressureForm::Hamiltonian, true) => sum_forces::<K, D, 2>(pairs, UniformViscosity, HamiltonianPressure),
-        (PressureForm::Hamiltonian, false) if has_whole_stress => {
-            sum_forces::<K, D, 3>(pairs, stress, HamiltonianPressure)
+    let across = mean_shear.map(|shear| shear.axis);
+    let virial = with_kernel!(pairs.kernel.choice, K => match (form, is_uniform) {
+        (PressureForm::Mean, true) => sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure), NoTerm, across),
+        (PressureForm::Mean, false) => {
+            sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure), NoTerm, across)
         }
-        (PressureForm::Hamiltonian, false) => sum_forces::<K, D, 3>(pairs, SpeciesViscosity, HamiltonianPressure),
+        (PressureForm::Hamiltonian, true) => {
+            sum_forces::<K, D, 2>(pairs, UniformViscosity, HamiltonianPressure, across)
+        }
+        (PressureForm::Hamiltonian, false) if has_whole_stress => {
+            sum_forces::<K, D, 3>(pairs, stress, HamiltonianPressure, across)
+        }
+        (PressureForm::Hamiltonian, false) => {
+            sum_forces::<K, D, 3>(pairs, SpeciesViscosity, HamiltonianPressure, across)
+        }
     })?;
     // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
     let kernel = &pairs.kernel;
@@ -87,7 +98,7 @@ pub(super) fn accelerate<const D: usize>(
             walls.force[i - count] = force;
         }
     }
-    Ok(())
+    Ok(virial * factor * pairs.kernel.smoothing_length)
 }
 
 /// The share of its viscosity that a fluid has in the sums over pairs, −(1/D) Σ_j V_j w' r as a mean over the particles: 1 for
@@ -111,13 +122,15 @@ pub(super) fn viscosity_share<const D: usize>(
     Ok(own.sum::<f64>() / count as f64)
 }
 
-/// Sums w'/r times the terms over all pairs, `terms` with the factor V_i² + V_j², and `plain_terms` without it.
+/// Sums w'/r times the terms over all pairs, `terms` with the factor V_i² + V_j², and `plain_terms` without it. Returns the sum over
+/// pairs of the first component times the way of the pair along the axis `across`, in ε; 0 without one.
 fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
     pairs: &mut PairWorkspace<D>,
-    terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]>,
-    plain_terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]>,
-) -> Result<(), Interrupted> {
-    pairs.sum_pairs::<2, S, D>(|pair| {
+    terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]> + Sync,
+    plain_terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]> + Sync,
+    across: Option<usize>,
+) -> Result<f64, Interrupted> {
+    let force = |pair: &Pair<'_, D, 2, S>| {
         let slope: Lanes = K::slope_over_q(pair.q());
         let (volume, other_volume) = pair.scalar(VOLUME);
         let squares = Number::mul_add(other_volume, other_volume, volume * volume);
@@ -125,11 +138,19 @@ fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
         let force = terms.add_to([Lanes::splat(-0.0); D], pair);
         if plain_terms.is_none() {
             let common = slope * squares;
-            return Shares::opposite(force.map(|part| common * part));
+            return force.map(|part| common * part);
         }
         let force = plain_terms.add_to(force.map(|part| squares * part), pair);
-        Shares::opposite(force.map(|part| slope * part))
-    })
+        force.map(|part| slope * part)
+    };
+    let mut virial = 0.0;
+    if let Some(axis) = across {
+        let nothing = Lanes::splat(0.0);
+        pairs.sum_pairs::<2, S, 1>(|pair| Shares { own: [force(pair)[0] * pair.dx[axis]], other: [nothing] })?;
+        virial = pairs.occupied().map(|(place, _)| pairs.sum(0, place)).sum();
+    }
+    pairs.sum_pairs::<2, S, D>(|pair| Shares::opposite(force(pair)))?;
+    Ok(virial)
 }
 
 #[cfg(test)]
@@ -141,7 +162,7 @@ mod tests {
     use crate::schemes::weakly_compressible_sph::test_setting::{KERNELS, Setting, near, setting};
 
     fn plain(pressure: PressureForm) -> Forms {
-        Forms { pressure, has_whole_stress: false }
+        Forms { pressure, has_whole_stress: false, mean_shear: None }
     }
 
     fn check<const D: usize>(kernel: KernelChoice, ratio: f64) {
@@ -185,7 +206,7 @@ mod tests {
     #[test]
     fn the_whole_stress_of_two_viscosities_lets_both_fluids_turn() {
         let mut this = setting::<2>(KernelChoice::WendlandC2, 1.0);
-        let forms = Forms { pressure: PressureForm::Hamiltonian, has_whole_stress: true };
+        let forms = Forms { has_whole_stress: true, ..plain(PressureForm::Hamiltonian) };
         let forces = |this: &Setting<2>, viscosity: f64| {
             let (mut pairs, mut flow) = (this.gathered(), this.flow());
             (flow.fluids.inside.viscosity, flow.fluids.outside.viscosity) = (viscosity, 0.5);

@@ -175,6 +175,15 @@ impl<const D: usize> LevelSet<D> {
         self.carried
     }
 
+    /// Replaces the domain, before the surface is fitted anew.
+    pub fn set_domain(&mut self, domain: &Domain<D>) {
+        if let LevelSurface::Spatial(surface) = &mut self.surface {
+            surface.set_domain(domain);
+        }
+        self.filter.set_domain(domain);
+        self.cells.set_domain(domain);
+    }
+
     /// Distance from the surface up to which particles are candidates.
     pub fn keep(&self) -> f64 {
         self.keep

@@ -183,6 +183,12 @@ struct Cluster<const D: usize> {
 }
 
 impl<const D: usize> SurfaceFilter<D> {
+    /// Replaces the domain.
+    pub fn set_domain(&mut self, domain: &Domain<D>) {
+        self.cluster_cells.set_domain(domain);
+        self.domain = domain.clone();
+    }
+
     pub fn new(domain: Domain<D>) -> Self {
         Self {
             sorted: Vec::new(),
