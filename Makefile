@@ -2,7 +2,7 @@
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
-.PHONY: help build page demo test test-cluster screenshots soak soak-cluster dist load estimates check client check-deploy check-portable setup clean
+.PHONY: help build page demo test test-cluster screenshots soak soak-cluster dist load estimates check client reference check-deploy check-portable setup clean
 
 # Where the MPI flavour of libhdf5 is installed too, linking would pick it silently: name the serial one.
 ifneq ($(wildcard /usr/lib/*/hdf5/openmpi /usr/lib/*/hdf5/mpich),)
@@ -100,6 +100,12 @@ client: $(VENV)/ready
 	cargo build --profile test --locked -p meniscus-api
 	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)" MENISCUS_UPDATE=1 \
 	cargo test --locked --test service the_client_for_python
+
+# docs/reference, from what the service says of itself.
+reference: $(VENV)/ready
+	cargo build --profile test --locked -p meniscus-api
+	MENISCUS_BIN="$(abspath $(TARGET)/debug/meniscus)" MENISCUS_PYTHON="$(abspath $(VENV)/bin/python)" MENISCUS_UPDATE=1 \
+	cargo test --locked --test service the_reference_is
 
 check:
 	cargo fmt --all --check

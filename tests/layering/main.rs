@@ -1,4 +1,4 @@
-//! The structure of the sources: directions of use, circles of files, lengths, words.
+//! The structure of the sources: directions of use, circles of files, lengths, words; and links of documents.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod circles;
@@ -6,6 +6,7 @@ mod code;
 mod functions;
 mod imports;
 mod known;
+mod links;
 
 use code::{CRATES, all_sources, is_test_file, root, sources};
 use imports::Crate;

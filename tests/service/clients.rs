@@ -63,6 +63,26 @@ fn the_client_for_python_does_what_it_says() {
 }
 
 #[test]
+fn the_reference_is_what_the_service_says_of_itself() {
+    let Some(python) = python() else { return };
+    let (_directory, service) = service(&["--slots", "1"]);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (kept, written) = (root.join("docs/reference"), service.data.join("reference"));
+    let target = if std::env::var_os("MENISCUS_UPDATE").is_some() { &kept } else { &written };
+    run(Command::new(&python).arg(root.join("tests/python/reference.py")).arg(&service.url).arg(target));
+    let pages = |folder: &Path| {
+        let mut pages: Vec<(std::ffi::OsString, String)> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap())
+            .map(|entry| (entry.file_name(), std::fs::read_to_string(entry.path()).unwrap()))
+            .collect();
+        pages.sort();
+        pages
+    };
+    assert!(pages(target) == pages(&kept), "`make reference` writes docs/reference anew");
+}
+
+#[test]
 fn the_notebook_of_first_steps_runs() {
     let Some(python) = python() else { return };
     let (directory, service) = service(&["--slots", "2"]);
