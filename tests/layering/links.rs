@@ -40,7 +40,7 @@ fn targets(text: &str) -> impl Iterator<Item = &str> {
 #[test]
 fn links_of_documents_lead_somewhere() {
     let root = root();
-    let mut pages: Vec<PathBuf> = fs::read_dir(&root)
+    let mut pages: Vec<PathBuf> = fs::read_dir(root)
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "md"))
@@ -64,7 +64,7 @@ fn links_of_documents_lead_somewhere() {
                     || !is_page
                     || known.entry(file.clone()).or_insert_with(|| anchors(&file)).iter().any(|a| a == heading));
             if !leads {
-                broken.push(format!("{}: {target}", page.strip_prefix(&root).unwrap().display()));
+                broken.push(format!("{}: {target}", page.strip_prefix(root).unwrap().display()));
             }
         }
     }

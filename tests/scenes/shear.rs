@@ -103,7 +103,7 @@ fn a_drop_in_a_slow_shear_is_drawn_out_as_taylor_says_wherever_it_lies() {
     // The same place of the lattice, in the middle and across the sides.
     for center in [[0.8, 0.8], [0.82, 0.0]] {
         let drop = json!({
-            "spacing": 0.04, "end_time": 1.2, "surface_tension": 1,
+            "spacing": 0.04, "end_time": 1.8, "surface_tension": 1,
             "domain": {"low": [0, 0], "high": [side, side], "axes": ["periodic", {"type": "lees_edwards", "shear_rate": rate}]},
             "shape": {"type": "circle", "center": center, "radius": radius},
             "fluids": {"inside": {"sound_speed": 25, "viscosity": 1}, "outside": {"sound_speed": 25, "viscosity": 1}}

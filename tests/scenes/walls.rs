@@ -239,6 +239,20 @@ fn a_drop_on_a_wall_keeps_its_angle_and_a_flow_between_walls_its_profile() {
     assert!(error(&run(&flow), "velocity", "relative", None) < 5e-3);
 }
 
+/// Walls that pass each other put in what viscosity takes, ηγ² V t; what lies behind them does no work on itself.
+#[test]
+fn the_work_of_moving_walls_is_that_of_the_shear_between_them() {
+    let start = json!({"inside": ["y", 0], "outside": ["y", 0]});
+    let between = json!({
+        "surface_tension": 0, "end_time": 0.2, "initial_velocity": start,
+        "fluids": {"inside": {"sound_speed": 15, "viscosity": 1}, "outside": {"sound_speed": 15, "viscosity": 1}}
+    });
+    let walls = json!(["periodic", {"high": {"velocity": [1, 0]}}]);
+    let simulation = finished(&body(&walls, &between));
+    let work = observable(simulation.as_ref(), "work");
+    assert!((work / 0.2 - 1.0).abs() < 0.05, "{work}");
+}
+
 #[test]
 fn particles_stay_between_walls() {
     let moved = body(

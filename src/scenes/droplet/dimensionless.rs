@@ -123,7 +123,7 @@ fn implied_in<const D: usize>(given: Given, shape: Option<Shape>) -> Preset {
         .map_or(0.0, |bond| bond * tension / ((inside.density - outside.density).abs() * diameter * diameter));
     // Without a difference of densities no gravity has that number, and the check of the numbers says so.
     let gravity = if gravity.is_finite() { gravity } else { 0.0 };
-    let fall = gravity * longest_side(&domain);
+    let fall = (gravity * longest_side(&domain)).max(domain.side_speed(radius).powi(2));
     let stiff = |fluid: FluidSpec| {
         let least = least_sound_speed(&fluid, Some(radius), tension, fall);
         FluidSpec { sound_speed: STIFFNESS_MARGIN * least, ..fluid }

@@ -73,14 +73,14 @@ impl SceneNumbers {
         least_sound_speed(fluid, self.radius, self.largest_tension, fall)
     }
 
-    /// A warning for each fluid that is softer than c² = 100 max(τ/(ρR), gL).
+    /// A warning for each fluid that is softer than c² = 100 max(τ/(ρR), gL, u²).
     pub fn soft_fluids(&self, spec: &Droplet) -> Vec<Finding> {
         let fluids = [("inside", &spec.fluids.inside), ("outside", &spec.fluids.outside)];
         let soft = fluids.into_iter().map(|(name, fluid)| (name, fluid.sound_speed, self.least_sound_speed(fluid)));
         let soft = soft.filter(|(_, sound_speed, least)| sound_speed < least);
         soft.map(|(name, sound_speed, least)| {
             let message = format!(
-                "the fluid {name} is compressed: its speed of sound is {sound_speed}, 100 max(τ/(ρR), gL) asks for {least:.4}"
+                "the fluid {name} is compressed: its speed of sound is {sound_speed}, 100 max(τ/(ρR), gL, u²) asks for {least:.4}"
             );
             Finding::warning("soft_fluid", message, (0, 0.0)).with_advice("a higher speed of sound helps")
         })
@@ -104,7 +104,7 @@ impl SceneNumbers {
     }
 }
 
-/// The least speed of sound that keeps a fluid nearly incompressible: c² = 100 max(τ/(ρR), gL). `fall` is gL.
+/// The least speed of sound that keeps a fluid nearly incompressible: c² = 100 max(τ/(ρR), gL, u²). `fall` is the larger of gL and u².
 pub(super) fn least_sound_speed(fluid: &FluidSpec, radius: Option<f64>, tension: f64, fall: f64) -> f64 {
     let capillary = radius.map_or(0.0, |radius| tension / (fluid.density * radius));
     (TUNING.stiffness * capillary.max(fall)).sqrt()

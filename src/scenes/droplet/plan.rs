@@ -173,13 +173,13 @@ fn plan<const D: usize>(mut spec: Droplet) -> Planned {
     let parts = part_count(shape.as_ref().map(|(shape, ..)| shape), surface);
     let (velocity, motion, speeds) = motion_at_start::<D>(&spec, parts, &room, &mut errors);
     let start = StartBox { shape: shape.as_ref().map(|(shape, ..)| shape), surface, low, lengths };
-    let tensions = [tension, tension * largest_tension(&spec, &start)];
-    let numbers = SceneNumbers::new(start.radius(), tensions, speeds, &lengths);
+    let speeds = shear::with_shear(speeds, room.mean_shear.as_ref(), (start.shape, start.radius()));
+    let numbers =
+        SceneNumbers::new(start.radius(), [tension, tension * largest_tension(&spec, &start)], speeds, &lengths);
     let expected_speed = numbers.expected_speed(&spec);
     let scheme = (geometry, smoothing_length, expected_speed, &room);
     let mut config = sph_config(&mut spec, &case, &flow, scheme, given_step, &mut errors);
-    config.is_at_rest = motion.is_none();
-    config.start_velocity = velocity;
+    (config.is_at_rest, config.start_velocity) = (motion.is_none(), velocity);
     config.tension_law = tension_law(&spec, &start, &config, &mut errors);
     let named = shape.as_ref().map(|(shape, ..)| shape);
     config.wave = named.and_then(|shape| standing_wave(shape, &spec, (tension, config.body_force.as_ref()), &room));
@@ -223,7 +223,7 @@ fn enclose<const D: usize>(
     (room, numbers, scope): (&Room<D>, &SceneNumbers, Scope),
     errors: &mut Vec<Violation>,
 ) {
-    shear::check(spec, config, (scope, !room.obstacles.is_empty()), errors);
+    shear::check(spec, config, scope, errors);
     let is_flat = matches!(shape, Some(Shape::Layer { amplitude: 0.0, .. }));
     config.starts_in_layers = is_flat && (room.container.is_some() || room.mean_shear.is_some());
     if room.container.is_none() {

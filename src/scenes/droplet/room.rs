@@ -96,7 +96,7 @@ impl<const D: usize> Room<D> {
     /// Along a periodic axis a force meets no wall: between walls that hold the fluids it drives the flow of Poiseuille, at most
     /// |g| H²/(8ν), or what falls freely until then.
     pub fn driven(&self, spec: &Droplet, acceleration: &Vector<D>) -> (f64, f64) {
-        let Some(container) = &self.container else { return (acceleration.norm(), self.side_speed()) };
+        let Some(container) = &self.container else { return (acceleration.norm(), 0.0) };
         let bounded = |d: usize| if container.is_bounded(d) { acceleration[d] } else { 0.0 };
         let across = Vector::<D>::from_fn(|d, _| bounded(d));
         let along = (acceleration - across).norm();
@@ -106,14 +106,13 @@ impl<const D: usize> Room<D> {
         let poiseuille = self.gap().filter(|_| holds).map_or(f64::INFINITY, |gap| along * gap * gap / (8.0 * least));
         let falling = (2.0 * along * self.lengths().max()).sqrt();
         let slide = if along > 0.0 { poiseuille.min(falling) } else { 0.0 };
-        (across.norm(), slide.max(self.side_speed()))
+        (across.norm(), slide.max(self.wall_speed()))
     }
 
-    /// The largest speed of a wall, or of the sides of a box in shear.
-    pub fn side_speed(&self) -> f64 {
-        let walls = self.container.iter().flat_map(Container::walls).map(|wall| wall.velocity.norm());
-        let sheared = self.mean_shear.iter().map(|shear| 0.5 * (shear.rate * shear.length).abs());
-        walls.chain(sheared).fold(0.0, f64::max)
+    /// The largest speed of a wall.
+    pub fn wall_speed(&self) -> f64 {
+        let walls = self.container.iter().flat_map(Container::walls);
+        walls.map(|wall| wall.velocity.norm()).fold(0.0, f64::max)
     }
 
     /// The shortest distance of walls that face each other.

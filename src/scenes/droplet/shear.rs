@@ -3,6 +3,7 @@
 use super::formulation::Scope;
 use super::spec::{AxisSpec, Droplet, GeometryChoice, IntegratorWord};
 use crate::geometry::Vector;
+use crate::scenes::shapes::Shape;
 use crate::schemes::weakly_compressible_sph::{MeanShear, SphConfig};
 use crate::spec::{Choice, Parameter, Violation};
 use serde_json::{Value, json};
@@ -36,13 +37,22 @@ pub(super) fn mean_shear<const D: usize>(
     (axis > 0).then_some(MeanShear { axis, rate, middle, length })
 }
 
+/// The speeds of a scene (gravity, velocity at the start, own speed) with that by which a shear moves the fluids about its mean flow: γR
+/// around a drop, up to that of the sides where layers share the shear.
+pub(super) fn with_shear(
+    [gravity, start, own]: [f64; 3],
+    mean_shear: Option<&MeanShear>,
+    (shape, radius): (Option<&Shape>, Option<f64>),
+) -> [f64; 3] {
+    let Some(shear) = mean_shear else { return [gravity, start, own] };
+    let half = 0.5 * shear.length;
+    let is_layer = matches!(shape, Some(Shape::Layer { .. }));
+    let reach = radius.filter(|_| !is_layer).map_or(half, |radius| radius.min(half));
+    [gravity, start, own.max(shear.rate.abs() * reach)]
+}
+
 /// Errors where the rest of a scene does not suit a box in shear.
-pub(super) fn check<const D: usize>(
-    spec: &Droplet,
-    config: &SphConfig<D>,
-    (scope, has_obstacles): (Scope, bool),
-    errors: &mut Vec<Violation>,
-) {
+pub(super) fn check<const D: usize>(spec: &Droplet, config: &SphConfig<D>, scope: Scope, errors: &mut Vec<Violation>) {
     if config.mean_shear.is_none() {
         return;
     }
@@ -64,7 +74,7 @@ pub(super) fn check<const D: usize>(
         (config.body_force.is_none(), "/body_force", spec.body_force.to_json(), json!({"type": "none"})),
         (spec.tension_slope.is_none(), "/tension_slope", spec.tension_slope.to_json(), Value::Null),
         (spec.surfactant.is_none(), "/surfactant", spec.surfactant.to_json(), Value::Null),
-        (!has_obstacles, "/obstacles", Value::Null, Value::Null),
+        (spec.obstacles.is_none(), "/obstacles", spec.obstacles.to_json(), Value::Null),
     ];
     for (_, pointer, got, allowed) in needs.into_iter().filter(|(holds, ..)| !holds) {
         errors.push(Violation::new(pointer, "conflict", "it does not go with a box in shear", got, allowed));

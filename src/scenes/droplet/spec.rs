@@ -262,6 +262,18 @@ impl WallSpec {
 }
 
 impl BoxSpec {
+    /// The largest speed at which walls move, or at which a shear moves what is a radius away.
+    #[must_use]
+    pub fn side_speed(&self, radius: f64) -> f64 {
+        let wall = |wall: &WallSpec| wall.velocity.iter().flat_map(|v| v.iter()).map(|u| u * u).sum::<f64>().sqrt();
+        let speeds = self.axes.iter().flat_map(|axes| &axes.0).map(|axis| match axis {
+            AxisSpec::Periodic => 0.0,
+            AxisSpec::Walls { low, high } => wall(low).max(wall(high)),
+            AxisSpec::LeesEdwards { shear_rate } => (shear_rate * radius).abs(),
+        });
+        speeds.fold(0.0, f64::max)
+    }
+
     /// Whether there are walls along any axis.
     #[must_use]
     pub fn has_walls(&self) -> bool {
@@ -460,7 +472,7 @@ crate::group! {
         redistancing: Option<RedistancingChoice>;
         /// radius in h of the surface filter of the curvature, 0 for none, for geometry pcp; by tension_force when not given
         curvature_filter_h: Option<f64>, in NOT_NEGATIVE.and_at_most(20.0);
-        /// particle shifting; when not given, pst where a force or a moving wall deforms fluids between walls, else by case
+        /// particle shifting; when not given, pst where a force, a moving wall or a shear deforms fluids between walls or in a box in shear, else by case
         shifting: Option<Shifting>;
         /// a force from outside; by case when not given
         body_force: Option<ForceChoice>;

@@ -20,7 +20,8 @@ pub(super) fn is_stirred<const D: usize>(spec: &Droplet, force: Option<&BodyForc
         return false;
     }
     let is_flat = matches!(spec.shape, Some(Shape::Layer { amplitude: 0.0, .. }));
-    (!is_flat || !room.obstacles.is_empty()) && (force.is_some() || room.side_speed() > 0.0)
+    let is_sheared = room.mean_shear.is_some_and(|shear| shear.rate != 0.0);
+    (!is_flat || !room.obstacles.is_empty()) && (force.is_some() || is_sheared || room.wall_speed() > 0.0)
 }
 
 /// A warning where the pressure of the whole weight of fluids that move holds them back: pressure acts as an elasticity of the lattice of

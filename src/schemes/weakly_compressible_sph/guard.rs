@@ -139,8 +139,9 @@ impl<const D: usize> Guard<D> {
     /// Work of surface tension since the drop came to rest, beyond that of the shrinking interface, in a capillary time
     /// √(ρR³/τ) by the surface energy at the start; NaN in motion, and for the first capillary time of rest.
     fn creep(&mut self, system: &SphSystem<D>, contents: &Contents<D>, time: f64) -> f64 {
-        if system.varying.is_some() || system.droplets.has_contact() {
-            // A slope works, a surfactant spreads, and so does a drop on a wall.
+        let is_sheared = system.config.mean_shear.is_some();
+        if system.varying.is_some() || system.droplets.has_contact() || is_sheared {
+            // A slope works, a surfactant spreads, and so does a drop on a wall; a shear draws drops out.
             return f64::NAN;
         }
         let tension = system.config.tension;

@@ -16,7 +16,7 @@ use super::config::PressureForm;
 use super::flow_state::FlowState;
 use super::interactions::pressure::{HamiltonianPressure, VolumePressure};
 use super::interactions::viscosity::{SpeciesViscosity, StressViscosity, UniformViscosity};
-use super::interactions::volume_pair::{STRESS, VISCOSITY, VOLUME};
+use super::interactions::volume_pair::{STRESS, VISCOSITY, VOLUME, WALL};
 use super::interactions::{NoTerm, PairTerm};
 use super::kernel_choice::with_kernel;
 use super::mean_shear::MeanShear;
@@ -70,26 +70,24 @@ pub(super) fn accelerate<const D: usize>(
         pairs.gather_velocities(flow.viscosity_factor * inverse, mean_shear.as_ref(), |i| all.velocity(i));
     }
     let stress = StressViscosity { least: flow.fluids.least_viscosity() };
-    let across = mean_shear.map(|shear| shear.axis);
+    let count = flow.count();
+    let ways = Ways { across: mean_shear.map(|shear| shear.axis), has_walls: walls.is_some() };
+    if ways.has_walls {
+        pairs.gather(VISCOSITY, 1.0, |i| all.viscosity(i));
+        pairs.gather(WALL, 0.0, |i| f64::from(u8::from(i >= count)));
+    }
     let virial = with_kernel!(pairs.kernel.choice, K => match (form, is_uniform) {
-        (PressureForm::Mean, true) => sum_forces::<K, D, 2>(pairs, (UniformViscosity, VolumePressure), NoTerm, across),
-        (PressureForm::Mean, false) => {
-            sum_forces::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure), NoTerm, across)
-        }
-        (PressureForm::Hamiltonian, true) => {
-            sum_forces::<K, D, 2>(pairs, UniformViscosity, HamiltonianPressure, across)
-        }
+        (PressureForm::Mean, true) => sum_ways::<K, D, 2>(pairs, (UniformViscosity, VolumePressure), NoTerm, ways),
+        (PressureForm::Mean, false) => sum_ways::<K, D, 3>(pairs, (SpeciesViscosity, VolumePressure), NoTerm, ways),
+        (PressureForm::Hamiltonian, true) => sum_ways::<K, D, 2>(pairs, UniformViscosity, HamiltonianPressure, ways),
         (PressureForm::Hamiltonian, false) if has_whole_stress => {
-            sum_forces::<K, D, 3>(pairs, stress, HamiltonianPressure, across)
+            sum_ways::<K, D, 3>(pairs, stress, HamiltonianPressure, ways)
         }
-        (PressureForm::Hamiltonian, false) => {
-            sum_forces::<K, D, 3>(pairs, SpeciesViscosity, HamiltonianPressure, across)
-        }
+        (PressureForm::Hamiltonian, false) => sum_ways::<K, D, 3>(pairs, SpeciesViscosity, HamiltonianPressure, ways),
     })?;
     // ∇W = σ/ε^(D+1) w'(q)/q x/ε.
     let kernel = &pairs.kernel;
     let factor = pairs.cell * pairs.cell * kernel.normalization * kernel.slope() / kernel.smoothing_length;
-    let count = flow.count();
     for (place, i) in pairs.occupied() {
         let force = pairs.vector_sum(place) * factor;
         if i < count {
@@ -122,6 +120,37 @@ pub(super) fn viscosity_share<const D: usize>(
     Ok(own.sum::<f64>() / count as f64)
 }
 
+/// In which ways sums of forces differ from that of all pairs of particles.
+#[derive(Debug, Clone, Copy)]
+struct Ways {
+    /// The axis along which a box is sheared: the virial is wanted.
+    across: Option<usize>,
+    /// Whether some are points of walls: two of them feel no force. Behind walls that face each other they are neighbors around the
+    /// box, and walls that pass each other would do work on each other.
+    has_walls: bool,
+}
+
+/// Scalar columns where there are walls.
+const WITH_WALLS: usize = WALL + 1;
+
+/// [`sum_forces`] with as many scalar columns as a scene has.
+fn sum_ways<K: RadialKernel, const D: usize, const S: usize>(
+    pairs: &mut PairWorkspace<D>,
+    terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]>
+    + for<'a> PairTerm<Pair<'a, D, 2, WITH_WALLS>, [Lanes; D]>
+    + Sync,
+    plain_terms: impl for<'a> PairTerm<Pair<'a, D, 2, S>, [Lanes; D]>
+    + for<'a> PairTerm<Pair<'a, D, 2, WITH_WALLS>, [Lanes; D]>
+    + Sync,
+    Ways { across, has_walls }: Ways,
+) -> Result<f64, Interrupted> {
+    if has_walls {
+        sum_forces::<K, D, WITH_WALLS>(pairs, terms, plain_terms, across)
+    } else {
+        sum_forces::<K, D, S>(pairs, terms, plain_terms, across)
+    }
+}
+
 /// Sums w'/r times the terms over all pairs, `terms` with the factor V_i² + V_j², and `plain_terms` without it. Returns the sum over
 /// pairs of the first component times the way of the pair along the axis `across`, in ε; 0 without one.
 fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
@@ -136,6 +165,13 @@ fn sum_forces<K: RadialKernel, const D: usize, const S: usize>(
         let squares = Number::mul_add(other_volume, other_volume, volume * volume);
         // −0 is the sum of no terms: adding it changes no number, and costs nothing.
         let force = terms.add_to([Lanes::splat(-0.0); D], pair);
+        // Times 1 exactly, or 0 between two points of walls.
+        let slope = if S == WITH_WALLS {
+            let (own, other) = pair.scalar(S - 1);
+            slope * (Lanes::splat(1.0) - own * other)
+        } else {
+            slope
+        };
         if plain_terms.is_none() {
             let common = slope * squares;
             return force.map(|part| common * part);

@@ -8,3 +8,5 @@ pub const VOLUME: usize = 0;
 pub const STRESS: usize = 1;
 /// Scalar column: dynamic viscosities η, where they differ.
 pub const VISCOSITY: usize = 2;
+/// Scalar column, where there are walls: 1 for points of walls, 0 for particles.
+pub const WALL: usize = 3;
