@@ -58,8 +58,8 @@ export function Plot({ x, xLabel, curves, logX = false, logY = false, height = 2
                 height,
                 scales: { x: { time: false, distr: logX ? 3 : 1 }, y: { distr: logY ? 3 : 1 } },
                 axes: [
-                    // Over less than a decade all ticks have their numbers.
-                    { ...axis, label: xLabel, labelSize: 20, ...(logX && isShort(data[0]) ? { filter: (_: uPlot, ticks: number[]) => ticks } : {}) },
+                    // Over less than a decade those at 1, 2 and 5 have numbers, not the powers of ten alone.
+                    { ...axis, label: xLabel, labelSize: 20, ...(logX && isShort(data[0]) ? { filter: (_: uPlot, ticks: number[]) => ticks.map((tick) => (/^[125]/.test(tick.toExponential(0)) ? tick : null)) } : {}) },
                     { ...axis, size: 70 },
                 ],
                 legend: { live: true },
